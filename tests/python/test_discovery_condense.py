@@ -11,7 +11,7 @@ from separatrix.discovery.measured import tables
 from separatrix.discovery.measured.condense import (
     NODES,
     _basis,
-    _spread,
+    _stretch_noise,
     condense,
     expected_left,
     stride,
@@ -42,7 +42,7 @@ def test_values_of_a_stretch_have_independent_errors_and_follow_their_degree(siz
     q, nodes, values = _basis(size)
     weights = values @ q[:, :NODES].T
     covariance = weights @ weights.T
-    assert np.allclose(covariance, np.diag(_spread(size, 0.0) ** 2), atol=1e-12)
+    assert np.allclose(covariance, np.diag(_stretch_noise(size, 0.0)[0] ** 2), atol=1e-12)
     for degree in range(NODES + 1):
         # one degree more than the polynomial has
         assert np.allclose(weights @ np.arange(size) ** float(degree), nodes**degree, rtol=1e-9)
@@ -55,11 +55,42 @@ def test_noise_with_memory_spreads_the_values_and_leaves_what_is_expected(memory
     drawn = random.standard_normal((20_000, size)) @ np.linalg.cholesky(memory**lags).T
     q, _, values = _basis(size)
     terms = drawn @ q[:, :NODES]
-    assert np.allclose(np.std(terms @ values.T, axis=0), _spread(size, memory), rtol=0.03)
+    assert np.allclose(np.std(terms @ values.T, axis=0), _stretch_noise(size, memory)[0], rtol=0.03)
     rest = drawn - terms @ q[:, :NODES].T
     power, product = expected_left(size, memory)
     assert np.isclose(np.mean(np.sum(rest**2, axis=1)), power, rtol=0.02)
     assert np.isclose(np.mean(np.sum(rest[:, 1:] * rest[:, :-1], axis=1)), product, atol=0.02 * power)
+
+
+@pytest.mark.parametrize("memory", [0.3, 0.5, 0.8])
+def test_rows_are_linked_as_the_noise_of_their_samples(memory):
+    """Spreads and correlations of neighbours against weights times the dense covariance of the samples."""
+    record = moving(0.3)
+    kept = np.zeros(record.t.size, bool)
+    kept[900:960] = True
+    rows = condensed(record, kept=kept)
+    count = rows.size.size
+    assert len(rows.lengths) > 1
+    assert np.any(rows.size == 1)
+    places, weights = [], []
+    for k in range(count):
+        size, node = int(rows.size[k]), int(rows.node[k])
+        if size == 1:
+            places.append((round(rows.place[k]), 1))
+            weights.append(np.ones(1))
+        else:
+            q, nodes, values = _basis(size)
+            places.append((round(rows.place[k] - nodes[node]), size))
+            weights.append((values @ q[:, :NODES].T)[node])
+    design = np.zeros((count, max(first + size for first, size in places)))
+    for k, ((first, size), weight) in enumerate(zip(places, weights, strict=True)):
+        design[k, first : first + size] = weight
+    lags = np.abs(np.subtract.outer(np.arange(design.shape[1]), np.arange(design.shape[1])))
+    covariance = design @ (memory**lags) @ design.T
+    spread = np.sqrt(np.diag(covariance))
+    assert np.allclose(rows.spread(memory), spread, rtol=1e-6)
+    beside = np.diag(covariance, -1) / (spread[1:] * spread[:-1])
+    assert np.allclose(rows.links(memory)[1:], beside, atol=1e-9)
 
 
 def test_a_fit_to_the_rows_is_the_fit_to_the_samples():

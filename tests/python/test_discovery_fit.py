@@ -17,6 +17,7 @@ from separatrix.discovery.fitting.base import measure_noise
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import blocking, minimise
 from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.noise import Noise
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, gauss_newton_step
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import project
@@ -296,8 +297,8 @@ def test_a_segment_bars_the_way_of_a_step_where_it_loses_more_than_all_gain(jump
 
 def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch):
     """Only the quiet record has v; the memory of the noise is kept, because the machine misses nothing."""
-    answers = {0: ({0: 1.0, 1: 1.0}, 0.5), 1: ({0: 2.0}, 0.0)}
-    monkeypatch.setattr(base_module, "noise_of", lambda problem, fit, channel, mass: answers[channel])
+    answers = {0: Noise({0: 1.0, 1: 1.0}, 0.5), 1: Noise({0: 2.0}, 0.0)}
+    monkeypatch.setattr(base_module, "noise_of", lambda _problem, _fit, channel, *_: answers[channel])
     prepared = [
         SimpleNamespace(
             sigma=sigma,

@@ -11,7 +11,7 @@ from separatrix.discovery.decision import decide, misfit
 from separatrix.discovery.decision.decide import Decision, _without_name
 from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet
 from separatrix.discovery.fitting.base import limit_noise
-from separatrix.discovery.fitting.noise import white_share
+from separatrix.discovery.fitting.noise import Noise, white_share
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 
@@ -31,6 +31,7 @@ def data(sigma: float, scatter: float) -> SimpleNamespace:
             sigma=sigma,
             sigma_stated=True,
             resolution=0.0,
+            doubt=1.0,
         )
         for name, one in zip(("first", "second"), noise, strict=True)
     ]
@@ -60,7 +61,7 @@ def test_the_records_that_are_missed_are_named():
 @pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])
 def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, training, held_out, outcome):
     # without faults of a rig
-    monkeypatch.setattr(decide, "cleaned", lambda problem, fitted: fitted)
+    monkeypatch.setattr(decide, "cleaned_prediction", lambda base, told: told.fit)
     bench = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
     first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
     foretold = SimpleNamespace(problem=None, fit=fit(1, held_out))
@@ -72,7 +73,7 @@ def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, train
 
 def test_stated_noise_is_doubted_where_the_samples_show_another(monkeypatch):
     """Scatter that only the fit shows is what the machine lacks."""
-    monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 30.0, 1: 30.0}, 0.0))
+    monkeypatch.setattr(misfit, "noise_of", lambda *_: Noise({0: 30.0, 1: 30.0}, 0.0))
     assert doubted_noise(data(1e-3, 1e-3), BODY, fit(900, 900), 1) == []
     said = doubted_noise(data(1e-4, 1e-3), BODY, fit(900, 900), 1)
     assert [text.split(":")[0] for text in said] == ["first", "second"]
@@ -80,7 +81,7 @@ def test_stated_noise_is_doubted_where_the_samples_show_another(monkeypatch):
 
 
 def test_noise_that_is_stated_too_large_is_doubted(monkeypatch):
-    monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 0.01, 1: 0.01}, 0.0))
+    monkeypatch.setattr(misfit, "noise_of", lambda *_: Noise({0: 0.01, 1: 0.01}, 0.0))
     said = doubted_noise(data(0.1, 1e-3), BODY, fit(1e-4, 1e-4), 1)
     assert all("scatter by only 0.001 m" in text for text in said)
     assert len(said) == 2
@@ -89,7 +90,7 @@ def test_noise_that_is_stated_too_large_is_doubted(monkeypatch):
 
 
 def test_unstated_noise_far_above_the_scatter_of_the_samples_is_told(monkeypatch):
-    monkeypatch.setattr(misfit, "noise_of", lambda *_: ({0: 1.0, 1: 1.0}, 0.0))
+    monkeypatch.setattr(misfit, "noise_of", lambda *_: Noise({0: 1.0, 1: 1.0}, 0.0))
     taken = data(1e-2, 1e-3)
     for one in taken.prepared:
         one.sigma_stated, one.memory = False, 0.0

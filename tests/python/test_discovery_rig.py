@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fitting.base import fit_base
+from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import ceiling
-from separatrix.discovery.fitting.data import gather
+from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.heldout import Known, predict
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import cleaned, share_beside_faults
+from separatrix.discovery.fitting.refit import Fitted, values_of
+from separatrix.discovery.fitting.rig import (
+    beside_faults,
+    cleaned,
+    cleaned_prediction,
+    share_beside_faults,
+    share_foretold,
+)
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.library import Model
@@ -69,3 +77,60 @@ def test_an_effect_is_its_own_as_far_as_it_is_larger_than_faults_of_a_rig():
 def test_what_is_a_fault_of_the_rig_is_no_effect():
     base, _ = fitted_base(drag=0.0, curved=1e-3)
     assert share_beside_faults(replace(base, fit=cleaned(base.problem, base.fit)), base) < 0.3
+
+
+def three_records(curved: tuple[float, float, float], drag: float = 0.0) -> tuple[Model, list]:
+    """Two records and one held out of the machine of a machine with drag; each sensor has its own curve."""
+    base = Model.from_text(CASE)
+    true = base.with_effect("quadratic_drag", {"coefficient": drag}) if drag else base
+    t = np.arange(1200) / 125
+    prepared = []
+    for number, (ratio, square) in enumerate(zip((1.1, 0.8, 1.3), curved, strict=True)):
+        start = np.array([[0.6, 0.0, 0.4]])
+        paths, values = ["drive.ratio"], np.array([ratio])
+        x = true.segments(paths, values, start, np.array([0, t.size]), t, derivatives=False).x
+        noise = np.random.default_rng([5, number]).standard_normal(t.size)
+        x = x + square * x.std() * ((x - x.mean()) / x.std()) ** 2 + NOISE / 2 * noise
+        head = {"units": "s, m", "drive_ratio": ratio, "phase": 0.4, "sensor_noise_sigma_m": NOISE / 2}
+        prepared.append(prepare(make_record(f"r{number}", {"t": t, "x": x}, head), base))
+    return base, prepared
+
+
+def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_number():
+    """Neither where it was fitted nor foretold; the intervals hold what faults have moved."""
+    base, prepared = three_records((1e-3, -1e-3, 8e-4))
+    fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
+    assert fitted.fit.sample_chi2 > 1.5
+    assert ceiling(fitted.problem, fitted.fit, 1.0).fit.sample_chi2 < 1.1
+    held_out = gather(prepared[2:], 1.0, None)
+    known = Known(fitted.fit.values, fitted.covariance, fitted.unseen)
+    told = predict(held_out, base, fitted.problem.free, known)
+    assert told.sample_chi2 > 1.5
+    assert cleaned(told.problem, told.fit).reduced_chi2 > cleaned_prediction(fitted, told).reduced_chi2
+    assert cleaned_prediction(fitted, told).sample_chi2 < 1.15
+    beside = beside_faults(fitted.problem, fitted.fit)
+    off, narrow = [], []
+    for i, one in enumerate(fitted.problem.free):
+        if one.record is None:
+            true = 1.0 if one.is_nuisance else base.parameters[one.path].value
+            off.append(abs(one.physical(fitted.fit.values[i]) - true) / beside.errors[i])
+            narrow.append(off[-1] * beside.errors[i] / np.sqrt(fitted.covariance[i, i]))
+    assert max(off) < 3
+    assert max(narrow) > 5
+
+
+@pytest.mark.parametrize(("curved", "drag"), [(1e-3, 0.0), (0.0, 0.1)])
+def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_explain_it(curved, drag):
+    base, prepared = three_records((curved, -curved, curved), drag)
+    training, held_out = gather(prepared[:2], 1.0, None), gather(prepared[2:], 1.0, None)
+    without = fit_base(training, base, 1.0)
+    found = candidate(base, without.problem.free, (), "quadratic_drag", scales_of(training, base))
+    problem = training.problem(found.model, training.last, found.free)
+    fit = minimise(problem, values_of(without, found.free), without.fit.starts)
+    effect = Fitted(found.names, found.model, problem, fit, found.added)
+    told = [
+        predict(held_out, one.model, one.problem.free, Known(one.fit.values, one.covariance, one.unseen))
+        for one in (effect, without)
+    ]
+    share = share_foretold(*told, without)
+    assert share > 0.6 if drag else share < 0.2

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from program import CASE
+from scipy.signal import lfilter
 from separatrix.discovery import Options, discover
 from separatrix.discovery.decision.judge import Judged, adequate, sizeable
 from separatrix.discovery.decision.remains import Remains, share_text
@@ -59,11 +60,35 @@ def test_one_motion_has_one_verdict_at_every_rate_of_sampling(effect):
             assert abs(found["value"] - 0.1) < 5 * found["standard_error"]
 
 
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("rate", [200, 8000])
+def test_noise_with_memory_is_no_gap_at_any_rate(rate):
+    """Its memory and size are found though nobody states them, and nothing else."""
+    base = Model.from_text(CASE)
+    memory, sigma = 0.5, 2e-3
+    records = []
+    for number in range(3):
+        one = record_of(base, rate, number)
+        clean = one.x - SIGMA * np.random.default_rng([number, rate]).standard_normal(one.t.size)
+        white = np.random.default_rng([number, rate, 5]).standard_normal(one.t.size)
+        noise = lfilter([sigma * np.sqrt(1 - memory**2)], [1, -memory], white)
+        header = {key: value for key, value in one.header.items() if "sigma" not in key}
+        records.append(make_record(one.name, {"t": one.t, "x": clean + noise}, header | {"units": "s, m"}))
+    verdict = discover(base, records[:2], records[2:], Options(quick=True, candidates=("quadratic_drag",)))
+    assert verdict["outcome"] == "none", verdict["reasons"]
+    for one in verdict["records"]:
+        assert one["memory"] == pytest.approx(memory, abs=0.08)
+        assert one["sigma"] == pytest.approx(sigma, rel=0.1)
+    for one in verdict["gap"].values():
+        assert one["after"] == pytest.approx(1, abs=0.1)
+
+
 def candidate(training: float, left: float, samples: float, p: float = 0.0) -> Judged:
     """An effect that gained so much and leaves so much in chi^2, by chance with a probability of `p`."""
     fit = SimpleNamespace(samples=samples, excess=left, sample_chi2=1 + left / samples)
     prediction = SimpleNamespace(excess=left)
-    one = Judged(SimpleNamespace(fit=fit), prediction, training, training, np.zeros(0), 1)
+    problem = SimpleNamespace(prepared=[])
+    one = Judged(SimpleNamespace(fit=fit, problem=problem), prediction, training, training, np.zeros(0), 1)
     one.ceiling = SimpleNamespace(p=p, closable=left if p < 0.01 else 0.0, fit=fit)
     return one
 

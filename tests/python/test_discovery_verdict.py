@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from program import CASE, succeed
 from separatrix.discovery.cli import main
+from separatrix.discovery.decision import verdict
 from separatrix.discovery.decision.verdict import _candidate, _parameters
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.wording import unit_of, units_of, with_error
@@ -131,12 +132,12 @@ def test_a_part_is_named_where_more_is_missing(separatrix, tmp_path):
     assert (tmp_path / "out" / "extended.toml").exists()
 
 
-def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so():
+def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so(monkeypatch):
+    monkeypatch.setattr(verdict, "beside_faults", lambda *_: SimpleNamespace(errors=np.array([0.0, 0.5])))
     free = [Free("contact.restitution", 1.0, 0.0, 1.0), Free("restoring.stiffness", 89.0)]
     fitted = SimpleNamespace(
         problem=SimpleNamespace(free=free),
         fit=SimpleNamespace(values=np.array([1.0, 89.0]), at_bound=np.array([True, False])),
-        covariance=np.diag([0.0, 0.25]),
         model=SimpleNamespace(parameters={}),
     )
     held, known = _parameters(fitted).values()

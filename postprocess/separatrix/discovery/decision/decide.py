@@ -22,7 +22,7 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted, shared_values
 from separatrix.discovery.fitting.rescue import suspicious
-from separatrix.discovery.fitting.rig import cleaned
+from separatrix.discovery.fitting.rig import cleaned_prediction
 from separatrix.discovery.options import Options
 
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
@@ -311,7 +311,7 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
     elif decision.rounds[0].base.fit.sample_chi2 > bench.options.adequate_chi2:
-        decision.reasons.append("a reduced chi^2 as large as that may be chance with so few samples")
+        decision.reasons.append(_no_gap(bench, decision))
     if wide:
         decision.outcome = "not-in-catalogue"
         name = decision.base_ceiling.best.name
@@ -320,6 +320,17 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
         what = "free forces" if several else f"forces that depend on {name}"
         decision.reasons.append(f"{what} would explain more, no effect does")
     return decision
+
+
+def _no_gap(bench: Bench, decision: Decision) -> str:
+    """Why what the base machine leaves is more than noise and yet no gap, in words."""
+    before, beside = decision.rounds[0].base.fit.sample_chi2, decision.base_ceiling.fit.sample_chi2
+    if beside > bench.options.adequate_chi2:
+        return "a reduced chi^2 as large as that may be chance with so few samples"
+    return (
+        f"what the base machine leaves (reduced chi^2 {before:.3g}) may be small faults of the rig, of some "
+        f"1e-3 of the signal: beside them it is {beside:.3g}"
+    )
 
 
 def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:
@@ -351,7 +362,7 @@ def _gap_of_base(bench: Bench, decision: Decision) -> tuple[list[str], bool]:
     base = decision.rounds[0].base
     fits = [(bench.training, decision.base_ceiling.fit)]
     if bench.held_out is not None and decision.foretold is not None:
-        fits.append((bench.held_out, cleaned(decision.foretold.problem, decision.foretold.fit)))
+        fits.append((bench.held_out, cleaned_prediction(base, decision.foretold)))
     left = [one for data, fit in fits for one in missed(data, fit, bench.options)]
     wide = _wide(decision.base_ceiling, base.fit, bench.options)
     caught = suspicious(base.fit) if wide else np.zeros(0, int)

@@ -23,7 +23,7 @@ from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import share_beside_faults
+from separatrix.discovery.fitting.rig import share_beside_faults, share_foretold
 from separatrix.discovery.options import Options
 
 
@@ -57,6 +57,8 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     """Set the p value of a candidate and every gate but the adequacy."""
     options = bench.options
     best.own = share_beside_faults(best.fitted, base)
+    if best.prediction is not None and best.foretold is not None:
+        best.own_foretold = share_foretold(best.prediction, best.foretold, base)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.settled
     best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
@@ -75,7 +77,8 @@ def _of_some_size(best: Judged, options: Options) -> bool:
     seen = sizeable(2 * best.own * best.training, best.fitted.fit, options, options.least_effect)
     if best.prediction is None:
         return seen
-    return seen or sizeable(2 * best.own * best.held_out, best.prediction.fit, options, options.least_effect)
+    foretold = 2 * best.own_foretold * best.held_out
+    return seen or sizeable(foretold, best.prediction.fit, options, options.least_effect)
 
 
 def judge_ceiling(bench: Bench, one: Judged) -> None:

@@ -45,6 +45,9 @@ class Judged:
     ceiling: Ceiling | None = None
     # share of the gain that small faults of a rig do not explain
     own: float = 1.0
+    # the same of what is gained on held-out records, and what the base foretold there
+    own_foretold: float = 1.0
+    foretold: Prediction | None = None
     # what it leaves, if it is adequate
     leaves: str = ""
 
@@ -75,7 +78,7 @@ def judged(
     if prediction is not None and foretold is not None:
         parts = gained_together(prediction, foretold)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
-    return Judged(fitted, prediction, training, float(parts.sum()), parts, live)
+    return Judged(fitted, prediction, training, float(parts.sum()), parts, live, foretold=foretold)
 
 
 def lead(one: Judged, other: Judged) -> float:
@@ -91,7 +94,7 @@ def detection(one: Judged, tested: float, inflation: float) -> float:
 
     What small faults of the rig may explain of it is no gain.
     """
-    gained = one.own * (one.training + one.held_out)
+    gained = one.own * one.training + one.own_foretold * one.held_out
     return family_wise(2 * gained / inflation, one.parameters, tested)
 
 
@@ -315,7 +318,8 @@ def adequate(one: Judged, options: Options) -> str:
     trifle = share > 0.5 and not sizeable(one.ceiling.closable, fit, options)
     clean = one.ceiling.p > options.detection_level or trifle
     closed = share >= options.adequate_share and one.ceiling.p > options.adequate_p
-    if fit.sample_chi2 <= options.adequate_chi2 and (clean or closed):
+    doubt = max((record.doubt for record in one.fitted.problem.prepared), default=1.0)
+    if fit.sample_chi2 <= doubt * options.adequate_chi2 and (clean or closed):
         return NOISE
     if _all_closed(one, options):
         return LITTLE

@@ -93,10 +93,11 @@ def _followed(told: Prediction) -> tuple[np.ndarray, float]:
 def _limit(one: Prepared, options: Options) -> float:
     """Reduced chi^2 above which a record is missed.
 
-    Noise that nobody stated is itself an estimate, and rounding follows the motion instead of chance.
+    Noise that nobody stated is itself an estimate, as its memory is, and rounding follows the motion instead
+    of chance.
     """
     rounding = one.resolution**2 / 12 > _ROUNDING * one.sigma**2
-    return options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2
+    return one.doubt * (options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2)
 
 
 def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:
@@ -108,7 +109,7 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
     notes = []
     units = units_of(problem.model.parameters)
     unit = units.force if problem.in_force else units.position
-    factors, _ = noise_of(problem, fit, 0, mass)
+    factors = noise_of(problem, fit, 0, mass).factors
     found = record_chi2(data, fit)
     for number, one in enumerate(data.prepared):
         if number not in found:

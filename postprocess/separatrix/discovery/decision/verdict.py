@@ -23,6 +23,7 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import WORSE, Fitted
+from separatrix.discovery.fitting.rig import beside_faults
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
@@ -272,7 +273,8 @@ def _records(findings: Findings) -> list[dict]:
 
 
 def _parameters(fitted: Fitted) -> dict:
-    errors = np.sqrt(np.diag(fitted.covariance))
+    # faults of the rig may have moved a value by more than the noise did
+    errors = beside_faults(fitted.problem, fitted.fit).errors
     found = {}
     for one, value, error, held in zip(
         fitted.problem.free, fitted.fit.values, errors, fitted.fit.at_bound, strict=True

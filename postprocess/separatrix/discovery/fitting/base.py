@@ -10,6 +10,7 @@ from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nu
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.rig import cleaned
 from separatrix.discovery.fitting.sensed import SensedData, joint_parameters, measure_sensors
 from separatrix.discovery.measured.signals import white_noise
 
@@ -66,21 +67,30 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     if isinstance(data, SensedData):
         measure_sensors(data, problem, fit)
         return
-    factors, memory = noise_of(problem, fit, 0, mass)
+    found = noise_of(problem, fit, 0, mass)
+    factors = found.factors
     before = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     for number, prepared in enumerate(data.prepared):
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
     if any(one.record.v is not None for one in data.prepared):
-        speeds, _ = noise_of(problem, fit, 1, mass)
+        # the products of velocities in stretches are not kept
+        memory = found.memory if found.of_samples else None
+        speeds = noise_of(problem, fit, 1, mass, memory).factors
         for number, prepared in enumerate(data.prepared):
             if prepared.record.v is not None and not prepared.velocity_sigma_stated:
                 prepared.velocity_sigma *= speeds.get(number, 1.0)
     scatter = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
+    # values of stretches scatter by more than samples do where the noise has memory: that is no misfit
+    known = found.of_samples or misfit < _MISFIT
+    if not known and found.memory:
+        # nor are small faults of a rig
+        known = misfit * cleaned(problem, fit).reduced_chi2 / fit.reduced_chi2 < _MISFIT
     for prepared in data.prepared:
-        prepared.memory = memory if misfit < _MISFIT else 0.0
+        prepared.memory = found.memory if known else 0.0
+        prepared.memory_error = found.error
 
 
 def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
@@ -145,5 +155,6 @@ def limit_noise(source: Data, target: Data) -> bool:
 def copy_noise(source: Data, target: Data) -> None:
     """Give records that are not fitted the memory of the noise of those that are."""
     memory = float(np.mean([one.memory for one in source.prepared]))
+    error = float(np.mean([one.memory_error for one in source.prepared]))
     for one in target.prepared:
-        one.memory = memory
+        one.memory, one.memory_error = memory, error

@@ -25,6 +25,8 @@ _PIECES = 4
 # samples of a piece of a measured force, and powers of time that are taken from it
 _SHORT, _POWERS = 16, 3
 _LEAST = 0.04
+# segments that say how large the noise is
+_FEWEST = 4
 # memory of a force beyond which it is that of the joint and not of the sensor
 _MOST = 0.8
 _SURE = 3.5
@@ -43,14 +45,43 @@ class _Left:
     products: np.ndarray
 
 
-def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dict[int, float], float]:
+@dataclass(frozen=True)
+class Noise:
     """Factor on the assumed standard deviation by record, and the correlation of neighbours in all."""
+
+    factors: dict[int, float]
+    memory: float
+    # standard error of that correlation
+    error: float = 0.0
+    # whether the memory is that of what condensed stretches leave over, in which no machine has a part
+    of_samples: bool = False
+
+
+def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float | None = None) -> Noise:
+    """Size and memory of the noise of one channel of all records; the memory may be `known`."""
+    stretches = [] if problem.in_force else _of_stretches(problem, channel)
     if problem.in_force:
         left = _of_short_pieces(problem, fit)
     else:
-        left = _joined([_of_segments(problem, fit, channel, mass), *_of_stretches(problem, channel)])
-    if left.record.size < 4:
-        return {}, 0.0
+        left = _joined([_of_segments(problem, fit, channel, mass), *stretches])
+    # a row of stretches stands for all of one length
+    if left.record.size < _FEWEST and not stretches:
+        return Noise({}, 0.0)
+    memory, error = _memory_of(_joined(stretches) if stretches else left)
+    if known is not None:
+        memory = known
+    if problem.in_force and memory > _MOST:
+        memory = 0.0
+    factors = {}
+    for number in np.unique(left.record):
+        rows = left.record == number
+        expected = float(np.interp(memory, _MEMORIES, left.powers[:, rows].sum(axis=1)))
+        factors[int(number)] = float(np.sqrt(left.power[rows].sum() / expected))
+    return Noise(factors, memory, error, bool(stretches))
+
+
+def _memory_of(left: _Left) -> tuple[float, float]:
+    """Correlation of neighbours of noise that leaves as much, 0 if it may be chance; its standard error."""
     # each record in its own size
     size = np.ones(left.record.size)
     for number in np.unique(left.record):
@@ -59,14 +90,11 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float) -> tuple[dic
     ratio = left.products.sum(axis=1) / left.powers.sum(axis=1)
     seen = float(np.sum(left.product / size) / np.sum(left.power / size))
     memory = float(np.interp(seen, ratio, _MEMORIES))
-    if memory < max(_LEAST, _SURE / np.sqrt(left.freedom.sum())) or (problem.in_force and memory > _MOST):
-        memory = 0.0
-    factors = {}
-    for number in np.unique(left.record):
-        rows = left.record == number
-        expected = float(np.interp(memory, _MEMORIES, left.powers[:, rows].sum(axis=1)))
-        factors[int(number)] = float(np.sqrt(left.power[rows].sum() / expected))
-    return factors, memory
+    # Bartlett's variance of the correlation of neighbours, over how fast it changes with the memory
+    freedom = left.freedom.sum()
+    slope = float(np.interp(memory, _MEMORIES, np.gradient(ratio, _MEMORIES)))
+    error = float(np.sqrt((1 - memory**2) / freedom)) / max(slope, 1e-3)
+    return (0.0 if memory < max(_LEAST, _SURE / np.sqrt(freedom)) else memory), error
 
 
 def white_share(memory: float) -> float:

@@ -69,10 +69,11 @@ class Problem:
                 continue
             rows = np.flatnonzero(self.segments.record == number)
             first, last = self.segments.first[rows], self.segments.last[rows]
-            white = samples.left / prepared.sigma**2
             count = samples.freedom
+            weights = samples.weights(prepared.memory)
+            white = samples.left * weights / prepared.sigma**2
             if samples.v is not None:
-                white = white + samples.left_v / prepared.velocity_sigma**2
+                white = white + samples.left_v * weights / prepared.velocity_sigma**2
                 count = 2 * count
             for table, per_row in ((squares, white), (freedom, count)):
                 total = np.concatenate([[0.0], np.cumsum(per_row)])
@@ -196,16 +197,15 @@ class Problem:
             if memory == 0:
                 continue
             rows = np.flatnonzero(self.segments.record == number)
-            linked = prepared.samples.linked[self.segments.index[rows]][:, 1:]
+            links = prepared.samples.links(memory)[self.segments.index[rows]][:, 1:]
             if self.in_force:
-                linked &= prepared.driven.moves[self.segments.index[rows]][:, :-1]
+                links *= prepared.driven.moves[self.segments.index[rows]][:, :-1]
             for first in range(0, self.channels * length, length):
                 known = self.compared[rows, first : first + length]
-                both = linked & known[:, 1:] & known[:, :-1]
-                both = both.reshape(both.shape + (1,) * (table.ndim - 2))
+                link = links * (known[:, 1:] & known[:, :-1])
+                link = link.reshape(link.shape + (1,) * (table.ndim - 2))
                 part = table[rows, first : first + length]
-                freed = (part[:, 1:] - memory * part[:, :-1]) / np.sqrt(1 - memory**2)
-                part[:, 1:] = np.where(both, freed, part[:, 1:])
+                part[:, 1:] = (part[:, 1:] - link * part[:, :-1]) / np.sqrt(1 - link**2)
                 table[rows, first : first + length] = part
         table[:, : self.compared.shape[1]][~self.compared] = 0
         return table

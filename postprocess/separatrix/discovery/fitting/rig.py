@@ -8,13 +8,14 @@ with that prior they take from a residual what they may explain of it (G. E. P. 
 with a bound).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_forces import fault_columns_of
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
@@ -52,40 +53,117 @@ def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
 
 
 def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
-    """What square and cube of what is compared, place or force, add to x or F as they are measured."""
+    """What square and cube of what is compared, place or force, add to x or F as they are measured.
+
+    Each record has its own: a smooth curve has other terms over another range.
+    """
     signal = fit.evaluation.force if problem.in_force else fit.evaluation.x
     count, length = signal.shape
-    table = np.zeros((count, fit.evaluation.residual.shape[1], len(_POWERS)))
+    records = len(problem.prepared)
+    table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
     good = problem.segments.inside & fit.good[:, None]
-    if not good.any():
-        return table
-    swing = float(np.std(signal[good]))
-    u = (signal - np.mean(signal[good])) / swing
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
+        seen = signal[rows][good[rows]]
+        swing = float(np.std(seen)) if seen.size else 0.0
+        if swing == 0:
+            continue
+        u = (signal[rows] - np.mean(seen)) / swing
         sigma = prepared.deviation(problem.segments.index[rows])
-        for column, power in enumerate(_POWERS):
-            table[rows, :length, column] = _SIZE * swing * u[rows] ** power / sigma
+        for place, power in enumerate(_POWERS, start=number * len(_POWERS)):
+            table[rows, :length, place] = _SIZE * swing * u**power / sigma
     return problem.whitened(table)
 
 
-def cleaned(problem: Problem, fit: Fit) -> Fit:
-    """The fit without what faults may explain of its residuals, its parameters fitted beside them."""
+@dataclass(frozen=True)
+class Beside:
+    """Parameters fitted beside faults, linearised: their steps from the fit, and covariance."""
+
+    shift: np.ndarray
+    covariance: np.ndarray
+
+    def of(self, places: list[int]) -> "Beside":
+        """Some of the parameters."""
+        return Beside(self.shift[places], self.covariance[np.ix_(places, places)])
+
+    def add_to(self, matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray) -> None:
+        """Add what is known to normal equations whose first unknowns these are, and let them move."""
+        m, seen = self.shift.size, np.diag(self.covariance) > 0
+        precision = _inverse(self.covariance, seen)
+        matrix[:m, :m] += precision
+        gradient[:m] += precision @ self.shift
+        open_[:m] |= seen
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Standard errors, what faults may have moved a parameter by included."""
+        known = np.diag(self.covariance)
+        return np.where(known > 0, np.sqrt(known + self.shift**2), 0.0)
+
+
+def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
+    """The fit without what faults may explain of its residuals, its parameters fitted beside them.
+
+    The first parameters of a held-out record were fitted to others: they are `known` from there.
+    """
     evaluation = fit.evaluation
-    faults = fault_columns(problem, fit)
-    weights = evaluation.used * fit.good[:, None]
-    p, q = evaluation.by_parameter.shape[2], faults.shape[2]
-    columns = np.concatenate([evaluation.by_parameter, faults], axis=2)
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
-        0
-    ].total()
-    open_ = np.r_[~fit.at_bound & fit.movable, np.ones(q, bool)]
+    columns, matrix, gradient, open_ = _equations(problem, fit)
+    p = evaluation.by_parameter.shape[2]
+    without = solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
+    if known is not None:
+        known.add_to(matrix, gradient, open_)
     sizes = solve_scaled(_bounded(matrix, gradient, p, open_), gradient, open_)
     # a step that the fit has without faults is none of theirs
-    sizes[:p] -= solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
+    sizes[:p] -= without
     residual = evaluation.residual - columns @ sizes
+    weights = evaluation.used * fit.good[:, None]
     chi2 = np.where(fit.good, fit.chi2 - _change(evaluation, residual, weights), fit.chi2)
     return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
+
+
+def cleaned_prediction(fitted: Fitted, told: Prediction) -> Fit:
+    """What a machine foretells, without what faults may explain of it and may have made of its parameters."""
+    return cleaned(told.problem, told.fit, _shared(fitted))
+
+
+def _shared(fitted: Fitted) -> Beside:
+    """What training records know beside faults of the parameters that held-out records share with them."""
+    shared = [i for i, one in enumerate(fitted.problem.free) if one.record is None]
+    return beside_faults(fitted.problem, fitted.fit).of(shared)
+
+
+def beside_faults(problem: Problem, fit: Fit) -> Beside:
+    """Parameters of a fit as they would be, and be known, if the faults of a rig were fitted too.
+
+    Enlarged where the fit beside them is still worse than the noise.
+    """
+    _, matrix, gradient, open_ = _equations(problem, fit)
+    p = fit.evaluation.by_parameter.shape[2]
+    matrix = _bounded(matrix, gradient, p, open_)
+    steps = solve_scaled(matrix, gradient, open_)[:p] - solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
+    shown = open_ & (np.diag(matrix) > 0)
+    covariance = _inverse(matrix, shown)[:p, :p]
+    return Beside(steps, covariance * max(1.0, cleaned(problem, fit).reduced_chi2))
+
+
+def _equations(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Columns of parameters and faults, their normal equations beside the starts, and which may move."""
+    evaluation = fit.evaluation
+    columns = np.concatenate([evaluation.by_parameter, fault_columns(problem, fit)], axis=2)
+    weights = evaluation.used * fit.good[:, None]
+    reduced, _, _ = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))
+    faults = columns.shape[2] - evaluation.by_parameter.shape[2]
+    return columns, *reduced.total(), np.r_[~fit.at_bound & fit.movable, np.ones(faults, bool)]
+
+
+def _inverse(matrix: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric matrix in units of its diagonal, 0 of what is not shown."""
+    found = np.zeros_like(matrix)
+    inner = matrix[np.ix_(shown, shown)]
+    scale = 1 / np.sqrt(np.diag(inner))
+    units = np.outer(scale, scale)
+    found[np.ix_(shown, shown)] = np.linalg.pinv(inner * units, rcond=1e-10, hermitian=True) * units
+    return found
 
 
 def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> np.ndarray:
@@ -111,10 +189,20 @@ def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -
     return found[0] - found[1]
 
 
-def share_beside_faults(one: Fitted, other: Fitted) -> float:
+def share_foretold(one: Prediction, other: Prediction, base: Fitted) -> float:
+    """The same of what is foretold; the other machine, `base`, is known as training records know it."""
+    beside = _shared(base)
+    without = Beside(np.zeros(beside.shift.size), other.covariance)
+    return share_beside_faults(one, other, (without, beside))
+
+
+def share_beside_faults(
+    one: Fitted | Prediction, other: Fitted | Prediction, known: tuple[Beside, Beside] | None = None
+) -> float:
     """Share of what one machine explains of what another leaves over that faults of a rig do not.
 
-    Linearised, the parameters of the other machine fitted beside them.
+    Linearised, the parameters of the other machine fitted beside them; those that held-out records do not
+    tell as they are `known` without and beside faults.
     """
     evaluation, both = other.fit.evaluation, common(one, other)
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
@@ -122,14 +210,17 @@ def share_beside_faults(one: Fitted, other: Fitted) -> float:
     p, q = evaluation.by_parameter.shape[2], faults.shape[2]
     columns = np.concatenate([evaluation.by_parameter, faults, moved], axis=2)
     weights = evaluation.used * both[:, None]
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
-        0
-    ].total()
-    open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(q, bool)]
-    alone = np.r_[:p, p + q]
-    without = _gain(*project(matrix[np.ix_(alone, alone)], gradient[alone], p, open_[:p]))
-    matrix[:-1, :-1] = _bounded(matrix[:-1, :-1], gradient[:-1], p, open_)
-    beside = _gain(*project(matrix, gradient, p + q, open_))
+    reduced, _, _ = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))
+    gains = []
+    for place, kept in enumerate((np.r_[:p, p + q], np.r_[: p + q + 1])):
+        matrix, gradient = reduced.total()
+        matrix, gradient = matrix[np.ix_(kept, kept)], gradient[kept]
+        open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(kept.size - p - 1, bool)]
+        if known is not None:
+            known[place].add_to(matrix, gradient, open_)
+        matrix[:-1, :-1] = _bounded(matrix[:-1, :-1], gradient[:-1], p, open_)
+        gains.append(_gain(*project(matrix, gradient, kept.size - 1, open_)))
+    without, beside = gains
     return float(np.clip(beside / without, 0.0, 1.0)) if without > 0 else 1.0
 
 

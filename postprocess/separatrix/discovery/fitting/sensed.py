@@ -305,9 +305,9 @@ def measure_sensors(data: SensedData, problem: CoordinateProblem, fit: Fit) -> N
     """Set the noise of all sensors that records do not state, and its memory."""
     memories, factors = [], {}
     for channel, name in enumerate(problem.columns):
-        found, memory = noise_of(problem, fit, channel, 1.0)
-        memories.append(memory)
-        for number, factor in found.items():
+        found = noise_of(problem, fit, channel, 1.0)
+        memories.append(found.memory)
+        for number, factor in found.factors.items():
             sensor = data.prepared[number].sensor(name)
             if sensor is not None:
                 factors[id(sensor)] = (sensor, factor)

@@ -18,6 +18,7 @@ from functools import cache, cached_property
 
 import numpy as np
 from scipy.linalg import toeplitz
+from scipy.signal import lfilter
 
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import white_noise
@@ -63,7 +64,7 @@ class Samples:
     products: np.ndarray
     # rows whose velocity says nothing: an impact lies so near that the sensor may be on either side of it
     blind: np.ndarray | None = None
-    _spreads: dict[float, np.ndarray] = field(default_factory=dict, repr=False)
+    _noises: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @cached_property
     def lengths(self) -> list[int]:
@@ -80,25 +81,43 @@ class Samples:
         """Degrees of freedom of what stretches leave over, at their first rows."""
         return np.where((self.node == 0) & (self.size > 1), self.size - NODES, 0)
 
-    @cached_property
-    def linked(self) -> np.ndarray:
-        """Whether the noise of a row remembers that of the row before: both are samples, and neighbours."""
-        single = self.size == 1
-        found = single & np.concatenate([[False], single[:-1]])
-        found[1:] &= np.diff(self.place) < 1.5
-        return found
-
     def spread(self, memory: float) -> np.ndarray:
         """Standard deviation of each row over that of a sample, of noise with correlation memory^|k|."""
-        if memory not in self._spreads:
-            found = np.ones(self.size.size)
-            for size in self.lengths:
-                rows = self.size == size
-                found[rows] = _spread(size, round(memory, 3))[self.node[rows]]
+        return self._of_noise(memory)[0]
+
+    def links(self, memory: float) -> np.ndarray:
+        """Correlation of the noise of each row with that of the row before, of the same noise; 0 of none."""
+        return self._of_noise(memory)[1]
+
+    def weights(self, memory: float) -> np.ndarray:
+        """Degrees of freedom over the squares that such noise of size 1 leaves, at first rows."""
+        found = np.zeros(self.size.size)
+        for size in self.lengths:
+            rows = (self.size == size) & (self.node == 0)
+            found[rows] = (size - NODES) / expected_left(size, round(memory, 3))[0]
+        return found
+
+    def _of_noise(self, memory: float) -> tuple[np.ndarray, np.ndarray]:
+        if memory not in self._noises:
             # noise is measured again now and then
-            self._spreads.clear()
-            self._spreads[memory] = found
-        return self._spreads[memory]
+            self._noises.clear()
+            self._noises[memory] = self._computed(memory)
+        return self._noises[memory]
+
+    def _computed(self, memory: float) -> tuple[np.ndarray, np.ndarray]:
+        spread, first, last, within = np.ones((4, self.size.size))
+        begin = self.place.copy()
+        for size in self.lengths:
+            rows = self.size == size
+            stretch, node = _stretch_noise(size, round(memory, 3)), self.node[rows]
+            for table, values in zip((spread, first, last, within), stretch, strict=True):
+                table[rows] = values[node]
+            begin[rows] -= _basis(size)[1][node]
+        links = np.zeros(self.size.size)
+        # from the end of a stretch or sample to the beginning of the next
+        neighbours = begin[1:] - begin[:-1] - self.size[:-1] < 0.5
+        links[1:] = np.where(neighbours, memory * last[:-1] * first[1:], 0.0)
+        return spread, np.where(self.node > 0, within, links)
 
 
 def whole(record: Record) -> Samples:
@@ -140,13 +159,19 @@ def _basis(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @cache
-def _spread(size: int, memory: float) -> np.ndarray:
-    """Standard deviations of the values of a stretch over that of a sample."""
+def _stretch_noise(size: int, memory: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of the values of a stretch, of noise with correlation memory^|k| and size 1: standard deviations;
+    correlations with the first and the last sample; with the value before (0 of the first).
+    """
     q, _, values = _basis(size)
     weights = values @ q[:, :NODES].T
-    lags = [np.sum(weights[:, k:] * weights[:, : size - k], axis=1) for k in range(min(size, 200))]
-    powers = memory ** np.arange(len(lags))
-    return np.sqrt(np.maximum(lags[0] + 2 * powers[1:] @ np.array(lags[1:]), 1e-12))
+    forth = lfilter([1.0], [1.0, -memory], weights, axis=1)
+    back = lfilter([1.0], [1.0, -memory], weights[:, ::-1], axis=1)[:, ::-1]
+    carried = forth + back - weights
+    covariance = weights @ carried.T
+    spread = np.sqrt(np.maximum(np.diag(covariance), 1e-12))
+    before = np.concatenate([[0.0], np.diag(covariance, -1) / (spread[1:] * spread[:-1])])
+    return spread, carried[:, 0] / spread, carried[:, -1] / spread, before
 
 
 @cache

@@ -40,8 +40,9 @@ class Prepared:
     sigma: float
     velocity_sigma: float
     resolution: float
-    # correlation of neighbouring noise
+    # correlation of neighbouring noise, and its standard error
     memory: float = 0.0
+    memory_error: float = 0.0
     sigma_stated: bool = False
     velocity_sigma_stated: bool = False
     frequency: float | None = None
@@ -82,6 +83,15 @@ class Prepared:
         self.memory, self.sigma = known[:2]
         if len(known) > 2:
             self.velocity_sigma = known[2]
+
+    @property
+    def doubt(self) -> float:
+        """Factor of chi^2 that two standard errors of the memory may make of noise.
+
+        Noise of correlation r^|k| that is freed of the correlation m has (1 - 2 r m + m^2) / (1 - m^2) of its
+        power left.
+        """
+        return 1 + 2 * self.memory_error * 2 * self.memory / (1 - self.memory**2)
 
     @property
     def signal(self) -> np.ndarray:
