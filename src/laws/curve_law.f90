@@ -3,7 +3,7 @@
 
 !> A function given by its values at a few knots: cubic between two of them (Hermite), with one slope at each, so that it is
 !> continuous with its derivative; beyond the first and the last it is constant, or goes on straight. The slope at a knot is
-!> that of the polynomial through it and its neighbours, up to five knots: the error falls with the fourth power of their
+!> that of the polynomial through five knots, it in the middle if they allow: the error falls with the fourth power of their
 !> distance, and the function is linear in the values.
 module curve_law
   use kinds, only: wp
