@@ -177,7 +177,7 @@ def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys
     verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
     verdict |= {"reasons": [], "separating_experiment": "", "warnings": [], "asked_for": None}
     verdict |= {"remains": [], "families": [], "function": None, "character": []}
-    verdict |= {"added": [], "not_added": "", "places": {}}
+    verdict |= {"added": [], "not_added": "", "places": {}, "in_families": []}
     monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
     monkeypatch.setattr(cli, "write_results", write)
     monkeypatch.setattr(cli, "write_report", fail)
