@@ -19,7 +19,7 @@ module adaptive_flight
   use oscillator, only: extra_force, system_t => oscillator_t
   use polynomial, only: degree, first_fall, interpolate, maximum_until, value_at
   use restoring_law, only: restoring_force
-  use table_pieces, only: enter_pieces, list_ends, most_ends, of_place, of_speed, of_stretch, piece_end_t
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
   implicit none
   private
 
@@ -29,8 +29,6 @@ module adaptive_flight
   integer, parameter :: most_equations = 2
   !> Barrier, speed zero, exit speed, the ends of pieces of tables.
   integer, parameter :: most_guards = 3 + most_ends, crosses_knot = -1
-  !> Margins: of a stretch of the spring below a constant, and above it.
-  integer, parameter :: stretch_below = 1, stretch_above = 2
 
   include 'march_types.inc'
 
@@ -118,11 +116,9 @@ contains
     call enter_pieces(machine%effects, y(1), y(2), stretch_at(machine, time, y(1)), slip)
     call list_ends(machine%effects, slip, pieces, count_ends)
     do i = 1, count_ends
-      associate (guard => guards(count_guards + i), one => pieces(i))
-        guard = guard_t(one%side*one%limit)
-        if (one%variable == of_stretch) guard%margin = merge(stretch_below, stretch_above, one%side > 0)
-        if (one%variable == of_place) guard%coefficients(1) = -one%side
-        if (one%variable == of_speed) guard%coefficients(2) = -one%side*slip%direction
+      associate (guard => guards(count_guards + i))
+        guard = guard_t()
+        call margin_of_end(pieces(i), slip%direction, guard%constant, guard%coefficients, guard%margin)
       end associate
     end do
     ends(count_guards + 1:count_guards + count_ends) = crosses_knot

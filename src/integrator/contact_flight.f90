@@ -19,7 +19,7 @@ module contact_flight
   use oscillator, only: extra_force, oscillator_t
   use polynomial, only: degree, maximum_until, value_at
   use restoring_law, only: restoring_force
-  use table_pieces, only: enter_pieces, list_ends, most_ends, of_place, of_speed, of_stretch, piece_end_t
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
   implicit none
   private
 
@@ -27,8 +27,6 @@ module contact_flight
 
   !> Guards: velocity zero, end of contact, change between pushing and not; after them the ends of pieces of tables.
   integer, parameter :: turning = 1, leaving = 2, cut = 3, most_guards = cut + most_ends
-  !> Margins: of the stretch of the spring below a constant, and above it.
-  integer, parameter :: stretch_below = 1, stretch_above = 2
   !> Halvings of the golden section that finds a peak of the force.
   integer, parameter :: most_sections = 40
   real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
@@ -177,7 +175,7 @@ contains
     type(guard_t), intent(out) :: guards(most_guards)
     integer, intent(out) :: count_guards
     type(piece_end_t) :: pieces(most_ends)
-    real(wp) :: margin(3)
+    real(wp) :: margin(3), constant, row(2)
     integer :: inward, i, count_ends
     inward = pressed%side*pressed%direction
     guards(turning)%coefficients(2) = inward
@@ -198,12 +196,10 @@ contains
       call enter_pieces(effects, pressed%surface + side*y(1), side*y(2), stretch_at(pressed, time, y), pressed%memory)
       call list_ends(effects, pressed%memory, pieces, count_ends)
       do i = 1, count_ends
-        associate (guard => guards(cut + i), one => pieces(i))
-          guard%constant = one%side*one%limit
-          if (one%variable == of_stretch) guard%margin = merge(stretch_below, stretch_above, one%side > 0)
-          if (one%variable == of_place) guard%constant = one%side*(one%limit - pressed%surface)
-          if (one%variable == of_place) guard%coefficients(1) = -one%side*side
-          if (one%variable == of_speed) guard%coefficients(2) = -one%side*inward
+        associate (guard => guards(cut + i))
+          call margin_of_end(pieces(i), pressed%memory%direction, constant, row, guard%margin)
+          guard%constant = constant + row(1)*pressed%surface
+          guard%coefficients(1:2) = side*row
         end associate
       end do
     end associate

@@ -10,10 +10,12 @@ module table_pieces
   implicit none
   private
 
-  public :: enter_pieces, list_ends
+  public :: enter_pieces, list_ends, margin_of_end
 
   !> Variables of tables: stretch of the spring, place, speed in the direction of the slip.
   integer, parameter, public :: of_stretch = 1, of_place = 2, of_speed = 3
+  !> Margins that are not linear in the state: of the stretch of the spring below a constant, and above it.
+  integer, parameter, public :: stretch_below = 1, stretch_above = 2
   !> Two each of spring, play, force, factor of dry friction, friction.
   integer, parameter, public :: most_ends = 10
 
@@ -58,6 +60,21 @@ contains
       call add_ends(effects%downwards, slip%in_speed, of_speed, ends, count_ends)
     end if
   end subroutine list_ends
+
+  !> How far a slip in `direction` is from an end: constant + row(1) x + row(2) v, and for the stretch the `number` of a margin to be
+  !> added, else 0.
+  pure subroutine margin_of_end(one, direction, constant, row, number)
+    type(piece_end_t), intent(in) :: one
+    real(wp), intent(in) :: direction
+    real(wp), intent(out) :: constant, row(2)
+    integer, intent(out) :: number
+    constant = one%side*one%limit
+    row = 0
+    number = 0
+    if (one%variable == of_place) row(1) = -one%side
+    if (one%variable == of_speed) row(2) = -one%side*direction
+    if (one%variable == of_stretch) number = merge(stretch_below, stretch_above, one%side > 0)
+  end subroutine margin_of_end
 
   pure subroutine add_ends(curve, piece, variable, ends, count_ends)
     type(curve_t), intent(in) :: curve

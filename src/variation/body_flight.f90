@@ -18,7 +18,7 @@ module body_flight
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
   use restoring_law, only: restoring_force, restoring_stiffness
-  use table_pieces, only: enter_pieces, list_ends, most_ends, of_place, of_speed, of_stretch, piece_end_t
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
   implicit none
   private
 
@@ -32,8 +32,8 @@ module body_flight
   !> After a stop in the layer the law is followed up to this share of Stribeck's velocity.
   real(wp), parameter :: half_way = 0.5_wp
   !> Guards: the speed rises to where it is to end, the force of a barrier is cut off or comes back; after them the ends of pieces
-  !> of tables. Margins: of the stretch of the spring below a constant, and above it.
-  integer, parameter :: exits = 1, cut_off = 2, most_cuts = cut_off + most_ends, stretch_below = 1, stretch_above = 2
+  !> of tables.
+  integer, parameter :: exits = 1, cut_off = 2, most_cuts = cut_off + most_ends
 
   !> Position and velocity, and after them the derivatives of both by the start, column by column.
   type, extends(watched_system_t) :: slip_t
@@ -319,11 +319,8 @@ contains
     call enter_pieces(system%machine%effects, y(1), y(2), stretch_margin(system, stretch_above, time, y), system%pieces)
     call list_ends(system%machine%effects, system%pieces, ends, count_ends)
     do i = 1, count_ends
-      associate (guard => cut(count_cuts + i), one => ends(i))
-        guard%constant = one%side*one%limit
-        if (one%variable == of_stretch) guard%margin = merge(stretch_below, stretch_above, one%side > 0)
-        if (one%variable == of_place) guard%coefficients(1) = -one%side
-        if (one%variable == of_speed) guard%coefficients(2) = -one%side*direction
+      associate (guard => cut(count_cuts + i))
+        call margin_of_end(ends(i), real(direction, wp), guard%constant, guard%coefficients(1:2), guard%margin)
       end associate
     end do
     count_cuts = count_cuts + count_ends
