@@ -61,8 +61,8 @@ contains
     end if
   end subroutine list_ends
 
-  !> How far a slip in `direction` is from an end: constant + row(1) x + row(2) v, and for the stretch the `number` of a margin to be
-  !> added, else 0.
+  !> How far a slip in `direction` is from an end: constant + row(1) x + row(2) v, and for the stretch the `number` of a
+  !> margin to be added, else 0.
   pure subroutine margin_of_end(one, direction, constant, row, number)
     type(piece_end_t), intent(in) :: one
     real(wp), intent(in) :: direction

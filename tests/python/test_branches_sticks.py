@@ -24,7 +24,7 @@ axis = [
   { name = "v0", from = -4, to = 4, count = 20 },
 ]
 """
-# Its friction force is 0.743 0.5659309564233164 1.767 N, its drive's 3.153 0.786 N.
+# Its friction force is 0.743 x 0.5659309564233164 x 1.767 N, that of its drive 3.153 x 0.786 N.
 STRUCTURE = """
 body.b.mass = 1.767
 spring.s = { between = ["b"], stiffness = 3.153, damping = 0.2551 }
