@@ -6,24 +6,22 @@
 !> a name.
 module branch
   use body_family, only: family_t
-  use branch_passage, only: change_all, enter_sequence, first_passed, label_of_margin, most_secants, no_passage, &
-    note_bifurcations
-  use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_gr_fold, label_long, label_not_known, &
-    label_pd, label_range, label_release, label_run, no_label, plan_t, point_t, set_point, step_to, trace_t
+  use branch_passage, only: first_passed, most_secants, no_passage, note_bifurcations
+  use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_long, label_not_known, label_pd, label_range, &
+    label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up
   use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
-  use graze_passage, only: at_graze, grazes_twice, is_repeated, leave_by_graze, put_on_graze
-  use hybrid_machine, only: event_t
+  use graze_passage, only: at_graze, leave_by_graze
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, nearest_copy
-  use motion_state, only: event_chatter_lower, event_chatter_upper, event_turning_point
-  use orbit_margins, only: is_impact, margin_t, of_gap, of_impact
+  use margin_passage, only: pass_margin
+  use motion_state, only: event_chatter_lower, event_chatter_upper
+  use orbit_margins, only: margin_t, of_impact
   use orbit_sections, only: rotate_to_section, section_points
   use orbit_motion, only: is_admissible, orbit_of_motion
   use periodic_orbit, only: closing_time, correct_orbit, direct, move_along, orbit_t, scales_of_orbit
   use search_watch, only: search_watch_t
-  use soft_graze, only: is_touch
   implicit none
   private
 
@@ -32,8 +30,6 @@ module branch
   !> Turn of the tangent in one step [cosine], and Newton steps from which on a step is thought long.
   real(wp), parameter :: least_cosine = 0.97_wp
   integer, parameter :: many_steps = 6
-  !> With so many impacts in a row no more are put in: they are the beginning of a chatter.
-  integer, parameter :: long_run = 10
   !> Smallest step, as a share of the largest.
   real(wp), parameter :: smallest_step = 1e-7_wp
   !> The parameter has not turned back by less than this share of its size.
@@ -300,24 +296,6 @@ contains
     is_chatter = kind == event_chatter_upper .or. kind == event_chatter_lower
   end function is_chatter
 
-  !> Impacts in a row on one side of a joint, turning points aside.
-  pure integer function longest_run(orbit) result(longest)
-    type(orbit_t), intent(in) :: orbit
-    type(event_t) :: last
-    integer :: k, run
-    run = 0
-    longest = 0
-    do k = 1, size(orbit%events)
-      associate (event => orbit%events(k))
-        if (event%kind == event_turning_point) cycle
-        if (event%kind /= last%kind .or. event%joint /= last%joint) run = 0
-        run = merge(run + 1, 0, is_impact(event%kind))
-        longest = max(longest, run)
-        last = event
-      end associate
-    end do
-  end function longest_run
-
   !> The last point within the range of the parameter.
   subroutine end_at_range(family, plan, trace, length, points, ending)
     type(family_t), intent(in) :: family
@@ -348,51 +326,5 @@ contains
     if (.not. ok .or. any(next%margins%list%value < -no_passage)) return
     points = [points, next%now]
   end subroutine end_at_range
-
-  !> The orbit where a margin is zero: its label, and on with the sequence of events beyond, if there is one.
-  subroutine pass_margin(family, trace, at, passed, points, ending)
-    type(family_t), intent(in) :: family
-    type(trace_t), intent(inout) :: trace
-    type(trace_t), intent(in) :: at
-    type(margin_t), intent(in) :: passed
-    type(point_t), allocatable, intent(inout) :: points(:)
-    integer, intent(out) :: ending
-    type(trace_t) :: beyond
-    type(point_t) :: point
-    real(wp) :: rise_before, rise_after
-    logical :: known
-    ending = no_label
-    point = at%now
-    point%label = label_of_margin(passed)
-    if (point%label == label_gr .and. (is_repeated(at) .or. grazes_twice(at))) then
-      ending = label_gr
-      points = [points, point]
-      return
-    end if
-    call change_all(at, passed, beyond%now%orbit, known)
-    if (known) call enter_sequence(family, at, trace%step, beyond, known)
-    ! An orbit of a shorter period near by is not what goes on there.
-    if (known) known = .not. is_repeated(beyond)
-    if (known) then
-      rise_before = at%now%tangent(size(at%now%tangent))
-      if (is_touch(at%now%orbit, passed)) then
-        call put_on_graze(family, beyond, passed, point)
-        ! The tangent is that of the singular point.
-        rise_before = point%orbit%parameter - points(size(points))%orbit%parameter
-      end if
-      rise_after = beyond%now%tangent(size(beyond%now%tangent))
-      if (point%label == label_gr .and. rise_before*rise_after < 0) point%label = label_gr_fold
-    end if
-    ! Two events that change places are none, if the motion goes on.
-    if (.not. known .and. point%label == no_label) point%label = label_not_known
-    points = [points, point]
-    if (.not. known) ending = point%label
-    ! Impact after impact is put in as a chatter is approached.
-    if (passed%kind == of_gap .and. longest_run(at%now%orbit) >= long_run) ending = label_run
-    if (ending /= no_label) return
-    points = [points, beyond%now]
-    beyond%came = beyond%step
-    trace = beyond
-  end subroutine pass_margin
 
 end module branch

@@ -15,7 +15,7 @@ module graze_passage
   implicit none
   private
 
-  public :: leave_by_graze, put_on_graze, grazes_twice, is_repeated
+  public :: leave_by_graze, grazes_twice, is_repeated
 
   !> Nearness to a graze, in speed, at the end of a branch; and where equations with an impact may already fail.
   real(wp), parameter, public :: at_graze = 1e-6_wp
@@ -101,20 +101,6 @@ contains
     points = [points, onset%now, beyond%now]
     trace = beyond
   end subroutine leave_by_stick
-
-  !> The graze of a soft contact by the orbit that misses it, for the equations of that which touches are singular there.
-  subroutine put_on_graze(family, missing, touch, point)
-    type(family_t), intent(in) :: family
-    type(trace_t), intent(in) :: missing
-    type(margin_t), intent(in) :: touch
-    type(point_t), intent(inout) :: point
-    type(trace_t) :: graze
-    logical :: ok
-    call locate_missed_graze(family, missing, touch, point%orbit%parameter, graze, ok)
-    if (.not. ok) return
-    graze%now%label = point%label
-    point = graze%now
-  end subroutine put_on_graze
 
   !> Whether an impact loses its speed where another barrier is just missed: an orbit and its mirror image become one there, and
   !> all that touches in other sequences begins there too. A barrier that is missed beside an impact that loses its speed is that

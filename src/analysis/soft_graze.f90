@@ -14,7 +14,7 @@ module soft_graze
   implicit none
   private
 
-  public :: is_touch, vanishing_touch, touches_apart, enter_apart, locate_missed_graze
+  public :: is_touch, vanishing_touch, touches_apart, enter_apart, enter_for, locate_missed_graze
 
   !> First look beyond the graze, in natural times between touch and separation.
   real(wp), parameter :: first_apart = 1e-3_wp
@@ -80,18 +80,30 @@ contains
     type(trace_t) :: there
     integer :: tries
     do tries = 0, 2
-      there%machines = at%machines
-      there%now%orbit = beyond%now%orbit
-      call move_along(there%now%orbit, first_apart*10**tries*apart* &
-                      scales_of_orbit(there%machines, there%now%orbit, family%parameter_size))
-      call correct_orbit(family, there%machines, there%now%orbit, apart, ok)
-      if (ok) call set_point(family, there, apart, ok)
+      call enter_for(family, at, beyond%now%orbit, first_apart*10**tries*apart, there, ok)
       if (ok) ok = all(there%margins%list%value > -margin_room)
       if (ok) ok = is_admissible(there%machines, there%now%orbit)
       if (ok) exit
     end do
     if (ok) beyond = there
   end subroutine enter_apart
+
+  !> The point `apart` from the orbit `from` at a graze, over state, instants and parameter in natural sizes, all else giving way.
+  subroutine enter_for(family, at, from, apart, there, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: at
+    type(orbit_t), intent(in) :: from
+    real(wp), intent(in) :: apart(:)
+    type(trace_t), intent(out) :: there
+    logical, intent(out) :: ok
+    real(wp) :: along(size(apart))
+    along = apart/norm2(apart)
+    there%machines = at%machines
+    there%now%orbit = from
+    call move_along(there%now%orbit, apart*scales_of_orbit(there%machines, from, family%parameter_size))
+    call correct_orbit(family, there%machines, there%now%orbit, along, ok)
+    if (ok) call set_point(family, there, along, ok)
+  end subroutine enter_for
 
   !> The graze that an orbit is near which misses the barrier of `touch`, or where its margin `touch` of sticking is zero, by the
   !> secant rule over the length of the branch; `start` has the value of the parameter near which it is. `ok` is false if it is not
