@@ -184,12 +184,12 @@ LANE_DEVICE inline contact_stride look_along_contact(const lane_machine &m, cons
   value_at<order - 1>(t.fall, t.end, f, f1, f2);
   t.turns = pressed & (f <= 0.0);
   if (any(t.turns))
-    t.lost = fall<order - 1>(t.fall, t.turns, vec(1.0), t.end);
+    t.lost = fall<order - 1>(t.fall, t.turns, vec(1.0), f, t.end);
   value_at<order>(t.u, t.end, f, f1, f2);
   t.leaves = pressed & ~t.lost & ~inward & (f <= 0.0);
   if (any(t.leaves)) {
     vec root = t.end;
-    t.lost = t.lost | fall<order>(t.u, t.leaves, t.end, root);
+    t.lost = t.lost | fall<order>(t.u, t.leaves, t.end, f, root);
     put(t.end, t.leaves, root);
   }
   value_at<order>(t.time, t.end, t.duration, f1, f2);
@@ -200,7 +200,7 @@ LANE_DEVICE inline contact_stride look_along_contact(const lane_machine &m, cons
     for (int k = 0; k <= order; k++)
       rest[k] = -t.time[k];
     rest[0] += ahead;
-    t.lost = t.lost | fall<order>(rest, t.stops, t.end, root);
+    t.lost = t.lost | fall<order>(rest, t.stops, t.end, ahead - t.duration, root);
     put(t.end, t.stops, root);
     put(t.duration, t.stops, ahead);
   }

@@ -106,6 +106,27 @@ LANE_DEVICE inline reg logarithm(reg x) {
 
 LANE_OF_PARTS(logarithm)
 
+// The same to 0.01, for what needs no more.
+LANE_LEAF reg rough_logarithm(reg x) {
+  const int64_t of_one = 0x3FF0000000000000, of_fraction = 0x000FFFFFFFFFFFFF;
+  reg_mask bits = bits_of(x);
+  reg twos = real_of(bits_of(all(to_integer)) + ((bits >> 52) - 1023)) - to_integer;
+  reg f = real_of((bits & of_fraction) | of_one) - 1.0;
+  return 6.93147180559945286227e-01 * (twos + f * (1.34 - 0.34 * f));
+}
+
+LANE_OF_PARTS(rough_logarithm)
+
+// e**x to 0.4 % for -700 <= x <= 700; below that e**-700.
+LANE_LEAF reg rough_exponential(reg x) {
+  x = x < -700.0 ? all(-700.0) : x;
+  reg y = x * 1.44269504088896338700e+00, shifted = y + to_integer, f = y - (shifted - to_integer);
+  return (1.0 + f * (0.6931 + 0.2402 * f)) *
+         real_of((bits_of(shifted) - bits_of(all(to_integer)) + 1023) << 52);
+}
+
+LANE_OF_PARTS(rough_exponential)
+
 #undef LANE_OF_PARTS
 
 } // namespace

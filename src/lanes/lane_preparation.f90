@@ -11,7 +11,7 @@ module lane_preparation
   use kinds, only: wp
   use lane_curve, only: restitution_curve_of
   use lane_types, only: contact_series_t, factor_over_place, lane_flow_t, law_t, layer_nodes, machine_t, mode_t, most_harmonics, &
-    over_place, over_play, over_speed, over_speed_downwards, over_stretch, table_t
+    over_place, over_play, over_speed, over_speed_downwards, over_stretch, series_order, table_t
   use layer_transit, only: gauss
   use motion, only: motion_t
   use motion_state, only: flight_adaptive
@@ -309,9 +309,25 @@ contains
       length = 1
       if (law%restoring%stiffness > 0) length = law%force_scale/law%restoring%stiffness
       if (length > 0) l%log_scale = logarithm(length)
+      l%foot_rate = rates_of(m%drive_frequency)
       if (effects%by_table) call set_tables(effects, l)
     end associate
   end subroutine set_law
+
+  !> (n w)^k/k! for the harmonics n = 1 ... of a drive of the angular frequency w [rad/s], with the signs of the derivatives of a
+  !> cosine and a sine.
+  pure function rates_of(frequency) result(rate)
+    real(wp), intent(in) :: frequency
+    real(wp) :: rate(0:series_order - 1, most_harmonics), size
+    integer :: n, k
+    do n = 1, most_harmonics
+      size = 1
+      do k = 0, series_order - 1
+        if (k > 0) size = size*(n*frequency/k)
+        rate(k, n) = merge(size, -size, mod(k, 4) < 2)
+      end do
+    end do
+  end function rates_of
 
   !> The forces that tables give, per unit of mass.
   pure subroutine set_tables(effects, law)

@@ -14,7 +14,7 @@
 
 namespace {
 
-enum { order = 18, most_root_rounds = 30 };
+enum { order = series_order, most_root_rounds = 30 };
 
 // Successive terms of a step shrink by exp(-shrinking); the last is then 2e-14 of the first.
 const double shrinking = 1.75;
@@ -30,23 +30,28 @@ struct table_piece {
   vec from, low, high, c[4];
 };
 
-// Sum of a(i) b(k - i), i = 0 ... k. In two parts, so that additions need not wait for each other.
+// Sum of a(i) b(k - i), i = 0 ... k. In two parts, so that additions need not wait for each other, and last
+// what has been known for the shortest time: b(k), a(k).
 LANE_LEAF vec product(const vec *a, const vec *b, int k) {
-  vec sum = a[0] * b[k], other = {};
+  if (k == 0)
+    return a[0] * b[0];
+  vec sum = {}, other = {};
   int i = 1;
-  for (; i < k; i += 2) {
+  for (; i + 1 < k; i += 2) {
     other += a[i] * b[k - i];
     sum += a[i + 1] * b[k - i - 1];
   }
-  if (i == k)
-    other += a[k] * b[0];
-  return sum + other;
+  if (i < k)
+    other += a[i] * b[k - i];
+  return ((sum + other) + a[0] * b[k]) + a[k] * b[0];
 }
 
 // The same of a with itself.
 LANE_LEAF vec square_of(const vec *a, int k) {
+  if (k == 0)
+    return a[0] * a[0];
   vec sum = {}, other = {};
-  int i = 0;
+  int i = 1;
   for (; 2 * i + 2 < k; i += 2) {
     sum += a[i] * a[k - i];
     other += a[i + 1] * a[k - i - 1];
@@ -54,20 +59,22 @@ LANE_LEAF vec square_of(const vec *a, int k) {
   if (2 * i < k)
     sum += a[i] * a[k - i];
   sum = 2.0 * (sum + other);
-  return k % 2 == 0 ? sum + a[k / 2] * a[k / 2] : sum;
+  if (k % 2 == 0)
+    sum += a[k / 2] * a[k / 2];
+  return sum + (2.0 * a[0]) * a[k];
 }
 
 // Sum of a(i) b(k - i)/k, i = 1 ... k: with a(i) = i c(i), coefficient k of what has the derivative c' b.
 LANE_LEAF vec chain(const vec *a, const vec *b, int k) {
   vec sum = {}, other = {};
   int i = 1;
-  for (; i < k; i += 2) {
+  for (; i + 1 < k; i += 2) {
     sum += a[i] * b[k - i];
     other += a[i + 1] * b[k - i - 1];
   }
-  if (i == k)
-    sum += a[k] * b[0];
-  return (1.0 / k) * (sum + other);
+  if (i < k)
+    sum += a[i] * b[k - i];
+  return (1.0 / k) * ((sum + other) + a[k] * b[0]);
 }
 
 // The motion of the foot of the spring, so many coefficients.
@@ -78,15 +85,12 @@ LANE_DEVICE inline void expand_foot(const lane_machine &m, vec time, int terms, 
     foot[k] = {};
   vec c = cosine, s = sine;
   for (int n = 0; n < m.harmonics; n++) {
-    const double w = (n + 1) * m.drive_frequency;
-    vec part = m.cosine[n] * c + m.sine[n] * s, slope = m.sine[n] * c - m.cosine[n] * s;
-    for (int k = 0; k < terms; k++) {
-      foot[k] += part;
-      const double turn = w / (k + 1);
-      vec next = turn * slope;
-      slope = -turn * part;
-      part = next;
-    }
+    const double *rate = m.law.foot_rate[n];
+    const vec part = m.cosine[n] * c + m.sine[n] * s, slope = m.sine[n] * c - m.cosine[n] * s;
+    for (int k = 0; k < terms; k += 2)
+      foot[k] += rate[k] * part;
+    for (int k = 1; k < terms; k += 2)
+      foot[k] += rate[k] * slope;
     vec next = c * cosine - s * sine;
     s = s * cosine + c * sine;
     c = next;
@@ -139,6 +143,7 @@ struct force_series {
   LANE_LEAF vec next(const lane_machine &m, const lane_group &g, mask within, vec foot, const vec *x,
                      const vec *v, const vec *rate, int k) {
     const lane_law &l = m.law;
+    const bool excessive = l.excess[0] > 0 || l.excess[1] > 0;
     const vec d = g.direction, viscous = l.viscous + l.asymmetric_viscous * d;
     stretch[k] = foot - x[k];
     if (k == 0)
@@ -182,7 +187,7 @@ struct force_series {
     } else {
       if (k == 0)
         dry[0] = l.kinetic * d + l.asymmetric;
-      for (int i = 0; i < 2; i++)
+      for (int i = 0; i < 2 && excessive; i++)
         if (l.excess[i] > 0)
           dry[k] += d * next_excess(l, i, within, d, v, k, excess[i]);
     }
@@ -233,10 +238,10 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
   const double smallest = 1e-290;
   vec least = 1e300;
   for (int k = order - 3; k <= order; k++) {
-    vec length = (1.0 / k) * (m.law.log_scale - logarithm(magnitude(p.x[k]) + smallest));
+    vec length = (1.0 / k) * (m.law.log_scale - rough_logarithm(magnitude(p.x[k]) + smallest));
     put(least, length < least, length);
   }
-  return exponential(least - shrinking);
+  return rough_exponential(least - shrinking);
 }
 
 // How much the speed may change over a step where there is friction E exp(-(v/v_s)^delta): the terms of its
@@ -294,11 +299,20 @@ LANE_DEVICE inline void value_at(const vec (&c)[degree + 1], vec s, vec &f, vec 
   f2 = 2.0 * f2;
 }
 
-// Where the polynomials of `seek` that are positive at 0 and not at `high` fall to zero, by Halley's steps
-// within brackets. Returns the lanes that were not found.
+// Where a parabola of value a > 0, or 0, and slope b at 0 that has the value c <= 0 at 1 falls to zero.
+LANE_DEVICE inline vec fall_of_parabola(vec a, vec b, vec c) {
+  vec bend = c - a - b, inner = b * b - 4.0 * a * bend;
+  vec root = square_root(pick(inner > 0.0, inner, vec{}));
+  mask rising = b > 0.0;
+  return pick(rising, b + root, 2.0 * a) / pick(rising, -2.0 * bend, root - b);
+}
+
+// Where the polynomials of `seek` that are positive at 0 and not at `high`, with the value `last` there, fall
+// to zero, by Halley's steps within brackets. Returns the lanes that were not found.
 template <int degree>
-LANE_DEVICE inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, vec &root) {
-  vec low = {}, s = high;
+LANE_DEVICE inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, vec last, vec &root) {
+  vec low = {}, s = high * fall_of_parabola(c[0], high * c[1], last);
+  s = pick((s > 0.0) & (s < high), s, high);
   for (int round = 0; round < most_root_rounds && any(seek); round++) {
     vec f, f1, f2;
     value_at<degree>(c, s, f, f1, f2);
@@ -359,37 +373,39 @@ LANE_DEVICE inline stride_of_lanes look_for_events(const lane_machine &m, const 
                                                    mask within, vec barrier, vec length,
                                                    const lane_group &g) {
   stride_of_lanes t;
-  vec d = g.direction, power = 1.0, gap[order + 1];
+  vec d = g.direction, power = 1.0;
   t.length = length;
   for (int k = 0; k <= order; k++) {
     t.x[k] = p.x[k] * power;
-    gap[k] = -d * t.x[k];
     if (k < order)
       t.fall[k] = d * p.v[k] * power;
     power *= length;
   }
-  gap[0] += d * barrier;
   // Outside a Stribeck layer the series is that without it: the step ends at its edge.
   vec level = pick(within, 0, m.law.edge);
   t.fall[0] -= level;
-  vec w = t.fall[order - 1], free = gap[order];
+  vec w = t.fall[order - 1], x = t.x[order];
   for (int k = order - 2; k >= 0; k--)
     w += t.fall[k];
   for (int k = order - 1; k >= 0; k--)
-    free += gap[k];
+    x += t.x[k];
   t.end = 1.0;
   mask slows = flying & (w <= 0.0);
   t.lost = mask{};
   if (any(slows)) {
-    t.lost = fall<order - 1>(t.fall, slows, vec(1.0), t.end);
-    vec f, f1, f2;
-    value_at<order>(gap, t.end, f, f1, f2);
-    put(free, slows, f);
+    t.lost = fall<order - 1>(t.fall, slows, vec(1.0), w, t.end);
+    vec there, f1, f2;
+    value_at<order>(t.x, t.end, there, f1, f2);
+    put(x, slows, there);
   }
+  const vec free = d * (barrier - x);
   t.hits = flying & ~t.lost & (free <= 0.0);
   if (any(t.hits)) {
-    vec root = t.end;
-    t.lost = t.lost | fall<order>(gap, t.hits, t.end, root);
+    vec root = t.end, gap[order + 1];
+    for (int k = 0; k <= order; k++)
+      gap[k] = -d * t.x[k];
+    gap[0] += d * barrier;
+    t.lost = t.lost | fall<order>(gap, t.hits, t.end, free, root);
     t.end = root;
   }
   slows = slows & ~t.hits;

@@ -66,7 +66,7 @@ LANE_DEVICE inline mask keep_in_piece(const vec *c, const table_piece &piece, ma
     for (int k = 0; k < order; k++)
       room[k] = -side * scaled[k];
     room[0] += side * pick(above, piece.high, piece.low);
-    lost = fall<order - 1>(room, leaves, vec(1.0), end);
+    lost = fall<order - 1>(room, leaves, vec(1.0), side * (pick(above, piece.high, piece.low) - last), end);
   }
   mask within = ~lost;
   for (int s = -1; s <= 1; s += 2) {

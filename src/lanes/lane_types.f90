@@ -14,7 +14,8 @@ module lane_types
 
   public :: widest_lanes, lane_sizes, separatrix_fly_lanes, law_t, machine_t, mode_t, contact_series_t, region_t, regions_t, table_t
 
-  integer, parameter, public :: lane_count = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64
+  integer, parameter, public :: lane_count = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64, &
+    series_order = 18
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
@@ -54,6 +55,7 @@ module lane_types
       cubic_damping = 0, kinetic = 0, asymmetric = 0, offset = 0, length = 0
     real(c_double) :: excess(2) = 0, velocity(2) = 1, exponent(2) = 1, edge = 0, rest_friction = 0
     real(c_double) :: dahl_stiffness = 0, dahl_level(2) = 0, inverse_mass = 1, log_scale = 0
+    real(c_double) :: foot_rate(0:series_order - 1, most_harmonics) = 0
     real(c_double) :: has_tables = 0
     type(table_t) :: table(tables)
     real(c_double) :: change_at_rest(2) = 0

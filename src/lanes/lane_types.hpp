@@ -14,6 +14,8 @@ enum {
   most_regions = 64,
   lane_modes_count = 6,
   most_knots = 16,
+  // Of the series of machines without a closed form.
+  series_order = 18,
   // Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction
   // over the speed upwards and downwards, free play over the stretch.
   over_stretch = 0,
@@ -77,6 +79,9 @@ struct lane_law {
   double dahl_stiffness, dahl_level[2], inverse_mass;
   // Logarithm of the length to which errors are compared.
   double log_scale;
+  // Coefficient k of a harmonic n + 1 of the drive is foot_rate[n][k] times the harmonic, or, where k is odd,
+  // times what its sine and cosine make when turned on by a quarter.
+  double foot_rate[most_harmonics][series_order];
   // Forces by tables, per mass; 1 if there are any. What friction over the speed is at rest, upwards and
   // downwards.
   double has_tables;
