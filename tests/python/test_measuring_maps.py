@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import separatrix as sx
-from separatrix.measuring.api import _OVER_PHASES, NAMES
+from separatrix.measuring.api import _OVER_PHASES, NAMES, _chosen
 from separatrix.measuring.cli import main
 from separatrix.measuring.maps import slice_of
 
@@ -105,6 +105,16 @@ def test_measures_are_refused_with_words(crank, tmp_path: Path) -> None:
             sx.measures(crank, **wrong)
     with pytest.raises(sx.SeparatrixError, match="no such file"):
         sx.measures(tmp_path / "none.h5")
+
+
+def test_a_map_along_a_line_has_no_areas(case) -> None:
+    with pytest.raises(sx.SeparatrixError, match="axis x0 of the map has one value"):
+        sx.measures(sx.basin(case, x0=[0.2], v0=12), ["global_integrity"])
+
+
+@pytest.mark.parametrize("asked", ["all", ["all"]])
+def test_all_measures_can_be_asked_for(asked) -> None:
+    assert _chosen(asked, None) == NAMES
 
 
 def test_a_window_without_boundary(case) -> None:

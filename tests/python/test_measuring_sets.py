@@ -234,6 +234,12 @@ def test_the_grid_method_finds_the_boundary_of_newtons_map() -> None:
     assert np.all(np.diff([share for share, _, _ in found.shares]) >= 0)
 
 
+def test_cells_beside_starts_without_a_label_are_of_no_boundary() -> None:
+    grid = np.array([[1, 1, 2], [1, 0, -1], [3, 0, 0]])
+    assert areas.cells_of_two_basins(grid).tolist() == [[False, True], [True, False]]
+    assert not areas.cells_of_two_basins(np.where(grid == 1, 1, 0)).any()
+
+
 def test_three_smooth_basins_are_not_wada() -> None:
     def sectors(points: np.ndarray) -> np.ndarray:
         return 1 + (np.mod(np.arctan2(points[:, 1], points[:, 0]), 2 * np.pi) // (2 * np.pi / 3)).astype(int)

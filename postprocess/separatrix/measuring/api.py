@@ -137,9 +137,9 @@ def _one(found: Slice, name: str, own: int | None, deviation: Mapping[str, float
 def _chosen(names: Sequence[str] | str | None, phases: int | None) -> tuple[str, ...]:
     if names is None:
         return USUAL if phases is None else (*USUAL, *_OVER_PHASES)
-    if names == "all":
-        return NAMES
     given = [names] if isinstance(names, str) else list(names)
+    if "all" in given:
+        return NAMES
     for name in given:
         if name not in NAMES:
             raise SeparatrixError(f"measures: found '{name}', allowed all, {', '.join(NAMES)}", USAGE)

@@ -37,6 +37,12 @@ def crossed_cells(grid: np.ndarray) -> np.ndarray:
     return low != high
 
 
+def cells_of_two_basins(grid: np.ndarray) -> np.ndarray:
+    """Return which cells have corners in two basins or more; labels that are no attractor's are left out."""
+    low, high = _corners(np.where(grid > 0, grid, np.iinfo(int).max))[0], _corners(grid)[1]
+    return (high > 0) & (low < high)
+
+
 def _corners(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest label of the corners of each cell."""
     corners = [

@@ -190,13 +190,15 @@ def wada_grid(found: Slice) -> Measure:
     cells = wada.grid_method(found.machine.labels, found.grid, found.axes, seed=found.seed)
     steps = len(cells.shares) - 1
     total = int(cells.counts[-1].sum())
+    if total == 0:
+        return Measure("wada_grid", told, limits=(*found.limits, "no cell has corners of two labels"))
     hits = int(cells.counts[-1][-1])
     return Measure(
         "wada_grid",
         told,
         "1",
         None,
-        hits / max(1, total),
+        hits / total,
         *share_interval(hits, total),
         "95 %, Clopper and Pearson over the cells",
         {"basins": cells.basins, "cells": total, "halvings": steps},

@@ -77,6 +77,12 @@ def slice_of(
     names = tuple(str(name) for name in chosen["attractor"].dims)
     if not names:
         raise SeparatrixError("measures: the map has no axis of starts but the crank angle", USAGE)
+    for name in names:
+        if chosen.sizes[name] < 2:
+            raise SeparatrixError(
+                f"measures: axis {name} of the map has one value, allowed are 2 or more: a line has no area",
+                USAGE,
+            )
     frequency, source = _frequency(case, _values(result, place, case), frequency)
     scale = np.array([frequency if name.endswith("v0") or "_v0" in name else 1.0 for name in names])
     axes = [np.asarray(chosen[name].values, float) / one for name, one in zip(names, scale, strict=True)]

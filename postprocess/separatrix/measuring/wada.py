@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from separatrix.measuring.areas import crossed_cells
+from separatrix.measuring.areas import cells_of_two_basins
 from separatrix.measuring.sampling import Labels, generator, label_all, share_interval
 
 
@@ -81,13 +81,13 @@ def grid_method(
 ) -> Cells:
     """Return how many cells with two basins show all of them when refined (after Daza and others 2015).
 
-    Up to `most` of the cells whose corners differ are taken. In each, segments between corners of different
-    labels are bisected with new starts, `steps` times; of the halves those with different ends go on, one for
+    Up to `most` of the cells with corners in two basins are taken. In each, segments between corners of
+    different labels are bisected with new starts, `steps` times; of the halves those with different ends go on, one for
     each pair of labels. `shares` are the cells with all N basins after each step, with intervals (Clopper and
     Pearson). A share that goes to 1 says Wada down to 2^-steps of a cell, and proves nothing below.
     """
     basins = tuple(int(label) for label in np.unique(grid) if label > 0)
-    cells = np.argwhere(crossed_cells(np.where(grid > 0, grid, 0)))
+    cells = np.argwhere(cells_of_two_basins(grid))
     random = generator(seed, 6)
     if len(cells) > most:
         cells = cells[np.sort(random.choice(len(cells), most, replace=False))]
