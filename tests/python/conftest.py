@@ -4,7 +4,9 @@
 
 import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from program import make_results, succeed
@@ -74,3 +76,17 @@ def branch_file(separatrix: Path, results: dict[str, Path], tmp_path_factory: py
         separatrix, "branches", results["map"].parent / "case.toml", *over, "-o", path, folder=path.parent
     )
     return path
+
+
+@pytest.fixture(scope="module")
+def campaign(source_dir: Path) -> Iterator[SimpleNamespace]:
+    """The modules of scripts/campaign."""
+    with pytest.MonkeyPatch.context() as patch:
+        for folder in ("scripts/campaign", "scripts", "tests/generator", "postprocess"):
+            patch.syspath_prepend(str(source_dir / folder))
+        import bars
+        import figure
+        import rates
+        import scoring
+
+        yield SimpleNamespace(rates=rates, scoring=scoring, bars=bars, figure=figure)
