@@ -27,8 +27,6 @@ class Share:
     upper: float
     starts: int
     not_known: float
-    drawn: bool = False
-    """The interval is that of the points of a grid as if they had been drawn."""
 
 
 def crossed_cells(grid: np.ndarray) -> np.ndarray:
@@ -65,43 +63,73 @@ def in_cells(
     return np.column_stack(columns)
 
 
+def missed_pieces(grid: np.ndarray, own: int) -> tuple[float, float]:
+    """Return which share of cells that seem to be of one label may be of another: of the basin's own, of others.
+
+    What lies between the points is told by the map of every second point: of the points that it leaves out,
+    so many in its cells of one label have another. These are the upper ends of Clopper and Pearson; on the
+    finer grid less is missed.
+    """
+    odd = grid[tuple(slice(0, size - (size + 1) % 2) for size in grid.shape)]
+    if min(odd.shape) < 3:
+        return 1.0, 1.0
+    low, high = _corners(odd[(slice(None, None, 2),) * grid.ndim])
+    lost = gained = in_own = in_others = 0
+    for bits in itertools.product((0, 1), repeat=grid.ndim):
+        if not any(bits):
+            continue
+        left_out = odd[tuple(slice(bit, -1, 2) for bit in bits)]
+        of_own, of_others = left_out[(low == own) & (high == own)], left_out[(low == high) & (low != own)]
+        lost, in_own = lost + np.sum(of_own != own), in_own + of_own.size
+        gained += np.sum((of_others == own) | (of_others == NOT_KNOWN))
+        in_others += of_others.size
+    return share_interval(lost, in_own)[1], share_interval(gained, in_others)[1]
+
+
 def global_share(
     labels: Labels | None, grid: np.ndarray, axes: list[np.ndarray], own: int, starts: int, seed: int = 1
 ) -> Share:
     """Return the share of a window that one basin has.
 
-    Cells whose corners are all alike count as their corners. With a labelling function `starts` are drawn in
-    the other cells, and the interval is that of Clopper and Pearson times their share; without one it is
-    from none to all of them, and the value counts points. Where there are no other cells, parts smaller than
-    a cell may still be missed: the interval is that of the points as if they had been drawn.
+    With a labelling function `starts` are drawn in the cells whose corners differ, and half as many each in
+    those of the basin and in those of others: the share is that of stratified sampling, the interval adds the
+    ends of Clopper and Pearson of the parts, or what `missed_pieces` says of cells whose corners are alike
+    where that is narrower. Without one cells with unlike corners count from none to all, and the value counts
+    points.
     """
     widths = np.ones(())
     for axis in axes:
         widths = np.multiply.outer(widths, np.diff(axis))
     widths = widths / widths.sum()
     low, high = _corners(grid)
-    whole = float(widths[(low == own) & (high == own)].sum())
-    unknown = float(widths[(low == NOT_KNOWN) & (high == NOT_KNOWN)].sum())
-    crossed = low != high
-    rest = float(widths[crossed].sum())
-    if not crossed.any():
-        lowest, highest = share_interval(int(np.sum(grid == own)), grid.size)
-        return Share(whole, min(whole, lowest), min(1.0, highest + unknown), 0, unknown, drawn=True)
+    kinds = {"crossed": low != high, "own": (low == own) & (high == own)}
+    without = (low == NOT_KNOWN) & (high == NOT_KNOWN)
+    kinds["others"] = ~(kinds["crossed"] | kinds["own"] | without)
+    size = {kind: float(widths[cells].sum()) for kind, cells in kinds.items()}
+    unknown = float(widths[without].sum())
+    lost, gained = missed_pieces(grid, own)
     if labels is None or starts == 0:
         value = float(np.mean(grid == own))
-        return Share(
-            value, min(whole, value), max(whole + rest + unknown, value), 0, float(np.mean(grid == NOT_KNOWN))
-        )
-    found = label_all(labels, in_cells(crossed, axes, starts, generator(seed, 2)))
-    hits, lost = int(np.sum(found == own)), int(np.sum(found == NOT_KNOWN))
-    lowest, highest = share_interval(hits, starts)[0], share_interval(hits + lost, starts)[1]
-    return Share(
-        whole + rest * hits / starts,
-        whole + rest * lowest,
-        whole + rest * highest + unknown,
-        starts,
-        unknown + rest * lost / starts,
-    )
+        least = size["own"] * (1 - lost)
+        most = size["own"] + size["others"] * gained + size["crossed"] + unknown
+        return Share(value, min(least, value), max(most, value), 0, float(np.mean(grid == NOT_KNOWN)))
+    total = np.array([0.0, 0.0, unknown])
+    drawn = 0
+    counts = {"crossed": starts, "own": starts // 2, "others": starts // 2}
+    for purpose, (kind, count) in enumerate(counts.items()):
+        if not size[kind] > 0 or count == 0:
+            continue
+        found = label_all(labels, in_cells(kinds[kind], axes, count, generator(seed, 2, purpose)))
+        hits, not_known = int(np.sum(found == own)), int(np.sum(found == NOT_KNOWN))
+        lowest, highest = share_interval(hits, count)[0], share_interval(hits + not_known, count)[1]
+        if kind == "own":
+            lowest = min(max(lowest, 1 - lost), hits / count)
+        elif kind == "others":
+            highest = max(min(highest, gained), (hits + not_known) / count)
+        total += size[kind] * np.array([hits / count, lowest, highest])
+        unknown += size[kind] * not_known / count
+        drawn += count
+    return Share(*map(float, total), drawn, unknown)
 
 
 def basin_stability(

@@ -13,18 +13,18 @@ from separatrix.measuring.report import Measure
 from separatrix.measuring.sampling import generator
 
 CELLS = (
-    "95 %: cells with corners of one label count as that label, new starts in the others "
-    "(Clopper and Pearson)"
+    "95 %: the ends of cells of the basin, of others and with corners of more than one label are added "
+    "(Clopper and Pearson, or what the map of every second point misses)"
 )
-DRAWN = "95 %: the points of the map as if they had been drawn, as all have one label (Clopper and Pearson)"
-POINTS = "from none to all of the cells with corners of more than one label"
+POINTS = (
+    "from none to all of the cells with corners of more than one label; of other cells what the map of every "
+    "second point misses"
+)
 RAY = "own starts up to the lower end, a start of another label at the upper end"
 
 
 def basis(share: areas.Share) -> str:
     """Return what the interval of a share of the window is from."""
-    if share.drawn:
-        return DRAWN
     return CELLS if share.starts else POINTS
 
 
@@ -37,10 +37,7 @@ def global_integrity(found: Slice, own: int) -> Measure:
     limits = list(found.limits)
     if labels is None:
         limits.append(f"resolution of the map ({' x '.join(map(str, found.grid.shape))} points)")
-    limits.append(
-        "a piece of another basin between the points of the map is not seen, nor is anything beyond the "
-        "window"
-    )
+    limits.append("nothing beyond the window is seen")
     return Measure(
         "global_integrity",
         "GIM: the share of the window that lies in the basin (area over area of the window)",
