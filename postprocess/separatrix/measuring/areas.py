@@ -64,7 +64,7 @@ def in_cells(
 
 
 def missed_pieces(grid: np.ndarray, own: int) -> tuple[float, float]:
-    """Return which share of cells that seem to be of one label may be of another: of the basin's own, of others.
+    """Return which share of cells of the basin may be of others, and which of other cells may be of the basin.
 
     What lies between the points is told by the map of every second point: of the points that it leaves out,
     so many in its cells of one label have another. These are the upper ends of Clopper and Pearson; on the
