@@ -10,7 +10,7 @@ module aperiodic
   use circle, only: nearest_turn, point_near
   use cycle, only: derivative, map_point, unattractive
   use elementary, only: exponential, logarithm
-  use exact_return, only: returns_t, watch_returns
+  use exact_return, only: returns_t, watch_anew, watch_returns
   use kinds, only: int64, wp
   use matrices, only: eigenvalues
   use motion, only: motion_t
@@ -46,7 +46,7 @@ contains
     real(wp), intent(in) :: amplitude
     type(strobe_t), intent(inout) :: strobe
     type(attractor_t), intent(out) :: found
-    type(returns_t), intent(out) :: returns
+    type(returns_t), intent(inout) :: returns
     logical, intent(out) :: known, ok
     type(tally_t) :: tally
     real(wp) :: before(most_coordinates), direction(most_coordinates), drift(box_periods), scale(most_coordinates)
@@ -55,6 +55,7 @@ contains
     known = .false.
     tally%wants_v_max = .true.
     call begin_tally(moving, strobe, tally)
+    call watch_anew(returns)
     found%coordinates = coordinates_of(moving)
     found%turn = moving%machine%turn
     call make_points(found, 2)
@@ -115,19 +116,23 @@ contains
   end subroutine tell_family
 
   !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the catalogue
-  !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly.
-  pure subroutine outlast(moving, catalogue, strobe, known, ok)
+  !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly, as `returns` tells.
+  !> `forgets` if it came to a completed chatter that leaves one motion alone, whatever came before: then nothing drifts apart for
+  !> good.
+  pure subroutine outlast(moving, catalogue, strobe, returns, known, forgets, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(strobe_t), intent(inout) :: strobe
-    logical, intent(out) :: known, ok
-    type(returns_t) :: returns
+    type(returns_t), intent(inout) :: returns
+    logical, intent(out) :: known, forgets, ok
     type(tally_t) :: tally
     integer(int64) :: slips
     integer :: i, reason
     known = .false.
+    forgets = .false.
     ok = .true.
     call begin_tally(moving, strobe, tally)
+    call watch_anew(returns)
     do i = 1, merge(lasting_exact, lasting, moving%exact)
       slips = tally%slips
       call advance_strobe_period(moving, strobe, tally, reason)
@@ -135,6 +140,7 @@ contains
       if (.not. ok) return
       known = captor_of(moving, catalogue, strobe, tally%slips > slips) > 0
       if (known) return
+      forgets = tally%chatters > 0 .and. coordinates_of(moving) == 2
       call watch_returns(moving, strobe, tally%chatters, returns)
       if (returns%period > 0) return
     end do

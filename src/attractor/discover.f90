@@ -5,8 +5,8 @@
 !> before any trajectory of a map is labelled.
 module discover
   use aperiodic, only: add_aperiodic, meets_chaos, outlast, tell_family, watch_long
-  use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_rest, longest_period, make_points, &
-    most_coordinates, regime_at_rest, regime_non_impact
+  use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_not_known, kind_rest, longest_period, &
+    make_points, most_coordinates, regime_at_rest, regime_non_impact
   use capture, only: captor_of
   use circle, only: point_near
   use contact_law, only: contact_t
@@ -94,7 +94,7 @@ contains
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     type(attractor_t) :: found, cycle_found
     type(returns_t) :: returns
-    logical :: known, ok, lasts
+    logical :: known, ok, lasts, forgets
     if (is_linear(moving) .and. stretch%regime == regime_non_impact) then
       call motion_without_impact(moving, found, ok)
       if (ok) then
@@ -104,6 +104,7 @@ contains
     end if
     if (.not. longer) return
     lasts = .false.
+    forgets = .false.
     do
       call watch_long(moving, catalogue, stretch%amplitude, strobe, found, returns, known, ok)
       if (known .or. .not. ok) return
@@ -114,10 +115,11 @@ contains
       end if
       if (.not. has_no_clock(moving)) call tell_family(moving, strobe, stretch%amplitude, min(max_period, longest_period), found)
       if (lasts .or. found%kind /= kind_chaotic .or. meets_chaos(catalogue, found)) exit
-      call outlast(moving, catalogue, strobe, known, ok)
+      call outlast(moving, catalogue, strobe, returns, known, forgets, ok)
       if (known .or. .not. ok) return
       lasts = .true.
     end do
+    if (forgets .and. found%kind == kind_chaotic) found%kind = kind_not_known
     call add_aperiodic(moving, found, catalogue)
   end subroutine look_longer
 

@@ -17,7 +17,7 @@ module exact_return
   implicit none
   private
 
-  public :: watch_returns, exact_cycle
+  public :: watch_returns, watch_anew, exact_cycle
 
   !> Distance, in units of the motion's size, at which states of an exact cycle count as the same: rounding may carry it
   !> through neighbouring numbers, several rounds of which come back exactly.
@@ -43,6 +43,12 @@ module exact_return
   end type returns_t
 
 contains
+
+  !> Forgets the state kept, as the running count of chatters begins anew, not the return that was found.
+  pure subroutine watch_anew(returns)
+    type(returns_t), intent(inout) :: returns
+    returns = returns_t(period=returns%period, chattered=returns%chattered)
+  end subroutine watch_anew
 
   !> Notes the state on the next section; `chatters` is a running count.
   pure subroutine watch_returns(moving, strobe, chatters, returns)

@@ -161,8 +161,8 @@ contains
     line = ''
     if (entries == 0) return
     line = 'warning: '//to_text(entries)//' entries of the catalogue, in '//to_text(slices)//' of '//to_text(size(catalogues))// &
-      ' slices, are not known to be periodic, nor do neighbouring motions drift apart: perhaps long transients. A longer '// &
-      'run.duration or run.extension (now '//to_text(extension, 3)//') tells'
+      ' slices, are not known to be periodic, nor that neighbouring motions drift apart for good: perhaps long transients. A '// &
+      'longer run.duration or run.extension (now '//to_text(extension, 3)//') tells'
   end function not_known_text
 
   !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where

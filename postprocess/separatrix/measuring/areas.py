@@ -64,7 +64,7 @@ def in_cells(
 
 
 def missed_pieces(grid: np.ndarray, own: int) -> tuple[float, float]:
-    """Return which share of cells of the basin may be of others, and which of other cells may be of the basin.
+    """Return which share of cells of the basin may be of others, and of other cells which may be of it.
 
     What lies between the points is told by the map of every second point: of the points that it leaves out,
     so many in its cells of one label have another. These are the upper ends of Clopper and Pearson; on the
