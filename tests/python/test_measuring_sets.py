@@ -226,6 +226,27 @@ def test_a_fractal_boundary_is_called_rough() -> None:
     assert found.boundary[1] > found.smooth
 
 
+@pytest.mark.parametrize("width", [0.002, 0.05, 0.3])
+def test_labels_that_are_not_known_widen_the_entropy(width: float) -> None:
+    """Discs on the boundary are left out first, so that the rest does not stand for all."""
+    whole = half_plane((1.0, 0.1), 0.55)
+
+    def labels(points: np.ndarray) -> np.ndarray:
+        near = np.abs(points @ np.array([1.0, 0.1]) - 0.55) < width
+        return np.where(near, 0, whole(points))
+
+    truth = entropy.basin_entropy(whole, UNIT, 0.05, 2000, 100)
+    found = entropy.basin_entropy(labels, UNIT, 0.05, 2000, 100)
+    for told, discs, right in (
+        (found.all_discs, found.discs, truth.all_discs[0]),
+        (found.boundary, found.mixed, truth.boundary[0]),
+    ):
+        _, low, high = found.bounds(told, discs)
+        assert 0 <= low < right < high <= np.log(3)
+    assert found.unsure and not truth.unsure
+    assert truth.bounds(truth.all_discs, truth.discs) == truth.all_discs
+
+
 def test_the_slope_of_the_entropy_is_the_exponent() -> None:
     found = [entropy.basin_entropy(cantor, UNIT, 0.03 * 3.0**-k, 4000, 100) for k in range(5)]
     slope, low, high = entropy.exponent(found)

@@ -55,7 +55,10 @@ def basin_entropy(found: Slice) -> list[Measure]:
     }
     limits = list(found.limits)
     if first.left:
-        limits.append(f"{first.left} discs left out: a label not known, or no start there")
+        limits.append(
+            f"{first.left} discs left out: {first.unknown} with a label not known, which the interval allows "
+            f"for, {first.left - first.unknown} with no start there"
+        )
     boundary_limits = [*limits, verdict(results)]
     return [
         Measure(
@@ -63,7 +66,7 @@ def basin_entropy(found: Slice) -> list[Measure]:
             told,
             "1",
             None,
-            *first.all_discs,
+            *first.bounds(first.all_discs, first.discs),
             "95 %, Student over the discs",
             parameters,
             tuple(limits),
@@ -74,7 +77,7 @@ def basin_entropy(found: Slice) -> list[Measure]:
             edge,
             "1",
             None,
-            *first.boundary,
+            *first.bounds(first.boundary, first.mixed),
             "95 %, Student over the discs",
             {**parameters, "discs": first.mixed, "of_a_smooth_boundary": first.smooth},
             tuple(boundary_limits),
@@ -87,6 +90,8 @@ def verdict(results: list[entropy.Entropy]) -> str:
     """Say what the test of smoothness finds; a Bonferroni bound over the radii."""
     probability = min(1.0, len(results) * min(one.probability for one in results))
     finest = results[-1]
+    if any(one.unsure for one in results):
+        return "too many discs have labels not known: whether the boundary is smooth is not known"
     if finest.mixed < 10:
         return "fewer than 10 discs of the smallest radius meet a boundary: whether it is smooth is not known"
     if probability < LEVEL:

@@ -26,7 +26,8 @@ class Entropy:
 
     `smooth` is the boundary entropy that a smooth boundary has with the same number of starts a disc, and
     `probability` how likely it would be to find as much as here, or more, if the boundary were smooth. `left`
-    are the discs left out, because a label is not known or a start does not exist.
+    are the discs left out, because a start does not exist or a label is not known, `unknown` those of them
+    that have starts throughout; `basins` is how many basins were met.
     """
 
     radius: float
@@ -38,6 +39,23 @@ class Entropy:
     smooth: float
     probability: float
     left: int
+    unknown: int
+    basins: int
+
+    @property
+    def unsure(self) -> bool:
+        """Whether so many discs have labels not known that the others do not stand for all."""
+        return self.unknown > 0.01 * (self.discs + self.unknown)
+
+    def bounds(self, interval: tuple[float, float, float], discs: int) -> tuple[float, float, float]:
+        """Return a mean over so many discs with ends that allow for those whose labels are not known.
+
+        Each of these may have from no entropy to that of all basins alike, and one more.
+        """
+        value, lower, upper = interval
+        share = self.unknown / max(1, discs + self.unknown)
+        most = np.log(self.basins + (self.unknown > 0))
+        return value, max(0.0, (1 - share) * lower), min(most, (1 - share) * upper + share * most)
 
 
 def basin_entropy(
@@ -47,7 +65,7 @@ def basin_entropy(
     random = generator(seed, 4, int(np.float64(radius).view(np.int64)))
     room = Region(region.lower + radius, region.upper - radius, region.turns)
     centres = room.draw(discs, random)
-    entropies, left = [], 0
+    entropies, left, unknown, met = [], 0, 0, set()
     step = max(1, (1 << 20) // starts)
     for first in range(0, discs, step):
         some = centres[first : first + step]
@@ -55,8 +73,11 @@ def basin_entropy(
             len(some), starts, region.dimension
         )
         found = label_all(labels, points.reshape(-1, region.dimension)).reshape(len(some), starts)
-        good = ~((found == NOT_KNOWN) | (found == NO_START)).any(axis=1)
+        whole, known = (found != NO_START).all(axis=1), (found != NOT_KNOWN).all(axis=1)
+        good = whole & known
         left += int(np.sum(~good))
+        unknown += int(np.sum(whole & ~known))
+        met |= set(np.unique(found[found > 0]))
         entropies.append(_entropies(found[good]))
     values = np.concatenate(entropies) if entropies else np.empty(0)
     mixed = values[values > 0]
@@ -71,6 +92,8 @@ def basin_entropy(
         smooth,
         _above(mixed, smooth),
         left,
+        unknown,
+        len(met),
     )
 
 
