@@ -147,7 +147,8 @@ def _chosen(names: Sequence[str] | str | None, phases: int | None) -> tuple[str,
 
 
 def _owns(found: Slice, wanted: Sequence[int] | int | None) -> list[int]:
-    present = [int(label) for label in np.unique(found.grid) if label > 0]
+    # an attractor whose basin lies between the points of the map has one nevertheless
+    present = sorted({int(label) for label in np.unique(found.grid) if label > 0} | set(found.entries))
     if wanted is None:
         return present
     given = [wanted] if isinstance(wanted, int) else list(wanted)
