@@ -32,6 +32,8 @@ module branch
   integer, parameter :: many_steps = 6
   !> Smallest step, as a share of the largest.
   real(wp), parameter :: smallest_step = 1e-7_wp
+  !> After so many tries of a step it is taken as near as rounding lets it: equations that tell little are no end.
+  integer, parameter :: few_tries = 3
   !> The parameter has not turned back by less than this share of its size.
   real(wp), parameter :: no_turn = 1e-11_wp
   !> Nearness of a multiplier to that of a doubling at the end of a branch.
@@ -132,7 +134,7 @@ contains
     ending = no_label
     do tries = 1, 60
       length = trace%step
-      call step_to(family, trace, length, next, ok, steps)
+      call step_to(family, trace, length, next, ok, steps, roughly=tries > few_tries)
       if (ok) ok = sum(next%now%tangent*trace%now%tangent) > least_cosine
       if (ok) exit
       trace%step = trace%step/2

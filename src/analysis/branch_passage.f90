@@ -122,7 +122,7 @@ contains
     s = length
     do i = 1, most_secants
       s = next_trial(bracket)
-      call step_to(family, trace, s, there, ok, steps)
+      call step_to(family, trace, s, there, ok, steps, roughly=target%test == no_test)
       if (.not. ok) return
       f = value_of(target, there)
       call narrow(bracket, s, f)
@@ -336,7 +336,7 @@ contains
     integer :: way, tries, steps
     start%machines = at%machines
     start%now%orbit = beyond%now%orbit
-    call correct_orbit(family, start%machines, start%now%orbit, direct(start%now%orbit, 1), ok)
+    call correct_orbit(family, start%machines, start%now%orbit, direct(start%now%orbit, 1), ok, roughly=.true.)
     if (.not. ok) return
     along = direct(start%now%orbit, nint(sign(1.0_wp, at%now%tangent(size(at%now%tangent)))))
     call set_point(family, start, along, ok)
@@ -348,7 +348,7 @@ contains
     do tries = 1, 4
       do way = 1, 2
         start%now%tangent = merge(1, -1, way == 1)*along
-        call step_to(family, start, look, tried(way), fits(way), steps)
+        call step_to(family, start, look, tried(way), fits(way), steps, roughly=.true.)
         if (fits(way)) fits(way) = all(tried(way)%margins%list%value > -no_passage)
         if (fits(way)) fits(way) = is_admissible(tried(way)%machines, tried(way)%now%orbit)
       end do

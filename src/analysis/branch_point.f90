@@ -108,14 +108,15 @@ contains
     trace%now%x_min = trace%margins%x_min
   end subroutine set_point
 
-  !> The point `length` further along the branch, with everything that belongs to it.
-  subroutine step_to(family, trace, length, next, ok, steps)
+  !> The point `length` further along the branch, with everything that belongs to it; `roughly`: as near as rounding lets it.
+  subroutine step_to(family, trace, length, next, ok, steps, roughly)
     type(family_t), intent(in) :: family
     type(trace_t), intent(in) :: trace
     real(wp), intent(in) :: length
     type(trace_t), intent(out) :: next
     logical, intent(out) :: ok
     integer, intent(out) :: steps
+    logical, intent(in), optional :: roughly
     type(error_t), allocatable :: error
     real(wp) :: way(size(trace%now%tangent))
     steps = 0
@@ -125,7 +126,7 @@ contains
     call move_along(next%now%orbit, way*scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
     call machine_neighbourhood(family, next%now%orbit%parameter, next%machines, error)
     ok = .not. allocated(error)
-    if (ok) call correct_orbit(family, next%machines, next%now%orbit, trace%now%tangent, ok, steps)
+    if (ok) call correct_orbit(family, next%machines, next%now%orbit, trace%now%tangent, ok, steps, roughly)
     if (ok) call set_point(family, next, trace%now%tangent, ok)
   end subroutine step_to
 

@@ -26,6 +26,8 @@ module periodic_orbit
   integer, parameter :: most_newton = 12
   !> Newton's method has converged when a step, in natural sizes, is below this.
   real(wp), parameter :: converged_step = 1e-11_wp
+  !> Where the equations hold to this, steps up to the other length are of rounding alone, as the equations tell no more.
+  real(wp), parameter :: rounding_of_equations = 5e-14_wp, told_by_rounding = 1e-9_wp
   !> Newton's steps with the same derivatives by the parameter.
   integer, parameter :: newton_between = 4
   !> Orbits whose points on the section are within this in natural sizes are one.
@@ -175,20 +177,22 @@ contains
 
   !> Newton's method from a guess; in natural sizes the orbit moves only across `direction` (a row over state, instants and
   !> parameter): a direction along the parameter keeps that fixed. `steps` is the number of iterations. `machines` in the end
-  !> are those of the orbit found.
-  subroutine correct_orbit(family, machines, orbit, direction, ok, steps)
+  !> are those of the orbit found. Where rounding keeps steps from shrinking as far as they should, it is found if `roughly` will do.
+  subroutine correct_orbit(family, machines, orbit, direction, ok, steps, roughly)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(inout) :: machines
     type(orbit_t), intent(inout) :: orbit
     real(wp), intent(in) :: direction(:)
     logical, intent(out) :: ok
     integer, intent(out), optional :: steps
+    logical, intent(in), optional :: roughly
     real(wp), dimension(size(direction)) :: scales, miss, step
     real(wp) :: slopes(size(direction), size(direction)), by_parameter(size(direction) - 1), before, length
     type(error_t), allocatable :: error
-    logical :: moved
+    logical :: moved, near_enough
     integer :: i, n
     n = size(direction)
+    near_enough = .false.
     before = huge(before)
     length = huge(length)
     moved = .false.
@@ -220,8 +224,11 @@ contains
       ! Or what the next step would be is nil, even if the steps shrink no faster than so far: beside a graze they do so late.
       ok = i > 1 .and. length*(length/before) < 1e-15_wp
       if (ok) exit
+      near_enough = .false.
+      if (present(roughly)) near_enough = roughly .and. norm2(miss) < rounding_of_equations
+      if (near_enough .and. length < told_by_rounding .and. length >= 0.5_wp*before) exit
     end do
-    ok = ok .or. length < converged_step
+    ok = ok .or. length < converged_step .or. (near_enough .and. length < told_by_rounding)
     if (ok .and. moved) call machine_neighbourhood(family, orbit%parameter, machines, error)
     ok = ok .and. .not. allocated(error)
     if (.not. ok) return

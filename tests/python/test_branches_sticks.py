@@ -102,3 +102,18 @@ def test_a_stick_between_two_slips_one_way_begins_and_ends(follow) -> None:
     assert set(labels) == {"none", "end_of_range", "stick_onset"}
     onsets = [0.629976286277, 0.632365114731, 0.633160141939]
     assert parameter[labels == "stick_onset"] == pytest.approx(onsets, abs=1e-10)
+
+
+def test_equations_that_tell_little_end_no_branch(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
+    """Where the capsule's cycle of two periods is told to 1e-9 only it goes on from its doubling."""
+    case = source_dir / "examples" / "structure_capsule.toml"
+    over = ("--parameter", "drive.inner.frequency", "--from", 0.9, "--to", 1.0, "--searches", 3)
+    succeed(separatrix, "branches", case, *over, "-o", "out.h5", folder=tmp_path)
+    with open_result(tmp_path / "out.h5") as result:
+        labels = decode_flags(result["label"]).values
+        parameter, period = result["parameter"].values, result["period"].values
+    doubled = (period == 2) & (parameter > 0.9646) & (parameter < 0.9647)
+    onset = parameter[doubled & (labels == "stick_onset")]
+    assert onset == pytest.approx([0.9646267953639], abs=1e-9)
+    assert "not_known" not in labels[doubled]
+    assert np.isin(parameter[doubled].max(), parameter[(period == 1) & (labels == "PD")])
