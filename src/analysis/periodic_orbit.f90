@@ -177,7 +177,8 @@ contains
 
   !> Newton's method from a guess; in natural sizes the orbit moves only across `direction` (a row over state, instants and
   !> parameter): a direction along the parameter keeps that fixed. `steps` is the number of iterations. `machines` in the end
-  !> are those of the orbit found. Where rounding keeps steps from shrinking as far as they should, it is found if `roughly` will do.
+  !> are those of the orbit found. Where rounding keeps steps from shrinking as far as they should, it is found if `roughly` will
+  !> do.
   subroutine correct_orbit(family, machines, orbit, direction, ok, steps, roughly)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(inout) :: machines
