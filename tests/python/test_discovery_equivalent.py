@@ -91,3 +91,13 @@ def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path
         colour="quantised", velocity=True, crank_angle=True, tells_noise=True, phase_error=[0.0, 0.0, 0.0],
     )  # fmt: skip
     assert "offset_force" in said(generator, case, tmp_path)
+
+
+@pytest.mark.parametrize("number", [557, 1023])
+def test_names_of_one_motion_are_not_lost_in_other_minima(generator, tmp_path, number):
+    """One name had found the motion, another was caught elsewhere or had a law more: the truth was out."""
+    from design import draw
+
+    case = draw(3017, number)
+    assert [one.name for one in case.hidden] == ["asymmetric_friction"]
+    assert {"offset_force", "asymmetric_friction", "sensor_bias"} <= said(generator, case, tmp_path)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An effect of two laws is fitted with each alone where one of them is doubtful, and only there."""
+"""An effect of two laws is fitted with each alone where one is doubtful or it is asked for."""
 
 from types import SimpleNamespace
 
@@ -15,15 +15,17 @@ NAME = "asymmetric_friction"
 COULOMB, VISCOUS = (f"effect.{NAME}.{key}" for key in ("coulomb", "viscous"))
 
 
-@pytest.mark.parametrize(("errors", "gained", "converged", "split"), [
-    ((0.1, 0.5), 10.0, True, True),
-    ((0.5, 0.1), 10.0, True, True),
+@pytest.mark.parametrize(("errors", "gained", "converged", "doubtful", "split"), [
+    ((0.1, 0.5), 10.0, True, True, True),
+    ((0.5, 0.1), 10.0, True, True, True),
+    # both are sure, and wanted all the same
+    ((0.1, 0.1), 10.0, True, False, True),
     # both are sure; nothing was gained; the whole is not at its end
-    ((0.1, 0.1), 10.0, True, False),
-    ((0.1, 0.5), 0.5, True, False),
-    ((0.1, 0.5), 10.0, False, False),
+    ((0.1, 0.1), 10.0, True, True, False),
+    ((0.1, 0.5), 0.5, True, True, False),
+    ((0.1, 0.5), 10.0, False, True, False),
 ])  # fmt: skip
-def test_a_doubtful_law_is_left_out(library, monkeypatch, errors, gained, converged, split):
+def test_a_doubtful_law_is_left_out(library, monkeypatch, errors, gained, converged, doubtful, split):
     added = []
     written = {COULOMB: SimpleNamespace(value=0.2), VISCOUS: SimpleNamespace(value=0.1)}
     model = SimpleNamespace(
@@ -45,7 +47,7 @@ def test_a_doubtful_law_is_left_out(library, monkeypatch, errors, gained, conver
     monkeypatch.setattr(halves_module, "minimise", minimise)
     monkeypatch.setattr(halves_module, "polished", lambda data, problem, fit, *rest, **more: fit)
     data = SimpleNamespace(last=0, problem=lambda model, stage, free: free)
-    found = list(halves(data, base, one, whole))
+    found = list(halves(data, base, one, whole, doubtful))
     if not split:
         assert not found
         return

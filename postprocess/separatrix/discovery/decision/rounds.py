@@ -15,7 +15,15 @@ from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of, 
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.places import SensedScales
-from separatrix.discovery.fitting.refit import Fitted, beaten, carried_on, crossed, gain_over, refit
+from separatrix.discovery.fitting.refit import (
+    Fitted,
+    beaten,
+    carried_on,
+    crossed,
+    gain_over,
+    in_place_of,
+    refit,
+)
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
 
@@ -133,6 +141,7 @@ def run_round(
     found.rank()
     _carry_on(bench, found)
     _cross(bench, found)
+    _same_motion(bench, found)
     _fair(bench, found)
     return found
 
@@ -168,12 +177,13 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
 
 
-def _simplest(bench: Bench, found: Round, whole: Judged) -> Judged:
-    """The effect, or one of its laws alone where that has more evidence."""
+def _simplest(bench: Bench, found: Round, whole: Judged, doubtful: bool = True) -> Judged:
+    """The effect, or one of its laws alone that has more evidence; if `doubtful`, where one may be zero."""
     best = whole
     if whole.prediction is None and bench.held_out is not None:
         return best
-    for part, fitted in halves(bench.training, found.base, found.candidates[whole.name], whole.fitted):
+    candidate = found.candidates[whole.name]
+    for part, fitted in halves(bench.training, found.base, candidate, whole.fitted, doubtful):
         one = found.judge(fitted, bench.foretell(fitted, whole.prediction))
         if one.evidence > best.evidence:
             best, found.candidates[whole.name] = one, part
@@ -238,6 +248,28 @@ def _cross(bench: Bench, found: Round) -> None:
         better = crossed(bench.training, one.fitted, best, found.candidates[one.name])
         if better is not one.fitted:
             order[place] = found.judge(better, bench.foretell(better, order[0].prediction))
+    found.rank()
+
+
+def _same_motion(bench: Bench, found: Round) -> None:
+    """Let names of one motion follow the best of them: it is theirs too, unless sticking tells them apart.
+
+    A name that is behind only because its fit ended in another minimum would be missed in a verdict.
+    """
+    order = found.judged
+    best = next((one for one in order if effect_of(one.name).confused), None)
+    if best is None or bench.options.quick or best.training < _WORTH_CROSSING:
+        return
+    if best.evidence < _SHARE * order[0].evidence:
+        return
+    for place, one in enumerate(order):
+        behind = best.evidence - one.evidence
+        if one.name not in effect_of(best.name).confused or behind < bench.options.separation:
+            continue
+        better = in_place_of(bench.training, one.fitted, best.fitted, found.candidates[one.name])
+        if better is not one.fitted:
+            one = found.judge(better, bench.foretell(better, best.prediction))
+        order[place] = _simplest(bench, found, one, doubtful=False)
     found.rank()
 
 

@@ -23,9 +23,9 @@ _WORTH = 1.0
 
 
 def halves(
-    data: Data, base: Fitted, candidate: Candidate, whole: Fitted
+    data: Data, base: Fitted, candidate: Candidate, whole: Fitted, doubtful: bool = True
 ) -> Iterator[tuple[Candidate, Fitted]]:
-    """The effect with each of its laws alone, where not all of them are sure."""
+    """The effect with each of its laws alone; if `doubtful`, only where not all of them are sure."""
     name = candidate.names[-1]
     if name not in effects():
         # of several bodies each is one law
@@ -35,7 +35,7 @@ def halves(
     units = {effect.parameters[key].unit for key in effect.amplitudes}
     if len(units) < 2 or len(units) != len(paths) or not whole.fit.converged:
         return
-    if gain_over(whole, base)[0] < _WORTH or not _doubtful(whole):
+    if gain_over(whole, base)[0] < _WORTH or (doubtful and not _doubtful(whole)):
         return
     for path in paths:
         # the value fitted may be none for the case as it is written, whose friction was fitted too

@@ -275,6 +275,24 @@ def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fit
     values = _base_values(other, candidate)
     added = list(candidate.added)
     values[added] = one.fit.values[list(one.added)]
+    return _from(data, one, values, other)
+
+
+def in_place_of(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
+    """A fit tried again in the place of another name of its motion; the better of both.
+
+    It begins at the machine of that name, without a size and with the size that its own leads to there.
+    """
+    own = _base_values(other, candidate)
+    found = _from(data, one, _absent(own, candidate), other)
+    own[list(candidate.added)] = one.fit.values[list(one.added)]
+    others = ~np.isin(np.arange(own.size), candidate.added)
+    sized = minimise(one.problem, own, other.fit.starts, most=8, fixed=others, rough=True)
+    return _from(data, found, sized.values, other)
+
+
+def _from(data: Data, one: Fitted, values: np.ndarray, other: Fitted) -> Fitted:
+    """The better of a fit and another from given values and the starts of another machine."""
     fit = minimise(one.problem, values, other.fit.starts, most=15)
     fit = polished(data, one.problem, fit, data.last, 8, rival=one.fit)
     found = Fitted(one.names, one.model, one.problem, fit, one.added, one.tries + 1)
