@@ -17,7 +17,7 @@ SEED = 20261124
 # A trajectory of this case takes a millisecond; the promise is 2 s and one trajectory.
 SOON = 2.0
 # So long that a run outlives the second that mpirun takes before it passes SIGTERM on.
-SLOW = ["--set", "run.duration=400"]
+SLOW = ["--set", "run.duration=2000"]
 # mpirun waits about two seconds when a process has returned another code than 0.
 MPIRUN = 2.5
 
