@@ -91,7 +91,9 @@ int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, 
  *     none is grazed; 0: do not trust the derivatives
  *   reason [segment_count]
  *     0, or why the segment could not be flown and has samples that are not numbers: 3 left the domain,
- *     4 not finite, 5 too many events, 6 step size, 65 its start is not finite or beyond a rigid barrier
+ *     4 not finite, 5 too many events, 6 step size, 7 too many steps, 65 its start is not finite or beyond
+ *     a rigid barrier. Too many: over 20 000 within a drive period, and 32 more for each sample of a
+ *     measured force, or over integrator.event_budget or step_budget of the case if those are less.
  *   impact_capacity, impact_count
  *     room for impacts, and how many there were; those beyond the room are left out
  *   impact_segment [impact_capacity], impact [impact_capacity][4]

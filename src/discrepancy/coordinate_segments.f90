@@ -169,6 +169,9 @@ contains
     do while (until - run%log%origin >= moving%machine%period)
       call advance_jointed_period(moving, state, tally, run%reason, run%log)
       if (run%reason /= 0) return
+      ! Budgets are of one period.
+      tally%events = 0
+      tally%steps = 0
     end do
     call advance_jointed(moving, state, until - run%log%origin, tally, run%reason, run%log)
   end subroutine fly_to

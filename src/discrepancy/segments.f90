@@ -178,6 +178,9 @@ contains
     do while (until - run%log%origin >= moving%machine%period)
       call advance_period(moving, state, run%tally, run%reason, run%log)
       if (run%reason /= 0) return
+      ! Budgets are of one period.
+      run%tally%events = 0
+      run%tally%steps = 0
     end do
     call advance(moving, state, until - run%log%origin, run%tally, run%reason, run%log)
   end subroutine fly_to

@@ -7,11 +7,11 @@
 !> own error s: both are least at e = sqrt(s), s being rounding for exact flights and, for adaptive ones, the part of the
 !> tolerance that neighbours do not share.
 module variants
-  use build_motion, only: machine_of
+  use build_motion, only: limit_budgets, machine_of
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
   use jointed, only: jointed_t
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use law_table, only: law_choice_t
   use machine_facts, only: is_one_body, structure_in
   use motion, only: motion_t
@@ -31,6 +31,11 @@ module variants
   real(wp), parameter :: uncommon = 4e-4_wp
   !> A parameter smaller than this share of its natural size is stepped as if it had that size.
   real(wp), parameter :: smallest_share = 0.1_wp
+
+  !> Events, and steps, that a segment may take in a drive period, and more for each sample of a measured force that a step
+  !> ends at. Motions of machines take some hundreds; a fit that tries a spring or barrier too stiff to have made a record must
+  !> not pay for following it.
+  integer(int64), parameter :: most_a_period = 20000, most_a_sample = 32
 
   !> Parameters of the sensor: derivatives by them follow from the samples and from those by the crank angle, and need no
   !> machine.
@@ -149,11 +154,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t) :: changed(size(plan%laws))
     type(options_t) :: options
+    integer(int64) :: budget
     changed = plan%laws
     call put_values(changed, plan%chosen, values)
     options = plan%options
     if (adaptive) options%flight = flight_adaptive
     call machine_of(changed, options, moving, error)
+    if (allocated(error)) return
+    budget = most_a_period
+    if (allocated(moving%machine%drive%force)) budget = budget + most_a_sample*size(moving%machine%drive%force)
+    call limit_budgets(moving, budget, budget)
     ! Samples within the Stribeck layer need the adaptive flight anyhow.
     moving%transit%available = .false.
   end subroutine build
