@@ -184,8 +184,8 @@ def wada_grid(found: Slice) -> Measure:
     told = (
         "W_N: the share of the map's cells with corners of two labels that show all N basins once "
         "the segments "
-        "between their corners are bisected with new starts; 1 says Wada, 0 that no three basins "
-        "meet"
+        "between their corners are bisected with new starts; 1 says Wada, 0 that no cell shows all of "
+        "them"
     )
     basins = [label for label in np.unique(found.grid) if label > 0]
     if len(basins) < 3:

@@ -19,8 +19,8 @@ _ALL_HARMONICS = 6
 _FEWEST_IMPACTS = 4
 POWERS = 4
 """Of the speed before an impact, of which kicks are made: from 0 on."""
-# standard deviation of a fault of a rig over the signal
-_SIZE = 1e-3
+FAULT = 5e-4
+"""Standard deviation of a fault of a rig over the signal: half of the largest that is usual."""
 
 
 def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
@@ -110,7 +110,7 @@ def fault_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
         u = (signal - np.mean(signal[seen])) / swing
         for power in (2, 3):
             table = np.zeros((count, fit.evaluation.residual.shape[1], 1))
-            table[:, part, 0] = seen * _SIZE * swing * u**power / sigmas_of(problem, name)[:, None]
+            table[:, part, 0] = seen * FAULT * swing * u**power / sigmas_of(problem, name)[:, None]
             columns.append(table)
     _, phase = clock_of(problem, fit)
     n = problem.structure.n
@@ -124,6 +124,6 @@ def fault_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
         rates = np.diff(speeds, axis=1)[usable] / steps[usable]
         usual = problem.structure.mass[place] * float(np.median(np.abs(rates))) / 0.6745
         waves = [f(k * phase) for k in range(1, _ALL_HARMONICS + 1) for f in (np.sin, np.cos)]
-        forces = _SIZE * usual * np.stack(waves, axis=2) * good[:, :, None]
+        forces = FAULT * usual * np.stack(waves, axis=2) * good[:, :, None]
         columns.append(columns_of(problem, fit, forces, np.eye(n)[place]))
     return problem.whitened(np.concatenate(columns, axis=2))

@@ -3,9 +3,9 @@
 """Small faults that every rig has and that are no missing effect: a sensor that is not quite linear, a drive
 with further harmonics.
 
-Each is known to be no larger than some 1e-3 of the signal, which is its standard deviation here; as nuisances
-with that prior they take from a residual what they may explain of it (G. E. P. Box's tentative overfitting,
-with a bound).
+Each is known to be no larger than some 1e-3 of the signal, which is two standard deviations here; as
+nuisances with that prior they take from a residual what they may explain of it (G. E. P. Box's tentative
+overfitting, with a bound).
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import fault_columns_of
+from separatrix.discovery.fitting.joint_forces import FAULT, fault_columns_of
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
@@ -24,8 +24,6 @@ from separatrix.discovery.fitting.refit import Fitted, common
 from separatrix.discovery.fitting.response import force_columns, sample_times
 from separatrix.discovery.fitting.screen import project
 
-# standard deviation of a fault over the signal
-_SIZE = 1e-3
 _POWERS = (2, 3)
 _HARMONICS = 6
 # standard deviations that a fault may have, and by which factors its prior is made narrower for that
@@ -47,7 +45,7 @@ def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
         # of the flights; impacts are far above
         usual = float(np.median(np.abs(rates))) / 0.6745 if rates.size else 0.0
         waves = [f(n * state["phase"]) for n in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
-        accelerations = _SIZE * usual * np.stack(waves, axis=2) * inside[:, :, None]
+        accelerations = FAULT * usual * np.stack(waves, axis=2) * inside[:, :, None]
         columns.append(force_columns(problem, fit, accelerations, 1.0))
     return np.concatenate(columns, axis=2)
 
@@ -71,7 +69,7 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
         u = (signal[rows] - np.mean(seen)) / swing
         sigma = prepared.deviation(problem.segments.index[rows])
         for place, power in enumerate(_POWERS, start=number * len(_POWERS)):
-            table[rows, :length, place] = _SIZE * swing * u**power / sigma
+            table[rows, :length, place] = FAULT * swing * u**power / sigma
     return problem.whitened(table)
 
 
