@@ -95,6 +95,11 @@ def test_a_held_out_record_tells_an_effect_by_the_odds_of_a_name():
     assert not beyond_doubt(foretold(np.zeros(12), np.ones(12)), base, OPTIONS)
     silent.training = 5.0
     assert not beyond_doubt(silent, base, OPTIONS)
+    # whose noise is all that tells two machines apart that should foretell alike, and whose is not
+    noise = np.array([*6 * [1.0], *6 * [-1.0]])
+    for offset, information, holds in ((0.0, 1e-3, True), (0.0, 1e3, False), (-0.5, 1e-3, False)):
+        one = foretold(noise + offset, np.full(12, information))
+        assert beyond_doubt(one, base, OPTIONS) == holds
 
 
 def foretold(gains: np.ndarray, information: np.ndarray) -> Judged:

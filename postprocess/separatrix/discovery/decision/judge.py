@@ -149,23 +149,32 @@ def foretells(one: Judged, options: Options) -> bool:
 
 
 def beyond_doubt(one: Judged, base: Fitted, options: Options) -> bool:
-    """Whether fitted records tell an effect of which held-out ones say nothing: they are foretold alike.
+    """Whether fitted records tell an effect of which held-out ones say nothing.
 
-    Over a base that is not at its minimum they do not.
+    They are foretold alike, or no worse than by chance where no gain is to be expected: half of the
+    information on the effect. Over a base that is not at its minimum they say something.
     """
     parts, misfit = one.held_out_parts, one.prediction.misfit
     compared = np.count_nonzero(parts) > parts.size / 2
-    alike = compared and float(np.abs(parts).sum()) < options.separation * misfit
-    return bool(alike and base.fit.converged and one.training - one.parameters > _DOUBTLESS * misfit)
+    alike = float(np.abs(parts).sum()) < options.separation * misfit
+    expected = float(_foretold_information(one).sum()) / 2
+    silent = expected < options.separation and float(parts.sum()) > options.harm * misfit
+    doubtless = one.training - one.parameters > _DOUBTLESS * misfit
+    return bool(compared and (alike or silent) and base.fit.converged and doubtless)
 
 
-def _telling(one: Judged) -> np.ndarray:
-    """Whether both machines follow a held-out segment and it has information on what was added."""
+def _foretold_information(one: Judged) -> np.ndarray:
+    """What each held-out segment says of what was added, over its size."""
     fitted, prediction = one.fitted, one.prediction
     shared = [i for i, free in enumerate(fitted.problem.free) if free.record is None]
     added = [i for i in fitted.added if i in shared]
     places = [shared.index(i) for i in added]
-    information = _information(fitted, prediction.fit.reduced.matrix, added, places)
+    return _information(fitted, prediction.fit.reduced.matrix, added, places)
+
+
+def _telling(one: Judged) -> np.ndarray:
+    """Whether both machines follow a held-out segment and it has information on what was added."""
+    prediction, information = one.prediction, _foretold_information(one)
     tells = np.zeros(information.size, bool)
     for number in np.unique(prediction.record):
         here = prediction.record == number
