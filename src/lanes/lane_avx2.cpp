@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // The kernel for processors with AVX2.
+#include "lane_samples.hpp"
 #include "lane_variation.hpp"
 
 SEPARATRIX_LANE_KERNEL(separatrix_fly_avx2)
 SEPARATRIX_LANE_VARIATION(separatrix_vary_avx2)
+SEPARATRIX_LANE_SAMPLES(separatrix_sample_avx2)

@@ -15,6 +15,9 @@ void separatrix_fly_avx512(const lane_machine *, const lane_regions *, lane_batc
 void separatrix_vary_sse2(const lane_machine *, lane_batch *, lane_tangents *);
 void separatrix_vary_avx2(const lane_machine *, lane_batch *, lane_tangents *);
 void separatrix_vary_avx512(const lane_machine *, lane_batch *, lane_tangents *);
+void separatrix_sample_sse2(const lane_machine *, lane_batch *, const lane_samples *);
+void separatrix_sample_avx2(const lane_machine *, lane_batch *, const lane_samples *);
+void separatrix_sample_avx512(const lane_machine *, lane_batch *, const lane_samples *);
 
 // Doubles in the widest vector that the processor has: 2, 4 or 8.
 int separatrix_lane_width(void) {
@@ -55,5 +58,18 @@ void separatrix_vary_lanes(int width, const lane_machine *machine, lane_batch *b
     separatrix_vary_avx2(machine, batch, tangents);
   else
     separatrix_vary_sse2(machine, batch, tangents);
+}
+
+void separatrix_sample_lanes(int width, const lane_machine *machine, lane_batch *batch, int64_t most,
+                             const int64_t *count, const double *times, int64_t *taken, double *x, double *v,
+                             int64_t *impacts, double *impact, double most_steps, double *steps) {
+  const untrapped around;
+  const lane_samples samples = {most, count, times, taken, x, v, impacts, impact, most_steps, steps};
+  if (width >= 8)
+    separatrix_sample_avx512(machine, batch, &samples);
+  else if (width >= 4)
+    separatrix_sample_avx2(machine, batch, &samples);
+  else
+    separatrix_sample_sse2(machine, batch, &samples);
 }
 }

@@ -211,6 +211,27 @@ LANE_DEVICE inline contact_stride look_along_contact(const lane_machine &m, cons
   return t;
 }
 
+// A step of the contacts. Where no root of the time is found, the sample is not a number.
+struct contact_motion {
+  const contact_stride &t;
+  const lane_group &g;
+  vec side, surface;
+
+  LANE_DEVICE inline void at(vec time, mask due, vec &x, vec &v) const {
+    vec rest[order + 1], ahead = time - g.time, root = t.end, u, f1, f2, w;
+    for (int k = 0; k <= order; k++)
+      rest[k] = -t.time[k];
+    rest[0] += ahead;
+    put(root, ahead <= 0.0, vec{});
+    const mask lost = fall<order>(rest, due & (ahead > 0.0), t.end, ahead - t.duration, root);
+    value_at<order>(t.u, root, u, f1, f2);
+    value_at<order - 1>(t.fall, root, w, f1, f2);
+    x = surface + side * (u * u);
+    v = g.direction * w;
+    put(x, lost, vec(not_known));
+  }
+};
+
 // Does the formula push all the way? `pulls` where it does not at the end of the step.
 LANE_DEVICE inline mask pushes(const lane_machine &m, mask asked, const contact_stride &t,
                                const lane_group &g, mask &pulls) {
@@ -263,7 +284,9 @@ LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const table_p
 // A step of the contacts `pressed`; `limit`: of its length, for the next attempt where one could not be
 // proven. Returns the lanes that have come to where they are to stop; adds to `left` those that the scalar
 // code must look at.
-LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left, lane_group &g) {
+template <class rider>
+LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit, mask &left, lane_group &g,
+                                 rider &along) {
   contact_expansion p;
   table_piece pieces[tables];
   if (m.law.has_tables > 0)
@@ -289,7 +312,11 @@ LANE_DEVICE inline mask press_on(const lane_machine &m, mask pressed, vec &limit
   // Where its law comes to pull, the contact has no force: a kink.
   mask lost = pressed & (idle | pulls | (~proven & ~(length > shortest_share * natural)));
   proven = proven & ~lost;
-  lost = lost | (proven & take_contact_events(m, pieces, t, proven, g)) | (pressed & (g.flights >= g.budget));
+  along.flown(proven, pick(t.stops, vec(for_ever), g.time + t.duration),
+              contact_motion{t, g, side_of(g), surface_of(m, g)});
+  lost = lost | (proven & take_contact_events(m, pieces, t, proven, g)) |
+         (pressed & ((g.flights >= g.budget) | along.weary()));
+  along.came_off(proven & ~lost & t.leaves, magnitude(g.v));
   put(limit, pressed, pick(proven, vec(1e300), 0.5 * length));
   left = left | lost;
   return proven & ~lost & t.stops;
@@ -301,8 +328,9 @@ LANE_DEVICE inline bool contacts_first(mask pressed, mask flying) {
 }
 
 // Steps on with all lanes of one vector until one has stopped or is left to the scalar code.
+template <class rider>
 LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &regions, int first,
-                               lane_batch &batch) {
+                               lane_batch &batch, rider &along) {
   const double shortest = 1e-12 * m.period;
   lane_group g;
   load<true>(batch, first, g);
@@ -314,7 +342,7 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
   while (any(sent) && !any(sent & (g.status != lane_flying)) && !is_due_back(rounds)) {
     mask pressed = sent & (g.place > 0.5), left = {};
     if (contacts_first(pressed, sent)) {
-      mask there = press_on(m, pressed, contact_limit, left, g);
+      mask there = press_on(m, pressed, contact_limit, left, g, along);
       put(g.status, left, lane_left);
       if (any(there))
         stop_or_pass(m.period, m.domain, there, g.x, g.v, regions, g);
@@ -345,12 +373,17 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
     // At a barrier that it moves towards, a body hits at once.
     left = flying & ((~proven & (length <= shortest)) | (g.direction * (barrier - g.x) <= 0.0));
     proven = proven & ~left;
+    mask onward = last & ~(t.turns | t.hits | t.slows);
+    const vec heading = g.direction;
+    along.flown(proven, pick(onward, vec(for_ever), g.time + t.end * t.length), series_motion{p, g.time});
     left = left | (proven & take_series_events(m, pieces, t, proven, barrier, g)) |
-           (flying & (g.flights >= g.budget));
+           (flying & ((g.flights >= g.budget) | along.weary()));
+    along.met(proven & t.hits & ~left, g.time, g.last_speed,
+              m.contact.stiffness > 0 ? vec(not_known) : magnitude(g.v), heading);
     // A step that leaves a piece of a table may do so behind its event.
     put(limit, flying, pick(proven, m.stride, 0.5 * pick(kept, t.end, vec(1.0)) * length));
     put(g.status, left, lane_left);
-    mask there = proven & ~left & last & ~(t.turns | t.hits | t.slows);
+    mask there = proven & ~left & onward;
     if (any(there))
       stop_or_pass(m.period, m.domain, there, g.x, g.v, regions, g);
   }

@@ -40,8 +40,9 @@ __global__ void __launch_bounds__(threads_per_block)
   lane_batch &batch = batches[body / lanes];
   const int lane = int(body % lanes);
   const double status = batch.fields.status[lane];
+  nothing_along along;
   if (status == lane_flying || status == lane_fresh)
-    fly_group<kind>(task->machine, task->regions, lane, batch);
+    fly_group<kind>(task->machine, task->regions, lane, batch, along);
 }
 
 // What one half has on the host, in memory that the GPU can copy from and to meanwhile, and on the GPU.

@@ -300,11 +300,6 @@ LANE_DEVICE inline mask look_ahead(const machine &m, mask seek, mask upward, vec
   return left;
 }
 
-// Nothing rides along with the bodies; see `lane_variation.hpp` for what may.
-struct nothing_along {
-  LANE_LEAF void cross(const lane_machine &, mask, const lane_group &) {}
-};
-
 // Flies the lanes of one vector until one has stopped or is left to the scalar code. They pass the sections
 // together, so that those set off together, whose first flights take longer to find, stay together.
 template <bool damping, class rider>
@@ -325,14 +320,19 @@ LANE_DEVICE void fly(const lane_machine &m, const lane_regions &regions, int fir
       left = left | (flying & (g.flights >= g.budget));
       flying = flying & ~left & (g.start + g.span < g.until);
       if (any(flying)) {
+        along.flown(flying, g.start + g.span, closed_motion<damping, lane_machine>{m, g});
         mask rare = take_events<damping, false>(m, flying, upward, barrier, g);
         along.cross(m, flying & ~rare, g);
+        along.met(flying & ~rare & (g.hits > 0.5), g.start, magnitude(g.end_v), magnitude(g.start_v),
+                  -g.direction);
         left = left | rare;
       }
       put(g.status, left, lane_left);
       flying = flying & ~left;
     }
-    take_stops<damping>(m, (g.status == lane_flying) & ~flying, regions, g);
+    mask there = (g.status == lane_flying) & ~flying;
+    along.flown(there, for_ever, closed_motion<damping, lane_machine>{m, g});
+    take_stops<damping>(m, there, regions, g);
   }
   store<false>(g, first, batch);
 }
@@ -371,8 +371,9 @@ LANE_DEVICE void fly_through_layers(const lane_machine &m, const lane_regions &r
 
 // The same where the equation changes with the mode: a flight begins anew after every event. Contacts without
 // a closed form are expanded in series.
+template <class rider>
 LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &regions, int first,
-                                   lane_batch &batch) {
+                                   lane_batch &batch, rider &along) {
   const bool in_series = m.contact.stiffness > 0;
   lane_group g;
   lane_modes f(m);
@@ -388,7 +389,7 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
     while (any(flying) && !is_due_back(rounds)) {
       mask pressed = in_series ? flying & (g.place > 0.5) : mask{}, left = {};
       if (in_series && contacts_first(pressed, flying)) {
-        mask there = press_on(m, pressed, limit, left, g);
+        mask there = press_on(m, pressed, limit, left, g, along);
         if (any(there))
           stop_or_pass(m.period, m.domain, there, g.x, g.v, regions, g);
         passed = passed | there;
@@ -408,14 +409,16 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
         mask due = free & ~left & (g.start + g.span < g.until);
         flying = pressed | due;
         if (any(due))
-          left = left | take_mode_events(f, due, g);
+          left = left | pass_mode_events(f, due, g, along);
         put(g.status, left, lane_left);
         flying = flying & ~left;
       }
       f.enter(g.status == lane_fresh, g);
       begin_flight<true, false>(f, g);
     }
-    take_stops<true>(f, (g.status == lane_flying) & ~passed & ~flying, regions, g);
+    mask there = (g.status == lane_flying) & ~passed & ~flying;
+    along.flown(there, for_ever, closed_motion<true, lane_modes>{f, g});
+    take_stops<true>(f, there, regions, g);
   }
   store<true>(g, first, batch);
 }
@@ -433,25 +436,25 @@ LANE_DEVICE inline flight flight_of(const lane_machine &m) {
   return m.decay > 0 ? damped : plain;
 }
 
-template <flight kind>
+// Nothing rides through layers.
+template <flight kind, class rider>
 LANE_DEVICE inline void fly_group(const lane_machine &m, const lane_regions &regions, int first,
-                                  lane_batch &batch) {
+                                  lane_batch &batch, rider &along) {
   if constexpr (kind == in_series)
-    fly_in_series(m, regions, first, batch);
+    fly_in_series(m, regions, first, batch, along);
   else if constexpr (kind == modal)
-    fly_through_modes(m, regions, first, batch);
+    fly_through_modes(m, regions, first, batch, along);
   else if constexpr (kind == layered)
     fly_through_layers(m, regions, first, batch);
-  else {
-    nothing_along along;
+  else
     fly<kind == damped>(m, regions, first, batch, along);
-  }
 }
 
 template <flight kind>
 inline void fly_batch(const lane_machine &m, const lane_regions &regions, lane_batch &batch) {
+  nothing_along along;
   for (int first = 0; first < lanes; first += vec_size)
-    fly_group<kind>(m, regions, first, batch);
+    fly_group<kind>(m, regions, first, batch, along);
 }
 
 // Calls FUNCTION<kind of the machine's flights> with what follows.

@@ -7,8 +7,8 @@
 #ifndef SEPARATRIX_LANE_MODES_HPP
 #define SEPARATRIX_LANE_MODES_HPP
 
-#include "lane_motion.hpp"
 #include "lane_restitution.hpp"
+#include "lane_stops.hpp"
 
 namespace {
 
@@ -106,6 +106,21 @@ LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_gro
   put(g.touch, due & passage & free, w);
   put(g.place, due & passage, f.leads_to);
   put(g.status, due, lane_fresh);
+  return rare;
+}
+
+// The same with what rides along. Out of a barrier, its surface is the origin.
+template <class rider>
+LANE_DEVICE inline mask pass_mode_events(const lane_modes &f, mask due, lane_group &g, rider &along) {
+  const mask hit = g.hits > 0.5, passage = hit & (f.leads_to >= 0.0), free = g.place < 0.5;
+  const vec heading = g.direction;
+  along.flown(due, g.start + g.span, closed_motion<true, lane_modes>{f, g});
+  const mask rare = take_mode_events(f, due, g), taken = due & ~rare;
+  along.met(taken & hit & ~passage, g.time, magnitude(g.end_v), magnitude(g.v), heading);
+  along.met(taken & passage & free, g.time, magnitude(g.end_v), vec(not_known), heading);
+  const mask out = taken & passage & ~free;
+  along.came_off(out & (f.lead <= 0.0), magnitude(g.end_v));
+  along.released(out & (f.lead > 0.0), g.time, f.origin);
   return rare;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Lanes where they are to stop: at the section, or before it.
+// Lanes where they are to stop: at the section, or before it; and what may look on meanwhile.
 #ifndef SEPARATRIX_LANE_STOPS_HPP
 #define SEPARATRIX_LANE_STOPS_HPP
 
@@ -14,6 +14,28 @@ namespace {
 enum { most_rounds_away = 256 };
 
 LANE_LEAF bool is_due_back(int &rounds) { return vec_size == 1 && ++rounds > most_rounds_away; }
+
+// Nothing rides along with the bodies; see `lane_variation.hpp` and `lane_samples.hpp` for what may.
+struct nothing_along {
+  // The lanes `flying` move until `end` as `known` says.
+  template <class motion> LANE_LEAF void flown(mask, vec, const motion &) {}
+  // Lanes that have taken too many steps.
+  LANE_LEAF mask weary() const { return mask{}; }
+  // The flights of these lanes have ended with an event, and the next have begun.
+  LANE_LEAF void cross(const lane_machine &, mask, const lane_group &) {}
+  // They have met a barrier on that side: when, and the speeds before and after.
+  LANE_LEAF void met(mask, vec, vec, vec, vec) {}
+  // They have come off a soft barrier at that speed; or it has ceased to push, and they are on the way to its
+  // surface.
+  LANE_LEAF void came_off(mask, vec) {}
+  LANE_LEAF void released(mask, vec, vec) {}
+};
+
+// Until when a flight lasts that ends with no event.
+const double for_ever = 1e300;
+
+// What is not known: the speed after a soft contact while that lasts, a sample without a root.
+const double not_known = __builtin_nan("");
 
 // The attractors that have captured points on the section, 0 = none; as `find_capture` of `attractors.f90`.
 LANE_DEVICE inline vec captors(const lane_regions &regions, vec x, vec v) {
@@ -47,6 +69,20 @@ LANE_DEVICE inline void stop_or_pass(double period, double domain, mask there, v
   put(g.sections, passing, g.sections - 1.0);
   put(g.status, there & ~passing, lane_stopped);
 }
+
+// A flight in closed form.
+template <bool damping, class machine> struct closed_motion {
+  const machine &m;
+  const lane_group &g;
+
+  LANE_DEVICE inline void at(vec time, mask, vec &x, vec &v) const {
+    kinematics k = evaluate<damping>(m, g, time - g.start);
+    x = k.x;
+    if constexpr (machine::modal)
+      x += m.origin;
+    v = k.v;
+  }
+};
 
 // The same for flights in closed form.
 template <bool damping, class machine>

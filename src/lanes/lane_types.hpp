@@ -213,6 +213,22 @@ struct lane_tangents {
   tangent_fields<double[lanes]> fields;
 };
 
+// What is looked at on the way of the bodies of a batch: `count` samples of each lane, `most` from lane to
+// lane, at ascending `times` [s, on the clock of `until`], of which `taken` are there; and impacts: time,
+// speeds before and after [m/s] (not a number while a soft contact lasts), side. More than fit are counted
+// only. A lane is left to the event loop after `most_steps`.
+enum { most_impacts = 16, impact_rows = 4 };
+
+struct lane_samples {
+  int64_t most;
+  const int64_t *count;
+  const double *times;
+  int64_t *taken;
+  double *x, *v;
+  int64_t *impacts;
+  double *impact, most_steps, *steps;
+};
+
 // Bodies on a GPU, see `lane_gpu.hpp`: by CUDA, or on the host for tests. 0 = all went well, else `message`
 // says what has failed.
 struct lane_gpu {

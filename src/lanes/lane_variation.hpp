@@ -11,7 +11,7 @@
 
 namespace {
 
-template <bool damping> struct tangents_along {
+template <bool damping> struct tangents_along : nothing_along {
   tangent_fields<vec> t;
 
   // Takes the directions of the lanes `passed` over the flight that has just ended and its event.

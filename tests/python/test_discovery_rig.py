@@ -54,7 +54,7 @@ def with_drag(base: Fitted, true: Model) -> Fitted:
 
 
 def test_a_curved_sensor_is_no_gap():
-    base, _ = fitted_base(drag=0.0, curved=2e-3)
+    base, _ = fitted_base(drag=0.0, curved=1e-3)
     gap = ceiling(base.problem, base.fit, 1.0)
     assert base.fit.sample_chi2 > 1.2
     assert gap.fit.sample_chi2 < 1.1
@@ -62,6 +62,13 @@ def test_a_curved_sensor_is_no_gap():
     # an exact step of the quadratic model: what is told to remain is what remains
     again = cleaned(base.problem, gap.fit)
     assert again.total == pytest.approx(gap.fit.total, abs=0.2 * (base.fit.total - gap.fit.total))
+
+
+def test_a_sensor_that_is_more_curved_than_rigs_are_is_a_gap():
+    base, _ = fitted_base(drag=0.0, curved=3e-3)
+    gap = ceiling(base.problem, base.fit, 1.0)
+    assert gap.p < 1e-6
+    assert gap.fit.sample_chi2 > 1.2
 
 
 def test_an_effect_is_its_own_as_far_as_it_is_larger_than_faults_of_a_rig():
