@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every machine of docs/performance_machines.md: the same map, bit for bit, for other vectors, ranks and tiles,
-and after a stop."""
+"""Every machine of docs/performance_machines.md: the same map, bit for bit, for other vectors, ranks and
+tiles, and after a stop."""
 
 import sys
 from pathlib import Path
