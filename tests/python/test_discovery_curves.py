@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Effects that are functions: laws of another shape than the built-in ones are found as tables."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
-from separatrix.discovery.fitting.base import fit_base
+from separatrix.discovery.fitting.base import _follows_better, fit_base
 from separatrix.discovery.fitting.curves import fit_member, function_of, knots_at
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.members import MEMBERS
@@ -194,3 +196,15 @@ def test_friction_that_varies_over_the_place_as_a_sine_is_found_as_a_function():
     off = np.maximum(band[0] - right, right - band[1])
     assert np.mean(off < 0.02 * right) >= 0.9
     assert min(one["closed"] for one in verdict["remains"]) > 0.98
+
+
+def test_a_fit_that_follows_nothing_is_no_good_one():
+    """It has no misfit either: its squares are those of the segments that it follows."""
+
+    def fit(followed: int, total: float) -> SimpleNamespace:
+        return SimpleNamespace(good=np.arange(25) < followed, total=total)
+
+    assert _follows_better(fit(9, 900.0), fit(0, 0.0))
+    assert not _follows_better(fit(0, 0.0), fit(9, 900.0))
+    assert not _follows_better(fit(25, 9000.0), fit(12, 900.0))
+    assert _follows_better(fit(25, 800.0), fit(25, 900.0))

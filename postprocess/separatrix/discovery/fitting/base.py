@@ -19,6 +19,8 @@ _RENEWED = 0.03
 _RENEWED_MEMORY = 0.06
 # reduced chi^2 above which correlated residuals say more about the model than about the noise
 _MISFIT = 1.5
+# share of the segments
+_HARDLY_ANY = 0.1
 # noise of a held-out record over what the sensor of the training records would leave there
 _SAME_SENSOR = 1.5
 
@@ -41,12 +43,23 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
             (fit.values, [1, data.last]),
         ):
             problem, fit = fit_stages(data, model, free, begin, stages=stages, most=40)
-            if fit.good.sum() >= best.fit.good.sum() and fit.total < best.fit.total:
+            if _follows_better(fit, best.fit):
                 best = Fitted((), model, problem, fit, ())
     if best.fit.converged:
         return best
     fit = minimise(best.problem, best.fit.values, best.fit.starts, patient=True)
     return best if fit.good.sum() < best.fit.good.sum() else Fitted((), model, best.problem, fit, ())
+
+
+def _follows_better(fit: Fit, best: Fit) -> bool:
+    """Whether a fit loses no segment of the best one and is closer, or the best one follows hardly any.
+
+    A fit that has wandered off to where it follows nothing has no misfit.
+    """
+    kept, now = best.good.sum(), fit.good.sum()
+    if kept < _HARDLY_ANY * best.good.size:
+        return bool(now > kept)
+    return bool(now >= kept and fit.total < best.total)
 
 
 def _free(data: Data, model) -> list[Free]:
