@@ -37,7 +37,8 @@ struct kinematics {
   vec x, v, a, j, s, re, im;
 };
 
-template <bool damping, class machine>
+// With `brief` position and velocity alone.
+template <bool damping, bool brief = false, class machine>
 LANE_DEVICE inline kinematics evaluate(const machine &m, const lane_group &g, vec elapsed) {
   LANE_COUNT(evaluations, vec_size);
   kinematics k;
@@ -54,18 +55,22 @@ LANE_DEVICE inline kinematics evaluate(const machine &m, const lane_group &g, ve
   const auto stiffness = m.natural * m.natural, drag = 2 * m.decay;
   vec y = k.im * (1 / m.damped);
   k.v = damping ? k.re - m.decay * y : k.re;
-  k.a = damping ? -stiffness * y - drag * k.v : -stiffness * y;
-  k.j = damping ? -stiffness * k.v - drag * k.a : -stiffness * k.v;
-  k.s = damping ? -stiffness * k.a - drag * k.j : -stiffness * k.a;
+  if constexpr (!brief) {
+    k.a = damping ? -stiffness * y - drag * k.v : -stiffness * y;
+    k.j = damping ? -stiffness * k.v - drag * k.a : -stiffness * k.v;
+    k.s = damping ? -stiffness * k.a - drag * k.j : -stiffness * k.a;
+  }
   vec c = cosine, s = sine;
   for (int n = 0; n < m.harmonics; n++) {
     double w = (n + 1) * m.drive_frequency, w2 = w * w;
     vec part = m.cosine[n] * c + m.sine[n] * s, slope = m.sine[n] * c - m.cosine[n] * s;
     y += part;
     k.v += w * slope;
-    k.a -= w2 * part;
-    k.j -= (w2 * w) * slope;
-    k.s += (w2 * w2) * part;
+    if constexpr (!brief) {
+      k.a -= w2 * part;
+      k.j -= (w2 * w) * slope;
+      k.s += (w2 * w2) * part;
+    }
     vec next = c * cosine - s * sine;
     s = s * cosine + c * sine;
     c = next;

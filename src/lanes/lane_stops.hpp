@@ -76,7 +76,7 @@ template <bool damping, class machine> struct closed_motion {
   const lane_group &g;
 
   LANE_DEVICE inline void at(vec time, mask, vec &x, vec &v) const {
-    kinematics k = evaluate<damping>(m, g, time - g.start);
+    kinematics k = evaluate<damping, true>(m, g, time - g.start);
     x = k.x;
     if constexpr (machine::modal)
       x += m.origin;
