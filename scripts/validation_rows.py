@@ -12,6 +12,7 @@ from separatrix.library import Model
 from stroboscopic import OFFSETS, WEIGHTS, Map, Orbit, doubling, fold, follow
 from validation_program import CASES, Labels, Program, Row
 
+CYCLE, FAMILY_OF_CYCLES = 1, 5
 NEWTON = "`examples/validation/{}.toml`, Newton's method on the library's map (`scripts/stroboscopic.py`)"
 
 
@@ -245,6 +246,11 @@ def family(program: Program) -> list[Row]:
         along = here.image(np.column_stack([x + 1e-3 * OFFSETS, np.zeros(4)]))
         how = f"`examples/validation/dry_friction_family.toml`, library, along the family at x = {x:.4f}"
         rows.append(Row(key, float(WEIGHTS @ along[:, 0]) / 1e-3, how))
+    axes = [f"axis[{i}].count=7" for i in (1, 2)]
+    kinds = program.catalogue("dry_friction_family", *axes)["kind"].ravel()
+    how = "`separatrix basin examples/validation/dry_friction_family.toml`, 7 x 7 starts"
+    rows.append(Row("family.catalogue", float(np.isin(kinds, (CYCLE, FAMILY_OF_CYCLES)).sum()), how))
+    rows.append(Row("family.kind", float((kinds == FAMILY_OF_CYCLES).sum()), how))
     return rows
 
 
