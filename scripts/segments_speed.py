@@ -37,18 +37,19 @@ LAWS = (
 
 PAGE = """# Time of the segments
 
-Written by `scripts/segments_speed.py`; do not edit. What the discovery compares with records: {segments} segments
-of half a drive period with {samples} samples each, of the published machine with one law more; *derivatives* by
-its parameters, along {directions} directions or one more, and by the start, each a neighbour that flies too.
-Microseconds of processor time a segment, least of {rounds} rounds in which both take turns. *Apart*: largest
-difference of a place, as a share of the largest; the event loop has a tolerance of 1e-9 where it is adaptive.
+Written by `scripts/segments_speed.py`; do not edit. What the discovery compares with records: {segments}
+segments of half a drive period with {samples} samples each, of the published machine with one law more;
+*derivatives* by its parameters, along {directions} directions or one more, and by the start, each a neighbour
+that flies too. Microseconds of processor time a segment, least of {rounds} rounds in which both take turns.
+*Apart*: largest difference of a place, as a share of the largest; the event loop has a tolerance of 1e-9
+where it is adaptive.
 {processor}
 
 {rows}
 
-In all rows both meet the same impacts and hold the same segments steady. A segment that a lane leaves to the event
-loop flies there with all its neighbours, as all do with `integrator.lanes = "off"`. Structures, measured forces
-and what is compared in force fly in the event loop.
+In all rows both meet the same impacts and hold the same segments steady. A segment that a lane leaves to the
+event loop flies there with all its neighbours, as all do with `integrator.lanes = "off"`. Structures,
+measured forces and what is compared in force fly in the event loop.
 """
 
 
