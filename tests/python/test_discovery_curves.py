@@ -151,7 +151,7 @@ def test_a_restitution_that_is_a_power_of_the_speed_is_found_as_a_function():
     part = verdict["function"]["parts"][0]
     at, value, band = (np.array(part[key]) for key in ("at", "value", "band_95"))
     right = 0.5 * at**-0.25
-    # between impacts a knot is known as well as its band tells; how many knots there are is a matter of rounding
+    # between impacts a knot is known as its band tells; how many knots there are is a matter of rounding
     assert np.mean(np.maximum(band[0] - right, right - band[1]) < 0.01 * right) >= 0.9
     assert np.mean(np.abs(value - right) < 0.03 * right) >= 0.8
     assert min(one["closed"] for one in verdict["remains"]) > 0.98
