@@ -79,8 +79,7 @@ def main(folder: Path, target: Path) -> None:
         caption = [
             "Where starts of the published Coulomb machine with a hidden effect end up, ratio 1.2, by the "
             "case without the "
-            "effect and by the case that separatrix-discover wrote from records of 8 s at the ratios 0.95 "
-            "and 1.2"
+            "effect and by the case that separatrix-discover wrote from two records of 8 s at other ratios"
         ]
         compose(
             figure, "Basin maps before and after the missing effect was found", caption, handles, columns=4
