@@ -159,7 +159,7 @@ contains
     known = size(points)
     call note_bifurcations(family, trace, next, length, passed%kind /= 0, points)
     if (passed%kind /= 0) then
-      call pass_margin(family, trace, next, passed, points, ending)
+      call pass_margin(family, plan, trace, next, passed, points, ending)
       return
     end if
     call rotate_to_section(next%machines, next%now%orbit, turned)
