@@ -10,7 +10,7 @@ module margin_passage
   use hybrid_machine, only: event_t
   use kinds, only: wp
   use motion_state, only: event_stick, event_turning_point
-  use orbit_margins, only: is_impact, margin_t, of_gap, of_hold, of_order, of_release, of_stick, of_turning
+  use orbit_margins, only: is_impact, margin_t, of_gap, of_hold, of_impact, of_order, of_release, of_stick, of_turning
   use periodic_orbit, only: orbit_t
   use short_slip, only: short_slip_of, slips_on
   use soft_fold, only: begin_touching, beginning_t, duration_of, gap_beside
@@ -18,10 +18,14 @@ module margin_passage
   implicit none
   private
 
-  public :: pass_margin
+  public :: pass_margin, begins_chatter
 
   !> With so many impacts in a row no more are put in: they are the beginning of a chatter.
   integer, parameter :: long_run = 10
+  !> And with so many, each slower than the one before, the last of this speed in natural sizes: the next would rise no higher than
+  !> rounding lets tell.
+  integer, parameter :: least_run = 4
+  real(wp), parameter :: hardly_an_impact = 1e-5_wp
   !> Touches up to which a fold is looked for that was not seen before a graze, in natural times.
   real(wp), parameter :: longest_touch = 0.1_wp
 
@@ -180,6 +184,29 @@ contains
     label = merge(label_gr, label_gr_fold, before == after)
     if (before*after == 0) label = merge(label_gr, label_not_known, alike)
   end function label_between
+
+  !> Whether an orbit has impacts in a row that fade until they are hardly any: those of a chatter.
+  pure logical function begins_chatter(trace) result(begins)
+    type(trace_t), intent(in) :: trace
+    type(event_t) :: last
+    real(wp) :: speed
+    integer :: i, run
+    begins = .false.
+    run = 0
+    speed = 0
+    do i = 1, size(trace%margins%list)
+      associate (one => trace%margins%list(i))
+        if (one%kind /= of_impact) cycle
+        associate (event => trace%now%orbit%events(one%event))
+          if (event%kind /= last%kind .or. event%joint /= last%joint .or. one%value > speed) run = 0
+          run = merge(run + 1, 0, is_impact(event%kind))
+          last = event
+        end associate
+        speed = one%value
+        begins = begins .or. (run >= least_run .and. speed < hardly_an_impact)
+      end associate
+    end do
+  end function begins_chatter
 
   !> Impacts in a row on one side of a joint, turning points aside.
   pure integer function longest_run(orbit) result(longest)

@@ -29,6 +29,9 @@ module orbit_margins
     of_order = 7, of_hold = 8, of_press = 9
   !> Looks along a flight, per period of the section.
   integer, parameter :: looks = 96
+  !> After a rebound slower than this, in natural sizes, so many looks come before the first, each at half the time of the next.
+  real(wp), parameter :: slow_rebound = 1e-2_wp
+  integer, parameter :: early_looks = 14
   integer, parameter :: most_secants = 60
 
   type, public :: margin_t
@@ -199,7 +202,7 @@ contains
     type(margin_t), intent(inout) :: gaps(-1:1), slowest
     type(margins_t), intent(inout) :: margins
     real(wp) :: y(states), a, last(states), last_a, t, last_t, slope(states)
-    integer :: i, count, direction
+    integer :: i, count, early, direction
     logical :: smooth
     smooth = turns_smoothly(machine)
     direction = direction_in(mode)
@@ -208,12 +211,15 @@ contains
     last_t = from
     slope = machine%slope(mode, from, start)
     last_a = slope(2)
-    ! A body that is let go of gathers speed from nothing, whatever rounding says.
+    early = 0
     if (k > 0) then
+      ! A body that is let go of gathers speed from nothing, whatever rounding says.
       if (orbit%events(k)%kind == event_release) last_a = 0
+      ! One that hardly rebounds may be back before the first look.
+      if (is_impact(orbit%events(k)%kind) .and. abs(start(2)) < slow_rebound*machine%size_of(2)) early = early_looks
     end if
-    do i = 1, count
-      t = from + (until - from)*i/count
+    do i = 1 - early, count
+      t = from + (until - from)*merge(2.0_wp**(i - 1), real(i, wp), i < 1)/count
       call machine%fly(mode, last_t, last, t, y)
       slope = machine%slope(mode, t, y)
       a = slope(2)

@@ -77,8 +77,8 @@ contains
     end associate
   end function onset_without
 
-  !> The orbit without the slip, or stick, after the event `k`, and without all later ones of its kind that last as long: a symmetric
-  !> orbit has two.
+  !> The orbit without the slip, or stick, after the event `k`, and without all later ones of its kind that last as long: a
+  !> symmetric orbit has two.
   pure function without_slips(machine, orbit, k) result(direct)
     class(hybrid_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
