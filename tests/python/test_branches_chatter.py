@@ -71,7 +71,7 @@ def completes(wall: float) -> bool:
 def test_both_sides_of_the_onset_of_a_chatter_meet(
     separatrix: Path, source_dir: Path, tmp_path: Path
 ) -> None:
-    """One side rests on the wall after its impacts; the other has ever more, and a fold and a graze with each.
+    """One side rests on the wall after its impacts; the other has ever more, each with a fold and a graze.
 
     Bounces lower than the rounding of the position keep the other some 1e-6 away from it.
     """
