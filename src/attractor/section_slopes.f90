@@ -20,8 +20,8 @@ module section_slopes
 
 contains
 
-  !> Derivative of the map over `periods` at a section point (SI), point and image in units of `scale`; `ok` is false where it is not
-  !> known, or there is none.
+  !> Derivative of the map over `periods` at a section point (SI), point and image in units of `scale`; `ok` is false where it is
+  !> not known, or there is none.
   pure subroutine slopes_of(moving, point, periods, scale, slopes, ok)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:), scale(:)
