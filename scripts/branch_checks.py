@@ -76,6 +76,7 @@ def turn(ratio: float) -> float:
 TAU = 2 * np.pi
 CASES = (
     Case("sweep_coulomb", "drive.ratio", (0.7, 1.8)),
+    Case("sweep_coulomb", "drive.ratio", (0.26, 0.7)),
     Case("sweep_viscous", "drive.ratio", (0.7, 1.8), product=lambda w: (0.2, 0.5, turn(w))),
     Case("sweep_stribeck", "drive.ratio", (0.7, 1.8), (1, 2)),
     Case("basin_effects", "drive.ratio", (1.0, 1.4), (1, 2)),
@@ -84,6 +85,7 @@ CASES = (
     Case("validation/impact_coco", "drive.amplitude", (0.05, 1.2), product=lambda _: (0.1, 0.8, TAU)),
     Case("validation/impact_coco", "contact.restitution", (0, 1), product=lambda e: (0.1, e, TAU)),
     Case("validation/dry_friction", "drive.ratio", (0.5, 1.5)),
+    Case("validation/dry_friction", "drive.ratio", (0.1, 0.5)),
     Case("validation/dry_friction_family", "drive.ratio", (0.6, 0.9)),
     Case("validation/soft_impact", "drive.ratio", (0.41, 0.46), (1, 2)),
     Case("validation/soft_impact_rig", "drive.ratio", (0.75, 0.9), (1, 2)),
@@ -102,7 +104,9 @@ CASES = (
     Case("basin_pair_backlash", "drive.frequency", (10.5, 11.5), (4, 5)),
     Case("sweep_pair_kappa", "body.friction", (0.3, 0.9), (1, 2)),
 )
+# Examples with a sweep, and its range.
 SWEEPS = ("sweep_coulomb", "sweep_viscous", "sweep_stribeck")
+SWEPT = (0.7, 1.8)
 # The machines of the sweeps and of other cases at one value.
 SAME_MACHINE = {
     *("basin_coulomb", "basin_coulomb_refined", "basin_ratio_stack", "basin_stribeck", "basin_viscous"),
@@ -327,7 +331,7 @@ def main() -> None:
         print(*cells, *missed, sep=" | ", flush=True)
         lines.append(cells)
         wrong += [f"{case.path}, {case.parameter}: {item}" for item in missed]
-        if case.path in SWEEPS:
+        if case.path in SWEEPS and case.ends == SWEPT:
             more, missed = jumps(program, options.folder, case.path, one)
             brackets += more
             wrong += missed

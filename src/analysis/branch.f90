@@ -8,14 +8,14 @@ module branch
   use body_family, only: family_t
   use branch_passage, only: first_passed, most_secants, no_passage, note_bifurcations
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_long, label_not_known, label_pd, label_range, &
-    label_release, no_label, plan_t, point_t, set_point, step_to, trace_t
+    label_release, label_run, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up
   use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
   use graze_passage, only: at_graze, leave_by_graze
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, nearest_copy
-  use margin_passage, only: pass_margin
+  use margin_passage, only: begins_chatter, pass_margin
   use motion_state, only: event_chatter_lower, event_chatter_upper
   use orbit_margins, only: margin_t, of_impact
   use orbit_sections, only: rotate_to_section, section_points
@@ -115,6 +115,7 @@ contains
       if (known > 3) call close_up(family, first, before, trace, known, points, ending)
     end do
     if (ending == no_label) ending = label_long
+    if (ending == label_not_known .and. points(size(points))%label == no_label .and. begins_chatter(trace)) ending = label_run
     labels = size(points)
     if (points(labels)%label == no_label) points(labels)%label = ending
   end subroutine trace_one_way
@@ -159,7 +160,7 @@ contains
     known = size(points)
     call note_bifurcations(family, trace, next, length, passed%kind /= 0, points)
     if (passed%kind /= 0) then
-      call pass_margin(family, trace, next, passed, points, ending)
+      call pass_margin(family, plan, trace, next, passed, points, ending)
       return
     end if
     call rotate_to_section(next%machines, next%now%orbit, turned)

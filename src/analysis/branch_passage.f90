@@ -17,7 +17,7 @@ module branch_passage
   use other_sequence, only: change_sequence
   use orbit_motion, only: is_admissible
   use periodic_orbit, only: correct_orbit, direct, orbit_t
-  use short_slip, only: stays_stuck, sticks_apart, with_slip
+  use short_slip, only: has_slip_in_stick, stays_stuck, sticks_apart, with_slip
   use secant_bracket, only: bracket_t, narrow, next_trial
   use soft_graze, only: enter_apart, is_touch, touches_apart, touching, vanishing_touch
   use structure, only: structure_t
@@ -34,6 +34,8 @@ module branch_passage
   real(wp), parameter :: rounding = 1e-9_wp
   !> First look beyond a point where the sequence changes, as a share of the largest step.
   real(wp), parameter :: first_look = 1e-4_wp
+  !> How much longer slips within sticks are taken to be than touches and sticks where they begin.
+  real(wp), parameter :: slip_room = 10
 
   !> What is zero at a point that is looked for: a test, or, without, a margin.
   type :: target_t
@@ -309,16 +311,17 @@ contains
     type(trace_t), intent(inout) :: beyond
     logical, intent(out) :: ok
     real(wp) :: along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
-    logical :: touches
     along = touches_apart(beyond%now%orbit)
-    touches = any(abs(along) > 0)
-    if (.not. touches) then
-      call enter_beside(family, at, step, beyond, ok)
+    if (.not. any(abs(along) > 0)) then
+      ok = .false.
+      if (.not. has_slip_in_stick(beyond%now%orbit)) call enter_beside(family, at, step, beyond, ok)
       if (ok) return
       along = sticks_apart(beyond%now%orbit)
     end if
     ok = any(abs(along) > 0)
     if (.not. ok) return
+    ! What goes with the third power of the length of a slip is told by its equations where that is not too short.
+    if (has_slip_in_stick(beyond%now%orbit)) along = slip_room*along
     call enter_apart(family, at, along, no_passage, beyond, ok)
     if (ok) beyond%step = 0.1_wp*step
   end subroutine enter_sequence

@@ -8,14 +8,14 @@ module graze_passage
   use branch_passage, only: change_all, enter_sequence
   use branch_point, only: label_gr, label_gr_fold, label_not_known, label_stick, no_label, plan_t, point_t, trace_t
   use kinds, only: wp
-  use orbit_margins, only: margin_t, of_gap, of_impact, of_stick
+  use orbit_margins, only: margin_t, of_gap, of_impact
   use orbit_sections, only: section_points
-  use short_slip, only: short_slip_of, without_slip
+  use short_slip, only: onset_without, short_slip_of, without_slips
   use soft_graze, only: is_touch, locate_missed_graze
   implicit none
   private
 
-  public :: leave_by_graze, grazes_twice, is_repeated
+  public :: leave_by_graze, leave_by_stick, grazes_twice, is_repeated
 
   !> Nearness to a graze, in speed, at the end of a branch; and where equations with an impact may already fail.
   real(wp), parameter, public :: at_graze = 1e-6_wp
@@ -56,8 +56,13 @@ contains
     if (ok) call locate_missed_graze(family, beyond, lost, at%now%orbit%parameter, graze, ok)
     if (ok) ok = abs(graze%now%orbit%parameter - at%now%orbit%parameter) < near_in_parameter*family%parameter_size
     if (.not. ok) then
-      call leave_by_stick(family, plan, trace, points, ending)
-      return
+      i = 0
+      do
+        i = short_slip_of(trace%machines%centre, trace%now%orbit, i + 1)
+        if (i == 0) return
+        call leave_by_stick(family, plan, trace, i, points, ending)
+        if (ending == no_label) return
+      end do
     end if
     ending = merge(label_gr, no_label, is_repeated(graze))
     graze%now%label = label_gr
@@ -72,27 +77,25 @@ contains
     trace = beyond
   end subroutine leave_by_graze
 
-  !> Where a slip is next to none: without it, the joint sticking at once, the branch goes on, and that shows
-  !> where the onset is. `ending`: not known if that is not so.
-  subroutine leave_by_stick(family, plan, trace, points, ending)
+  !> Where the slip, or stick, after the event `k` is next to none: without it the branch goes on, and that shows where the onset
+  !> is. `ending`: not known if that is not so.
+  subroutine leave_by_stick(family, plan, trace, k, points, ending)
     type(family_t), intent(in) :: family
     type(plan_t), intent(in) :: plan
     type(trace_t), intent(inout) :: trace
+    integer, intent(in) :: k
     type(point_t), allocatable, intent(inout) :: points(:)
     integer, intent(out) :: ending
     type(trace_t) :: beyond, onset
     type(margin_t) :: stick
-    integer :: k, i
     logical :: ok
     ending = label_not_known
-    k = short_slip_of(trace%machines%centre, trace%now%orbit)
-    if (k == 0) return
-    beyond%now%orbit = without_slip(trace%machines%centre, trace%now%orbit, k)
+    if (slip_grows(trace, k)) return
+    beyond%now%orbit = without_slips(trace%machines%centre, trace%now%orbit, k)
     call enter_sequence(family, trace, 0.1_wp*plan%largest_step, beyond, ok)
     if (.not. ok) return
-    i = findloc(beyond%margins%list%kind == of_stick .and. beyond%margins%list%event == k, .true., 1)
-    if (i == 0) return
-    stick = beyond%margins%list(i)
+    stick = onset_without(trace%now%orbit, k, beyond%margins)
+    if (stick%kind == 0) return
     call locate_missed_graze(family, beyond, stick, trace%now%orbit%parameter, onset, ok)
     if (ok) ok = abs(onset%now%orbit%parameter - trace%now%orbit%parameter) < near_in_parameter*family%parameter_size
     if (.not. ok) return
@@ -101,6 +104,15 @@ contains
     points = [points, onset%now, beyond%now]
     trace = beyond
   end subroutine leave_by_stick
+
+  !> Whether the slip after the event `k` lasts longer further on: the branch has just come from where it is none.
+  pure logical function slip_grows(trace, k)
+    type(trace_t), intent(in) :: trace
+    integer, intent(in) :: k
+    associate (n => size(trace%now%orbit%y))
+      slip_grows = trace%now%tangent(n + k + 1) > trace%now%tangent(n + k)
+    end associate
+  end function slip_grows
 
   !> Whether an impact loses its speed where another barrier is just missed: an orbit and its mirror image become one there, and
   !> all that touches in other sequences begins there too. A barrier that is missed beside an impact that loses its speed is that

@@ -5,30 +5,36 @@
 module margin_passage
   use body_family, only: family_t
   use branch_passage, only: change_all, enter_sequence, label_of_margin
-  use branch_point, only: label_gr, label_gr_fold, label_not_known, label_run, no_label, point_t, trace_t
-  use graze_passage, only: grazes_twice, is_repeated
+  use branch_point, only: label_gr, label_gr_fold, label_not_known, label_run, label_stiction, no_label, plan_t, point_t, trace_t
+  use graze_passage, only: grazes_twice, is_repeated, leave_by_stick
   use hybrid_machine, only: event_t
   use kinds, only: wp
-  use motion_state, only: event_turning_point
-  use orbit_margins, only: is_impact, margin_t, of_gap
+  use motion_state, only: event_stick, event_turning_point
+  use orbit_margins, only: is_impact, margin_t, of_gap, of_hold, of_impact, of_order, of_release, of_stick, of_turning
   use periodic_orbit, only: orbit_t
+  use short_slip, only: short_slip_of, slips_on
   use soft_fold, only: begin_touching, beginning_t, duration_of, gap_beside
   use soft_graze, only: is_touch, locate_missed_graze, touches_apart
   implicit none
   private
 
-  public :: pass_margin
+  public :: pass_margin, begins_chatter
 
   !> With so many impacts in a row no more are put in: they are the beginning of a chatter.
   integer, parameter :: long_run = 10
+  !> And with so many, each slower than the one before, the last of this speed in natural sizes: the next would rise no higher than
+  !> rounding lets tell.
+  integer, parameter :: least_run = 4
+  real(wp), parameter :: hardly_an_impact = 1e-5_wp
   !> Touches up to which a fold is looked for that was not seen before a graze, in natural times.
   real(wp), parameter :: longest_touch = 0.1_wp
 
 contains
 
   !> The orbit `at` where a margin is zero, from `trace` on: its label, and on with the sequence of events beyond, if there is one.
-  subroutine pass_margin(family, trace, at, passed, points, ending)
+  subroutine pass_margin(family, plan, trace, at, passed, points, ending)
     type(family_t), intent(in) :: family
+    type(plan_t), intent(in) :: plan
     type(trace_t), intent(inout) :: trace
     type(trace_t), intent(in) :: at
     type(margin_t), intent(in) :: passed
@@ -38,19 +44,37 @@ contains
     type(point_t), allocatable :: here(:)
     type(orbit_t) :: changed
     logical :: goes_on
+    integer :: k
+    k = short_pair(at, passed)
+    if (k > 0) then
+      ! A stick has been left where its margin is zero, if its equations lead there.
+      if (at%now%orbit%events(k)%kind /= event_stick) then
+        call pass_without(family, plan, at, k, trace, points, ending)
+        ! A release by a force that only just reaches friction would be taken for the end of sticking.
+        if (ending == no_label .or. passed%kind == of_release) return
+      end if
+    end if
     ending = no_label
     here = [at%now]
     here%label = label_of_margin(passed)
+    if (passed%kind == of_hold) then
+      if (slips_on(at%machines%centre, at%now%orbit, passed)) here%label = label_stiction
+    end if
     if (here(1)%label == label_gr .and. (is_repeated(at) .or. grazes_twice(at))) then
       ending = label_gr
       points = [points, here]
       return
     end if
-    call change_all(at, passed, changed, goes_on)
+    goes_on = here(1)%label /= label_stiction
+    if (goes_on) call change_all(at, passed, changed, goes_on)
     beyond%now%orbit = changed
     if (goes_on) call enter_sequence(family, at, trace%step, beyond, goes_on)
     ! An orbit of a shorter period near by is not what goes on there.
     if (goes_on) goes_on = .not. is_repeated(beyond)
+    if (k > 0 .and. .not. goes_on) then
+      call pass_without(family, plan, at, k, trace, points, ending)
+      if (ending == no_label) return
+    end if
     if (.not. goes_on) then
       ! Two events that change places are none, if the motion goes on.
       if (here(1)%label == no_label) here%label = label_not_known
@@ -70,6 +94,32 @@ contains
     beyond%came = beyond%step
     trace = beyond
   end subroutine pass_margin
+
+  !> The event with which a slip, or stick, begins that lasts for next to no time, if what is zero belongs to it: all of its margins
+  !> are zero together, and the orbit goes on without it. 0 without.
+  pure integer function short_pair(at, passed) result(k)
+    type(trace_t), intent(in) :: at
+    type(margin_t), intent(in) :: passed
+    k = 0
+    if (all(passed%kind /= [of_turning, of_release, of_order, of_stick])) return
+    k = short_slip_of(at%machines%centre, at%now%orbit, max(1, passed%event - 1))
+    if (k > passed%event) k = 0
+  end function short_pair
+
+  !> From `at` on without the slip, or stick, after the event `k`; `ending` is no label where the branch goes on so, from `trace`.
+  subroutine pass_without(family, plan, at, k, trace, points, ending)
+    type(family_t), intent(in) :: family
+    type(plan_t), intent(in) :: plan
+    type(trace_t), intent(in) :: at
+    integer, intent(in) :: k
+    type(trace_t), intent(inout) :: trace
+    type(point_t), allocatable, intent(inout) :: points(:)
+    integer, intent(out) :: ending
+    type(trace_t) :: there
+    there = at
+    call leave_by_stick(family, plan, there, k, points, ending)
+    if (ending == no_label) trace = there
+  end subroutine pass_without
 
   !> Rise of the parameter along the branch.
   pure real(wp) function rise_of(point)
@@ -134,6 +184,29 @@ contains
     label = merge(label_gr, label_gr_fold, before == after)
     if (before*after == 0) label = merge(label_gr, label_not_known, alike)
   end function label_between
+
+  !> Whether an orbit has impacts in a row that fade until they are hardly any: those of a chatter.
+  pure logical function begins_chatter(trace) result(begins)
+    type(trace_t), intent(in) :: trace
+    type(event_t) :: last
+    real(wp) :: speed
+    integer :: i, run
+    begins = .false.
+    run = 0
+    speed = 0
+    do i = 1, size(trace%margins%list)
+      associate (one => trace%margins%list(i))
+        if (one%kind /= of_impact) cycle
+        associate (event => trace%now%orbit%events(one%event))
+          if (event%kind /= last%kind .or. event%joint /= last%joint .or. one%value > speed) run = 0
+          run = merge(run + 1, 0, is_impact(event%kind))
+          last = event
+        end associate
+        speed = one%value
+        begins = begins .or. (run >= least_run .and. speed < hardly_an_impact)
+      end associate
+    end do
+  end function begins_chatter
 
   !> Impacts in a row on one side of a joint, turning points aside.
   pure integer function longest_run(orbit) result(longest)

@@ -8,7 +8,8 @@ module orbit_margins
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
-    event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point
+    event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point, &
+    mode_stick
   use one_body, only: direction_in, one_body_t, rests_on_barrier, slips_in, turns_smoothly
   use periodic_orbit, only: orbit_t
   use secant_bracket, only: bracket_t, narrow, next_trial
@@ -28,6 +29,9 @@ module orbit_margins
     of_order = 7, of_hold = 8, of_press = 9
   !> Looks along a flight, per period of the section.
   integer, parameter :: looks = 96
+  !> After a rebound slower than this, in natural sizes, so many looks come before the first, each at half the time of the next.
+  real(wp), parameter :: slow_rebound = 1e-2_wp
+  integer, parameter :: early_looks = 14
   integer, parameter :: most_secants = 60
 
   type, public :: margin_t
@@ -64,7 +68,7 @@ contains
   pure logical function same_meaning(one, other) result(same)
     type(margin_t), intent(in) :: one, other
     same = one%kind == other%kind .and. one%joint == other%joint .and. one%guard == other%guard
-    if (one%kind == of_gap) same = same .and. one%side == other%side
+    if (any(one%kind == [of_gap, of_hold])) same = same .and. one%side == other%side
     if (.not. is_between(one)) same = same .and. one%event == other%event
   end function same_meaning
 
@@ -73,13 +77,15 @@ contains
     class(hybrid_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
     type(margins_t) :: margins
-    type(margin_t) :: gaps(-1:1), slowest
+    type(margin_t) :: gaps(-1:1), holds(-1:1), slowest
     real(wp) :: y(states), t, until
     integer :: k, m, mode
     m = size(orbit%events)
     allocate (margins%list(0))
     gaps = margin_t(kind=of_gap)
     gaps%side = [-1, 0, 1]
+    holds = margin_t(kind=of_hold)
+    holds%side = gaps%side
     slowest = margin_t(kind=of_slip)
     select type (machine)
     type is (one_body_t)
@@ -102,10 +108,13 @@ contains
         margins%x_min = min(margins%x_min, y(1))
         until = orbit%periods*machine%period
         if (k < m) until = orbit%events(k + 1)%time
-        if (slips_in(mode) .and. until > t) call look_along(machine, orbit, mode, t, y, until, k, gaps, slowest, margins)
+        if (.not. until > t) cycle
+        if (slips_in(mode)) call look_along(machine, orbit, mode, t, y, until, k, gaps, slowest, margins)
+        ! A body that rests for ever has no other motion near by.
+        if (mode == mode_stick .and. m > 0) call look_while_stuck(machine, t, y, until, k, holds)
       end do
     end select
-    margins%list = [margins%list, gaps(-1), gaps(1), slowest]
+    margins%list = [margins%list, gaps(-1), gaps(1), slowest, holds(-1), holds(1)]
   end function margins_of
 
   !> The margins of the event `k`.
@@ -193,7 +202,7 @@ contains
     type(margin_t), intent(inout) :: gaps(-1:1), slowest
     type(margins_t), intent(inout) :: margins
     real(wp) :: y(states), a, last(states), last_a, t, last_t, slope(states)
-    integer :: i, count, direction
+    integer :: i, count, early, direction
     logical :: smooth
     smooth = turns_smoothly(machine)
     direction = direction_in(mode)
@@ -202,12 +211,15 @@ contains
     last_t = from
     slope = machine%slope(mode, from, start)
     last_a = slope(2)
-    ! A body that is let go of gathers speed from nothing, whatever rounding says.
+    early = 0
     if (k > 0) then
+      ! A body that is let go of gathers speed from nothing, whatever rounding says.
       if (orbit%events(k)%kind == event_release) last_a = 0
+      ! One that hardly rebounds may be back before the first look.
+      if (is_impact(orbit%events(k)%kind) .and. abs(start(2)) < slow_rebound*machine%size_of(2)) early = early_looks
     end if
-    do i = 1, count
-      t = from + (until - from)*i/count
+    do i = 1 - early, count
+      t = from + (until - from)*merge(2.0_wp**(i - 1), real(i, wp), i < 1)/count
       call machine%fly(mode, last_t, last, t, y)
       slope = machine%slope(mode, t, y)
       a = slope(2)
@@ -223,6 +235,62 @@ contains
       last_t = t
     end do
   end subroutine look_along
+
+  !> The least reserves of friction, in both directions, in a stick after the event `k` that lasts from `from` to `until` [s] at the
+  !> state `y`; those at its ends are others' margins.
+  pure subroutine look_while_stuck(machine, from, y, until, k, holds)
+    type(one_body_t), intent(in) :: machine
+    real(wp), intent(in) :: from, y(states), until
+    integer, intent(in) :: k
+    type(margin_t), intent(inout) :: holds(-1:1)
+    real(wp) :: t, last_t, value, rate, last_rate, force
+    integer :: i, side, count
+    force = max(machine%moving%machine%force_scale, tiny(1.0_wp))
+    count = max(6, ceiling(looks*(until - from)/machine%period))
+    do side = -1, 1, 2
+      last_rate = 0
+      last_t = from
+      do i = 0, count
+        t = from + (until - from)*i/count
+        call reserve_at(machine, side, t, y, value, rate)
+        if (last_rate < 0 .and. rate > 0) then
+          call least_reserve(machine, side, y, bracket_t(last_t, t, last_rate, rate), last_t, value)
+          if (value/force < holds(side)%value) holds(side) = margin_t(value/force, of_hold, -k - 1, side, last_t)
+        end if
+        last_rate = rate
+        last_t = t
+      end do
+    end do
+  end subroutine look_while_stuck
+
+  !> The least reserve of friction [N] and its instant [s], by the Illinois form of the secant rule.
+  pure subroutine least_reserve(machine, side, y, within, t, value)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: side
+    real(wp), intent(in) :: y(states)
+    type(bracket_t), intent(in) :: within
+    real(wp), intent(out) :: t, value
+    type(bracket_t) :: bracket
+    real(wp) :: rate
+    integer :: i
+    bracket = within
+    do i = 1, most_secants
+      t = next_trial(bracket)
+      call reserve_at(machine, side, t, y, value, rate)
+      call narrow(bracket, t, rate)
+      if (.not. abs(rate) > 0 .or. bracket%high - bracket%low <= 4*spacing(bracket%high)) exit
+    end do
+  end subroutine least_reserve
+
+  !> By how much the force on a body at rest is less than what moves it to a side [N], and the rate of that [N/s].
+  pure subroutine reserve_at(machine, side, t, y, value, rate)
+    type(one_body_t), intent(in) :: machine
+    integer, intent(in) :: side
+    real(wp), intent(in) :: t, y(states)
+    real(wp), intent(out) :: value, rate
+    real(wp) :: by_state(states)
+    call machine%guard(event_t(kind=event_release, side=side), t, y, value, by_state, rate)
+  end subroutine reserve_at
 
   !> The extreme of x between two looks, the body being at `start` at the first.
   pure subroutine note_turning(machine, mode, start, low, high, side, k, gaps, margins)

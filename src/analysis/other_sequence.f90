@@ -10,7 +10,7 @@ module other_sequence
     event_stick, event_touch_lower, event_touch_upper, event_turning_point, mode_lower_barrier, mode_slip_minus, mode_slip_plus, &
     mode_stick, mode_upper_barrier
   use one_body, only: one_body_t, turns_smoothly
-  use orbit_margins, only: is_impact, margin_t, of_gap, of_impact, of_slip, of_stick, of_turning
+  use orbit_margins, only: is_impact, margin_t, of_gap, of_hold, of_impact, of_slip, of_stick, of_turning
   use periodic_orbit, only: orbit_t
   implicit none
   private
@@ -69,6 +69,9 @@ contains
       ! Where a slip comes to a stop the force is that of sliding friction, which holds the body.
       other%events = [orbit%events(:k), event_t(kind=event_stick, side=margin%side, after=mode_stick, time=margin%time), &
                       release_at(margin%time, margin%side, slip_in(margin%side)), orbit%events(k + 1:)]
+    case (of_hold)
+      other%events = [orbit%events(:-k - 1), release_at(margin%time, margin%side, slip_in(margin%side)), &
+                      event_t(kind=event_stick, side=margin%side, after=mode_stick, time=margin%time), orbit%events(-k:)]
     case default
       known = .false.
     end select

@@ -8,7 +8,7 @@ module soft_graze
   use branch_point, only: set_point, step_to, trace_t
   use kinds, only: wp
   use motion_state, only: event_separation, event_touch_lower, event_touch_upper
-  use orbit_margins, only: margin_t, margins_t, of_gap, of_impact, of_stick, same_meaning
+  use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_slip, of_stick, same_meaning
   use orbit_motion, only: is_admissible
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit
   implicit none
@@ -147,7 +147,7 @@ contains
     gap = huge(gap)
     do i = 1, size(trace%margins%list)
       associate (one => trace%margins%list(i))
-        if (touch%kind == of_stick) then
+        if (any(touch%kind == [of_stick, of_slip, of_hold])) then
           if (same_meaning(one, touch)) gap = one%value
         else if (one%kind == of_gap .and. one%joint == touch%joint .and. one%side == touch%side) then
           gap = one%value

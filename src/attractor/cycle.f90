@@ -15,6 +15,7 @@ module cycle
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
+  use section_slopes, only: slopes_of
   use strobe, only: advance_strobe_period, begin_tally, scales_of, section_point, strobe_at, strobe_t, turn_of
   use turn_section, only: has_no_clock
   implicit none
@@ -121,8 +122,8 @@ contains
     scale = max(scales_of(moving, max((tally%x_max - tally%x_min)/2, smallest_motion(moving))), tiny(1.0_wp))
   end function scale_of
 
-  !> Newton's method on P^period(z) - z, derivatives by central differences, steps no longer than a fifth of
-  !> the motion's size; ends at rounding.
+  !> Newton's method on P^period(z) - z, derivatives by variations, or by central differences where those are not known, steps no
+  !> longer than a fifth of the motion's size; ends at rounding.
   pure subroutine newton(moving, period, scale, point, converged)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: period
@@ -142,7 +143,8 @@ contains
       if (norm2(miss) <= 64*epsilon(1.0_wp)) return
       if (i > 4 .and. norm2(miss) < 1e-11_wp .and. norm2(miss) >= best) return
       best = min(best, norm2(miss))
-      call differentiate(moving, point, period, scale, jacobian, converged)
+      call slopes_of(moving, point, period, scale, jacobian, converged)
+      if (.not. converged) call differentiate(moving, point, period, scale, jacobian, converged)
       if (.not. converged) return
       do k = 1, size(point)
         jacobian(k, k) = jacobian(k, k) - 1
@@ -158,8 +160,10 @@ contains
     converged = best < 1e-9_wp
   end subroutine newton
 
-  !> Scaled derivative of P^period. Next to a graze the map is linear only in a range that shrinks like the square of the impact
-  !> speed: where a quarter of the step of the differences gives another result, it is divided on until the results agree best.
+  !> Scaled derivative of P^period, by variations where they are known: not of a motion from turn to turn, under a measured force,
+  !> and of the laws that `why_not_varied` names. There it is by differences. Next to a graze the map is linear only in a range that
+  !> shrinks like the square of the impact speed: where a quarter of their step gives another result, it is divided on until the
+  !> results agree best.
   pure subroutine derivative(moving, point, period, scale, jacobian, ok)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:), scale(:)
@@ -169,6 +173,8 @@ contains
     real(wp), dimension(size(point), size(point)) :: coarse, fine
     real(wp) :: share, best, change
     integer :: k
+    call slopes_of(moving, point, period, scale, jacobian, ok)
+    if (ok) return
     share = 1
     best = huge(best)
     call differentiate(moving, point, period, scale, coarse, ok)
