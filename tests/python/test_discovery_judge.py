@@ -320,6 +320,30 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
     assert [one.name for one in close] == rivals
 
 
+@pytest.mark.parametrize(("information", "needed"), [(1e-3, True), (1e3, False)])
+def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_it(
+    monkeypatch, information, needed
+):
+    """As of restitution in impacts of one speed, which noise makes 0.5 worse there."""
+
+    def one(*names, evidence):
+        return SimpleNamespace(
+            fitted=replace(base, names=names), evidence=evidence, prediction=SimpleNamespace()
+        )
+
+    base = fitted("", np.full(COUNT, 100.0))
+    whole = one("quadratic_drag", "restitution_slope", evidence=100.0)
+    parts = {name: one(name, evidence=20.0) for name in whole.fitted.names}
+    over = {
+        "restitution_slope": foretold(np.ones(12), np.ones(12)),
+        "quadratic_drag": foretold(np.array([*6 * [0.95], *6 * [-1.0]]), np.full(12, information)),
+    }
+    monkeypatch.setattr(several, "without", lambda *_: parts["restitution_slope"])
+    monkeypatch.setattr(several, "over_base", lambda bench, base, *_: over[base.names[0]])
+    bench = SimpleNamespace(options=OPTIONS)
+    assert several._all_needed(bench, None, whole, parts["quadratic_drag"]) == needed
+
+
 def test_each_of_several_effects_is_held_against_its_family(monkeypatch):
     """Where an effect of the family has nearly as much evidence alone and nobody tried it in the set."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
-from separatrix.discovery.decision.judge import Judged, admissible, judged
+from separatrix.discovery.decision.judge import Judged, admissible, beyond_doubt, judged
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.fitting.heldout import Prediction
@@ -99,7 +99,8 @@ def _closes_most(before: Judged, after: Judged) -> bool:
 
 
 def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool:
-    """Whether each effect of a set is worth it over the set without it, on held-out records too."""
+    """Whether each effect of a set is worth it over the set without it, on held-out records too, as far as
+    those say anything of it."""
     least = bench.options.needed * bench.options.separation
     for name in whole.fitted.names:
         if set(part.fitted.names) == {*whole.fitted.names} - {name}:
@@ -112,8 +113,8 @@ def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool
         if whole.evidence - other.evidence < least:
             return False
         if whole.prediction is not None and other.prediction is not None:
-            over = judged(other.fitted, other.prediction, whole.fitted, whole.prediction)
-            if over.held_out <= 0:
+            over = over_base(bench, other.fitted, other.prediction, whole)
+            if over.held_out <= 0 and not beyond_doubt(over, other.fitted, bench.options):
                 return False
     return True
 
