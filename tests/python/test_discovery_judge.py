@@ -250,6 +250,24 @@ def test_a_table_that_left_most_of_a_gap_is_not_fitted_again():
     assert flexible._far_tables(found) == set()
 
 
+@pytest.mark.parametrize("lost", [COUNT, COUNT // 2, 0])
+def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatch, lost):
+    """Squares of segments that it lost would pass for a gain, and its values mean nothing."""
+    base, few = (fitted(name, np.full(COUNT, size)) for name, size in (("", 100.0), ("friction_curve", 60.0)))
+    more = fitted("friction_curve", np.full(COUNT, 59.9))
+    more.fit.evaluation.failed[:lost] = True
+    made = iter([few, more, None])
+    monkeypatch.setattr(flexible, "knots_at", lambda member, seen, count: np.arange(count))
+    monkeypatch.setattr(flexible, "fit_member", lambda *_: next(made))
+    member = SimpleNamespace(seen=lambda _: None, values=("force",), knots="", effect="friction_curve")
+    found = SimpleNamespace(base=base, judged=[], foretold=None)
+    found.judge = lambda one, told: Judged(one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3)
+    bench = SimpleNamespace(options=OPTIONS, training=None, foretell=lambda *_: None)
+    best = flexible._fit_table(bench, found, member, base, True)
+    assert best.fitted is few
+    assert (few.finer is more) == (lost == 0)
+
+
 def test_more_knots_end_sooner_where_a_closed_form_is_far_ahead():
     few, more = (fitted("friction_curve", np.full(COUNT, size)) for size in (200.0, 150.0))
     ahead, near = (fitted("coulomb", np.full(COUNT, size)) for size in (50.0, 149.0))
@@ -318,6 +336,29 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
     best, close = foremost(pool, OPTIONS)
     assert best.name == "quadratic_drag"
     assert [one.name for one in close] == rivals
+
+
+@pytest.mark.parametrize("better", [80.0, 20.0])
+def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better):
+    """What a set is held against must not be caught in a minimum that the set left."""
+    alone = [contender("second_barrier", 50.0), contender("sensor_gain", 40.0), contender("viscous", 30.0)]
+    led = contender("second_barrier", better)
+    names = ("second_barrier", "sensor_gain")
+    whole = replace(alone[0], fitted=replace(alone[0].fitted, names=names))
+    first = SimpleNamespace(base=None, foretold=None, judged=list(alone), rank=lambda: None)
+    asked = []
+
+    def led_by(data, one, other):
+        asked.append(one.names)
+        return led.fitted if one.names == led.fitted.names else one
+
+    monkeypatch.setattr(several, "led_by", led_by)
+    monkeypatch.setattr(several, "judged", lambda *_: led)
+    bench = SimpleNamespace(training=None, foretell=lambda *_: None)
+    part = several._led_by(bench, first, whole, alone[0])
+    assert asked == [("second_barrier",), ("sensor_gain",)]
+    assert part is (led if better > 50 else alone[0])
+    assert first.judged == [part, *alone[1:]]
 
 
 @pytest.mark.parametrize(("information", "needed"), [(1e-3, True), (1e3, False)])

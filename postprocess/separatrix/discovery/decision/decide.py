@@ -120,8 +120,11 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
         return _give_up(bench, decision, best)
-    rounds = list(decision.rounds)
+    rounds, before = list(decision.rounds), list(found.judged)
     *more, closed = with_more(bench, rounds, best)
+    alone = None if closed else _led_alone(bench, found, before)
+    if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
+        return _conclude(bench, decision, *alone)
     if shaped is not None:
         # a table for each direction says what a law over the speed and one of the direction say with less
         closed = closed and more[0].evidence > shaped[0].evidence
@@ -136,6 +139,14 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         fit = minimise(base.problem, base.fit.values, base.fit.starts, patient=True)
         return decide(bench, replace(base, fit=fit), settled=True)
     return _give_up(bench, decision, best)
+
+
+def _led_alone(bench: Bench, found: Round, before: list[Judged]) -> tuple[Judged, list[Judged]] | None:
+    """An effect alone that closes the gap since several led it out of a wrong minimum, and its rivals."""
+    if all(any(one is other for other in before) for one in found.judged):
+        return None
+    best, rivals = _lead(bench, found)
+    return (best, rivals) if _detected(best) and best.gates["adequate"] else None
 
 
 def _with_more_foretold(

@@ -13,7 +13,7 @@ from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_r
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.refit import Fitted, hopeless, refit
+from separatrix.discovery.fitting.refit import Fitted, hopeless, led_by, refit
 from separatrix.discovery.fitting.screen import screen, signature
 
 _PAIRS = 6
@@ -42,6 +42,8 @@ def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, 
             larger, close = choice(bench, first.base, first.foretold, [*grown, *swapped], foremost)
         pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
         judge_ceiling(bench, larger)
+        if larger.gates["adequate"]:
+            found = _led_by(bench, first, larger, found)
         larger.gates["drop"] = _all_needed(bench, first, larger, found)
         if larger.gates["adequate"] and larger.gates["drop"]:
             return larger, close, True
@@ -98,6 +100,29 @@ def _closes_most(before: Judged, after: Judged) -> bool:
     return all(share is None or share > _CLOSES for share in shares)
 
 
+def _led_by(bench: Bench, first: Round, whole: Judged, part: Judged) -> Judged:
+    """Let each effect alone, and `part` of a set, follow the set that closes the gap; return that part.
+
+    What a set is held against must not be in a minimum that the set left. Those alone are put into the round.
+    """
+    for place, one in enumerate(first.judged):
+        if one.name in whole.fitted.names:
+            first.judged[place] = _followed(bench, first, whole, one)
+    first.rank()
+    if len(part.fitted.names) > 1:
+        return _followed(bench, first, whole, part)
+    return next((one for one in first.judged if one.name == part.name), part)
+
+
+def _followed(bench: Bench, first: Round, whole: Judged, one: Judged) -> Judged:
+    """A part of a set from where the set ended, if there is more evidence of it."""
+    better = led_by(bench.training, one.fitted, whole.fitted)
+    if better is one.fitted:
+        return one
+    found = judged(first.base, first.foretold, better, bench.foretell(better, whole.prediction))
+    return found if found.evidence > one.evidence else one
+
+
 def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool:
     """Whether each effect of a set is worth it over the set without it, on held-out records too, as far as
     those say anything of it."""
@@ -107,6 +132,8 @@ def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool
             other: Judged | None = part
         else:
             other = without(bench, first, name, whole.fitted.names)
+            if other is not None and len(other.fitted.names) > 1 and whole.gates.get("adequate", False):
+                other = _followed(bench, first, whole, other)
         if other is None:
             # it cannot be fitted
             continue
