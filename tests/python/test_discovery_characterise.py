@@ -4,10 +4,13 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
+from separatrix.discovery.decision import characterise
+from separatrix.discovery.decision.decide import Decision
 
 SEED = 31
 # numbers of cases of the campaign's generator with one effect each, on what it depends, and its constant
@@ -43,6 +46,36 @@ def hide(source_dir, tmp_path_factory):
 def ask(case: Path, **options) -> dict:
     training = [case / "first.csv", case / "second.csv"]
     return discover(case / "base.toml", training, [case / "held_out.csv"], Options(quick=True, **options))
+
+
+@pytest.mark.parametrize(("evidence", "foremost", "outcome"), [
+    (106.5, "memory", "characterised"),
+    # as far ahead as one of several names has to be
+    (105.5, "memory", "named"),
+    # a function of the catalogue would do it as well, linearised as the hidden state is
+    (106.5, "speed", "named"),
+])  # fmt: skip
+def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, foremost, outcome):
+    def one(variable: str) -> SimpleNamespace:
+        return SimpleNamespace(hypothesis=SimpleNamespace(depends_on=(variable,)), evidence=evidence)
+
+    fit = SimpleNamespace(reduced_chi2=1.0, excess=300.0)
+    fitted = SimpleNamespace(names=("friction_curve",), fit=fit)
+    name = SimpleNamespace(fitted=fitted, evidence=100.0)
+    first = SimpleNamespace(base=SimpleNamespace(problem=None))
+    decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
+    monkeypatch.setattr(characterise, "_motions", lambda *_: (None, None))
+    monkeypatch.setattr(characterise, "memories", lambda _: ["memory"])
+    monkeypatch.setattr(characterise, "_best", lambda training, held_out, variable: one(variable))
+
+    def characterised(bench, gap):
+        assert (gap.outcome, gap.accepted) == ("not-in-catalogue", [])
+        return Decision("characterised", [], [], [], [first], None, None, characters=[one(foremost)])
+
+    monkeypatch.setattr(characterise, "characterised", characterised)
+    found = characterise.remembered(SimpleNamespace(options=Options()), decision)
+    assert found.outcome == outcome
+    assert bool(found.accepted) == (outcome == "named")
 
 
 @pytest.mark.parametrize("number", CASES)

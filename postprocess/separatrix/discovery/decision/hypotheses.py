@@ -114,7 +114,7 @@ def hypotheses(training: Motion) -> Iterator[Hypothesis]:
     """All that are tried; knots and scales are those of the training records."""
     yield from _smooth(training)
     yield from _times(training)
-    yield from _memories(training)
+    yield from memories(training)
     if training.problem.in_force:
         yield _after_turning(training)
         yield Hypothesis(
@@ -168,7 +168,7 @@ def _times(training: Motion) -> Iterator[Hypothesis]:
         )  # fmt: skip
 
 
-def _memories(training: Motion) -> Iterator[Hypothesis]:
+def memories(training: Motion) -> Iterator[Hypothesis]:
     """Hidden states: one that relaxes, one that is late, a mass on a spring of its own."""
     period = 2 * np.pi / training.natural
     yield Hypothesis(
