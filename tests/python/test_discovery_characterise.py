@@ -11,6 +11,7 @@ import pytest
 from separatrix.discovery import Options, discover
 from separatrix.discovery.decision import characterise
 from separatrix.discovery.decision.decide import Decision
+from separatrix.discovery.fitting import motions
 
 SEED = 31
 # numbers of cases of the campaign's generator with one effect each, on what it depends, and its constant
@@ -127,3 +128,21 @@ def test_a_machine_without_a_gap_has_no_character(hide):
     assert verdict["outcome"] == "none"
     assert verdict["character"] == []
     assert np.isfinite(verdict["gap"]["training"]["before"])
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_spring_of_a_machine_that_cannot_be_flown_is_no_variable(monkeypatch, seen):
+    slack = np.full(motions._ANGLES.size, 0.3)
+    slack[1] = 0.3 if seen else np.nan
+    monkeypatch.setattr(motions, "_slack_places", lambda *_: slack)
+    index = np.arange(8)[None, :]
+    segments = SimpleNamespace(inside=np.ones((1, 8), bool), record=np.zeros(1, int), index=index)
+    problem = SimpleNamespace(
+        model=SimpleNamespace(parameters={"restoring.stiffness": None}),
+        segments=segments,
+        prepared=[SimpleNamespace(samples=SimpleNamespace(t=np.arange(8.0)))],
+        crank_angle=lambda number, values, t: t,
+    )
+    fit = SimpleNamespace(values=None, evaluation=SimpleNamespace(x=np.full((1, 8), 0.1)))
+    found = motions.stretches(problem, fit)
+    assert np.allclose(found, 0.2) if seen else found is None

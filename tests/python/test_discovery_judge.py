@@ -235,6 +235,20 @@ def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, forete
     assert (decide._shaped(bench, found) is not None) == foretells
 
 
+@pytest.mark.parametrize(("missed", "named"), [(False, True), (True, False)])
+def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, missed, named):
+    """It has the freedom to follow the fitted ones where the missing force is no function at all."""
+    one = judged(np.full(COUNT, 5.0), np.ones(COUNT))
+    monkeypatch.setattr(decide, "misses", lambda *_: missed)
+    monkeypatch.setattr(decide, "_shaped", lambda *_: (one, []))
+    monkeypatch.setattr(
+        decide, "_conclude", lambda bench, decision, best, rivals: replace(decision, accepted=[best])
+    )
+    gap = decide.Decision("not-in-catalogue", [], [], [], [], None, None)
+    bench = SimpleNamespace(options=OPTIONS)
+    assert bool(decide._shape_alone(bench, gap, None).accepted) == named
+
+
 def excess(size: float) -> SimpleNamespace:
     """A fit of a table, and no finer one."""
     return SimpleNamespace(fitted=SimpleNamespace(fit=SimpleNamespace(excess=size), finer=None))

@@ -128,7 +128,7 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     if shaped is not None:
         # a table for each direction says what a law over the speed and one of the direction say with less
         closed = closed and more[0].evidence > shaped[0].evidence
-        if not closed:
+        if not closed and not _only_follows(bench, shaped[0]):
             return _conclude(bench, decision, *shaped)
     decision.rounds = rounds
     if closed:
@@ -174,7 +174,7 @@ def _with_more_foretold(
 def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
     """A family as a function where none of its closed forms, nor any other effect, stands out of chance."""
     shaped = _shaped(bench, found) if decision.outcome == "not-in-catalogue" else None
-    if shaped is None:
+    if shaped is None or _only_follows(bench, shaped[0]):
         return decision
     decision.reasons.clear()
     return _conclude(bench, decision, *shaped)
@@ -206,9 +206,13 @@ def _of_several(bench: Bench, one: Judged) -> bool:
     A table of friction for each direction says what two closed forms say with less; and what follows the
     fitted records but not held-out ones may have taken over what another effect does.
     """
-    if bench.options.quick or one.prediction is None:
-        return _of_two_directions(one)
-    return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, bench.options)
+    return _of_two_directions(one) or (not bench.options.quick and _only_follows(bench, one))
+
+
+def _only_follows(bench: Bench, one: Judged) -> bool:
+    """Whether a function follows fitted records and misses held-out ones: it has the freedom to, and no law
+    of its own would."""
+    return one.prediction is not None and misses(one.prediction, one.fitted.fit, bench.options)
 
 
 def _of_two_directions(one: Judged) -> bool:
