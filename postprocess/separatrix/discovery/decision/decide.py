@@ -206,13 +206,21 @@ def _of_several(bench: Bench, one: Judged) -> bool:
     A table of friction for each direction says what two closed forms say with less; and what follows the
     fitted records but not held-out ones may have taken over what another effect does.
     """
-    return _of_two_directions(one) or (not bench.options.quick and _only_follows(bench, one))
+    if bench.options.quick or one.prediction is None:
+        return _of_two_directions(one)
+    return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, bench.options)
 
 
 def _only_follows(bench: Bench, one: Judged) -> bool:
-    """Whether a function follows fitted records and misses held-out ones: it has the freedom to, and no law
-    of its own would."""
-    return one.prediction is not None and misses(one.prediction, one.fitted.fit, bench.options)
+    """Whether a function follows fitted records, as it has the freedom to, and misses held-out ones.
+
+    What faults of a rig may explain of those is taken off.
+    """
+    told = one.prediction
+    if told is None or not misses(told, one.fitted.fit, bench.options):
+        return False
+    told = replace(told, fit=cleaned_prediction(one.fitted, told))
+    return misses(told, one.fitted.fit, bench.options)
 
 
 def _of_two_directions(one: Judged) -> bool:
