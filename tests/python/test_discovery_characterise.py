@@ -49,25 +49,35 @@ def ask(case: Path, **options) -> dict:
     return discover(case / "base.toml", training, [case / "held_out.csv"], Options(quick=True, **options))
 
 
-@pytest.mark.parametrize(("evidence", "foremost", "outcome"), [
-    (106.5, "memory", "characterised"),
+@pytest.mark.parametrize(("evidence", "beside", "faults", "foremost", "outcome"), [
+    (106.5, 6.5, 0.0, "memory", "characterised"),
     # as far ahead as one of several names has to be
-    (105.5, "memory", "named"),
+    (105.5, 6.5, 0.0, "memory", "named"),
+    # a right name leaves nothing to it
+    (106.5, 5.5, 0.0, "memory", "named"),
+    # or faults of the rig, of which it would explain a part
+    (200.0, 16.5, 12.0, "memory", "named"),
+    (200.0, 18.5, 12.0, "memory", "characterised"),
     # a function of the catalogue would do it as well, linearised as the hidden state is
-    (106.5, "speed", "named"),
+    (106.5, 6.5, 0.0, "speed", "named"),
 ])  # fmt: skip
-def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, foremost, outcome):
-    def one(variable: str) -> SimpleNamespace:
+def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, beside, faults, foremost, outcome):
+    def one(variable: str, evidence: float = evidence) -> SimpleNamespace:
         return SimpleNamespace(hypothesis=SimpleNamespace(depends_on=(variable,)), evidence=evidence)
 
     fit = SimpleNamespace(reduced_chi2=1.0, excess=300.0)
     fitted = SimpleNamespace(names=("friction_curve",), fit=fit)
-    name = SimpleNamespace(fitted=fitted, evidence=100.0)
+    name = SimpleNamespace(fitted=fitted, evidence=100.0, prediction=SimpleNamespace())
     first = SimpleNamespace(base=SimpleNamespace(problem=None))
     decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
-    monkeypatch.setattr(characterise, "_motions", lambda *_: (None, None))
+    monkeypatch.setattr(characterise, "_motions", lambda _, machine, told: (machine is fitted, None))
     monkeypatch.setattr(characterise, "memories", lambda _: ["memory"])
-    monkeypatch.setattr(characterise, "_best", lambda training, held_out, variable: one(variable))
+    monkeypatch.setattr(characterise, "evidence_of_faults", lambda *_: faults)
+    monkeypatch.setattr(
+        characterise,
+        "_best",
+        lambda named, held_out, variable: one("memory", beside if named else evidence),
+    )
 
     def characterised(bench, gap):
         assert (gap.outcome, gap.accepted) == ("not-in-catalogue", [])

@@ -20,6 +20,7 @@ from separatrix.discovery.fitting.rig import (
     beside_faults,
     cleaned,
     cleaned_prediction,
+    evidence_of_faults,
     share_beside_faults,
     shares_beside_faults,
 )
@@ -153,3 +154,13 @@ def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_expla
     ]
     _, share = shares_beside_faults((effect, without), tuple(told))
     assert share > 0.6 if drag else share < 0.2
+
+
+@pytest.mark.parametrize("curved", [1e-3, 0.0])
+def test_the_evidence_of_faults_of_a_rig_is_that_of_all_records(curved):
+    base, prepared = three_records((curved, -curved, curved))
+    fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
+    known = Known(fitted.fit.values, fitted.covariance, fitted.unseen)
+    told = predict(gather(prepared[2:], 1.0, None), base, fitted.problem.free, known)
+    evidence = evidence_of_faults(fitted, told)
+    assert evidence > 100 if curved else evidence < 3

@@ -20,6 +20,7 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.rig import evidence_of_faults
 from separatrix.discovery.fitting.sensed import SensedData
 
 # least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
@@ -105,8 +106,8 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
 def remembered(bench: Bench, decision: Decision) -> Decision:
     """The decision without its names where a hidden state explains clearly more than they do.
 
-    It is no effect of the catalogue, and what it does a function of speed, place or phase does in part. Its
-    evidence is that of a force along the motion of the base, which is rather too small than too large.
+    It is no effect of the catalogue, and what it does a function of speed, place or phase does in part. A
+    right name leaves nothing to it: it has to explain more beside the names too, and than faults of a rig.
     """
     base, foretold = decision.rounds[0].base, decision.foretold
     if not decision.accepted or foretold is None or foretold.fit.excess <= 0:
@@ -116,8 +117,15 @@ def remembered(bench: Bench, decision: Decision) -> Decision:
     training, held_out = _motions(bench, base, foretold)
     best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
     name = decision.accepted[0]
-    lead = best.evidence - name.evidence / max(1.0, name.fitted.fit.reduced_chi2)
-    if lead < bench.options.needed * bench.options.separation:
+    if name.prediction is None:
+        return decision
+    faults = evidence_of_faults(name.fitted, name.prediction)
+    least = bench.options.needed * bench.options.separation
+    lead = best.evidence - name.evidence / max(1.0, name.fitted.fit.reduced_chi2) - faults
+    if lead < least:
+        return decision
+    beside = _best(*_motions(bench, name.fitted, name.prediction), best.hypothesis)
+    if beside.evidence - faults < least:
         return decision
     gap = replace(
         decision, outcome="not-in-catalogue", accepted=[], alternatives=[], rivals=[], equivalent=False

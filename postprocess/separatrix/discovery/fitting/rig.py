@@ -220,15 +220,22 @@ def share_beside_faults(one: Fitted, other: Fitted) -> float:
 def shares_beside_faults(
     fitted: tuple[Fitted, Fitted], told: tuple[Prediction, Prediction]
 ) -> tuple[float, float]:
-    """The same of two machines in training, and of what they foretell: one rig made all the records.
-
-    The other machine is known on held-out records as training records know it, without or beside faults.
-    """
-    training = _contest(*fitted)
-    beside = _shared(fitted[1])
-    without = Beside(np.zeros(beside.shift.size), told[1].covariance)
-    held_out = _contest(*told, (without, beside))
+    """The same in training, and of what two machines foretell: one rig made all the records."""
+    training, held_out = _contest(*fitted), _foretold_contest(told, fitted[1])
     return _share(training), _share(held_out, training)
+
+
+def evidence_of_faults(fitted: Fitted, told: Prediction) -> float:
+    """Evidence that a rig has faults where a machine is right but for them; 0 if nothing speaks for them."""
+    both = _contest(fitted, fitted) + _foretold_contest((told, told), fitted)
+    return max(0.0, float(both.faults.max()))
+
+
+def _foretold_contest(told: tuple[Prediction, Prediction], other: Fitted) -> Contest:
+    """Of what they foretell; the other one is known as training records know it, without or beside faults."""
+    beside = _shared(other)
+    without = Beside(np.zeros(beside.shift.size), told[1].covariance)
+    return _contest(*told, (without, beside))
 
 
 def _share(new: Contest, known: Contest | None = None) -> float:
