@@ -384,9 +384,14 @@ def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better
     assert first.judged == [part, *alone[1:]]
 
 
-@pytest.mark.parametrize(("information", "needed"), [(1e-3, True), (1e3, False)])
+@pytest.mark.parametrize(("information", "own", "needed"), [
+    (1e-3, 1.0, True),
+    (1e3, 1.0, False),
+    # faults of the rig may be all that it explains
+    (1e-3, 0.1, False),
+])  # fmt: skip
 def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_it(
-    monkeypatch, information, needed
+    monkeypatch, information, own, needed
 ):
     """As of restitution in impacts of one speed, which noise makes 0.5 worse there."""
 
@@ -403,6 +408,7 @@ def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_
         "quadratic_drag": foretold(np.array([*6 * [0.95], *6 * [-1.0]]), np.full(12, information)),
     }
     monkeypatch.setattr(several, "without", lambda *_: parts["restitution_slope"])
+    monkeypatch.setattr(several, "shares_beside_faults", lambda *_: (own, own))
     monkeypatch.setattr(several, "over_base", lambda bench, base, *_: over[base.names[0]])
     bench = SimpleNamespace(options=OPTIONS)
     assert several._all_needed(bench, None, whole, parts["quadratic_drag"]) == needed

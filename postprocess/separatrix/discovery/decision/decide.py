@@ -159,7 +159,7 @@ def _with_more_foretold(
     told = best.prediction
     if told is None or bench.options.quick or bench.options.most_effects < 2 or best.leaves != NOISE:
         return best, rivals
-    if not misses(told, best.fitted.fit, bench.options):
+    if not _only_follows(bench, best):
         return best, rivals
     rounds = list(decision.rounds)
     whole, others, closed = with_more(bench, rounds, best)
@@ -212,7 +212,7 @@ def _of_several(bench: Bench, one: Judged) -> bool:
 
 
 def _only_follows(bench: Bench, one: Judged) -> bool:
-    """Whether a function follows fitted records, as it has the freedom to, and misses held-out ones.
+    """Whether a machine follows fitted records, as a function has the freedom to, and misses held-out ones.
 
     What faults of a rig may explain of those is taken off.
     """

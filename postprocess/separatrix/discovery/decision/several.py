@@ -14,6 +14,7 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, hopeless, led_by, refit
+from separatrix.discovery.fitting.rig import shares_beside_faults
 from separatrix.discovery.fitting.screen import screen, signature
 
 _PAIRS = 6
@@ -143,7 +144,15 @@ def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool
             over = over_base(bench, other.fitted, other.prediction, whole)
             if over.held_out <= 0 and not beyond_doubt(over, other.fitted, bench.options):
                 return False
+            if _beside_faults(over, other) < least:
+                return False
     return True
+
+
+def _beside_faults(over: Judged, other: Judged) -> float:
+    """Evidence of what a set has more than a part of it, against that part with faults of a rig, too."""
+    own, own_foretold = shares_beside_faults((over.fitted, other.fitted), (over.prediction, other.prediction))
+    return own * over.training + own_foretold * max(0.0, over.held_out) - over.parameters
 
 
 def without(bench: Bench, first: Round, name: str, names: Iterable[str]) -> Judged | None:
