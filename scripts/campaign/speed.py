@@ -38,16 +38,23 @@ def ask(folder: Path, seed: int, number: int) -> dict:
 
 def told(one: dict) -> str:
     """The verdict in few words."""
-    names = [*one["effects"], *(f"or {'+'.join(other)}" for other in one["alternatives"])]
+    names = [*one["effects"], *(f"or {_joined(other)}" for other in one["alternatives"])]
     if one["outcome"] == "characterised" and one["depends_on"]:
         names.append("of " + " and ".join(one["depends_on"][0]))
     return " ".join([one["outcome"], *names])
 
 
+def _joined(names: str | list[str]) -> str:
+    """Several effects in one word; those of a verdict are that already."""
+    return names if isinstance(names, str) else "+".join(names)
+
+
 def same(one: dict, other: dict) -> bool:
     """Whether two verdicts name the same; the order of alternatives means nothing."""
     return all(
-        one[key] == other[key] if key != "alternatives" else sorted(one[key]) == sorted(other[key])
+        one[key] == other[key]
+        if key != "alternatives"
+        else sorted(map(_joined, one[key])) == sorted(map(_joined, other[key]))
         for key in TOLD
     )
 

@@ -4,10 +4,14 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
+from separatrix.discovery.decision import characterise
+from separatrix.discovery.decision.decide import Decision
+from separatrix.discovery.fitting import motions
 
 SEED = 31
 # numbers of cases of the campaign's generator with one effect each, on what it depends, and its constant
@@ -43,6 +47,46 @@ def hide(source_dir, tmp_path_factory):
 def ask(case: Path, **options) -> dict:
     training = [case / "first.csv", case / "second.csv"]
     return discover(case / "base.toml", training, [case / "held_out.csv"], Options(quick=True, **options))
+
+
+@pytest.mark.parametrize(("evidence", "beside", "faults", "foremost", "outcome"), [
+    (106.5, 6.5, 0.0, "memory", "characterised"),
+    # as far ahead as one of several names has to be
+    (105.5, 6.5, 0.0, "memory", "named"),
+    # a right name leaves nothing to it
+    (106.5, 5.5, 0.0, "memory", "named"),
+    # or faults of the rig, of which it would explain a part
+    (200.0, 16.5, 12.0, "memory", "named"),
+    (200.0, 18.5, 12.0, "memory", "characterised"),
+    # a function of the catalogue would do it as well, linearised as the hidden state is
+    (106.5, 6.5, 0.0, "speed", "named"),
+])  # fmt: skip
+def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, beside, faults, foremost, outcome):
+    def one(variable: str, evidence: float = evidence) -> SimpleNamespace:
+        return SimpleNamespace(hypothesis=SimpleNamespace(depends_on=(variable,)), evidence=evidence)
+
+    fit = SimpleNamespace(reduced_chi2=1.0, excess=300.0)
+    fitted = SimpleNamespace(names=("friction_curve",), fit=fit)
+    name = SimpleNamespace(fitted=fitted, evidence=100.0, prediction=SimpleNamespace())
+    first = SimpleNamespace(base=SimpleNamespace(problem=None))
+    decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
+    monkeypatch.setattr(characterise, "_motions", lambda _, machine, told: (machine is fitted, None))
+    monkeypatch.setattr(characterise, "memories", lambda _: ["memory"])
+    monkeypatch.setattr(characterise, "evidence_of_faults", lambda *_: faults)
+    monkeypatch.setattr(
+        characterise,
+        "_best",
+        lambda named, held_out, variable: one("memory", beside if named else evidence),
+    )
+
+    def characterised(bench, gap):
+        assert (gap.outcome, gap.accepted) == ("not-in-catalogue", [])
+        return Decision("characterised", [], [], [], [first], None, None, characters=[one(foremost)])
+
+    monkeypatch.setattr(characterise, "characterised", characterised)
+    found = characterise.remembered(SimpleNamespace(options=Options()), decision)
+    assert found.outcome == outcome
+    assert bool(found.accepted) == (outcome == "named")
 
 
 @pytest.mark.parametrize("number", CASES)
@@ -94,3 +138,21 @@ def test_a_machine_without_a_gap_has_no_character(hide):
     assert verdict["outcome"] == "none"
     assert verdict["character"] == []
     assert np.isfinite(verdict["gap"]["training"]["before"])
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_spring_of_a_machine_that_cannot_be_flown_is_no_variable(monkeypatch, seen):
+    slack = np.full(motions._ANGLES.size, 0.3)
+    slack[1] = 0.3 if seen else np.nan
+    monkeypatch.setattr(motions, "_slack_places", lambda *_: slack)
+    index = np.arange(8)[None, :]
+    segments = SimpleNamespace(inside=np.ones((1, 8), bool), record=np.zeros(1, int), index=index)
+    problem = SimpleNamespace(
+        model=SimpleNamespace(parameters={"restoring.stiffness": None}),
+        segments=segments,
+        prepared=[SimpleNamespace(samples=SimpleNamespace(t=np.arange(8.0)))],
+        crank_angle=lambda number, values, t: t,
+    )
+    fit = SimpleNamespace(values=None, evaluation=SimpleNamespace(x=np.full((1, 8), 0.1)))
+    found = motions.stretches(problem, fit)
+    assert np.allclose(found, 0.2) if seen else found is None

@@ -19,6 +19,7 @@ from separatrix.discovery.decision.judge import (
 )
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
@@ -235,6 +236,28 @@ def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, forete
     assert (decide._shaped(bench, found) is not None) == foretells
 
 
+@pytest.mark.parametrize(("left", "named"), [
+    ((1.0, 1.0), True),
+    # small faults of the rig explain what it leaves
+    ((1.3, 1.0), True),
+    ((1.3, 1.2), False),
+])  # fmt: skip
+def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, left, named):
+    """It has the freedom to follow the fitted ones where the missing force is no function at all."""
+    one = judged(np.full(COUNT, 5.0), np.ones(COUNT))
+    told = Prediction(None, None, None, None, left[0], 1.0, None)
+    one = replace(one, prediction=told)
+    monkeypatch.setattr(decide, "cleaned_prediction", lambda *_: left[1])
+    monkeypatch.setattr(decide, "misses", lambda told, *_: told.fit > 1.1)
+    monkeypatch.setattr(decide, "_shaped", lambda *_: (one, []))
+    monkeypatch.setattr(
+        decide, "_conclude", lambda bench, decision, best, rivals: replace(decision, accepted=[best])
+    )
+    gap = decide.Decision("not-in-catalogue", [], [], [], [], None, None)
+    bench = SimpleNamespace(options=OPTIONS)
+    assert bool(decide._shape_alone(bench, gap, None).accepted) == named
+
+
 def excess(size: float) -> SimpleNamespace:
     """A fit of a table, and no finer one."""
     return SimpleNamespace(fitted=SimpleNamespace(fit=SimpleNamespace(excess=size), finer=None))
@@ -248,6 +271,24 @@ def test_a_table_that_left_most_of_a_gap_is_not_fitted_again():
     assert flexible._far_tables(found) == {"friction_curve"}
     tables[0][3].fitted.finer = SimpleNamespace(fit=SimpleNamespace(excess=30.0))
     assert flexible._far_tables(found) == set()
+
+
+@pytest.mark.parametrize("lost", [COUNT, COUNT // 2, 0])
+def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatch, lost):
+    """Squares of segments that it lost would pass for a gain, and its values mean nothing."""
+    base, few = (fitted(name, np.full(COUNT, size)) for name, size in (("", 100.0), ("friction_curve", 60.0)))
+    more = fitted("friction_curve", np.full(COUNT, 59.9))
+    more.fit.evaluation.failed[:lost] = True
+    made = iter([few, more, None])
+    monkeypatch.setattr(flexible, "knots_at", lambda member, seen, count: np.arange(count))
+    monkeypatch.setattr(flexible, "fit_member", lambda *_: next(made))
+    member = SimpleNamespace(seen=lambda _: None, values=("force",), knots="", effect="friction_curve")
+    found = SimpleNamespace(base=base, judged=[], foretold=None)
+    found.judge = lambda one, told: Judged(one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3)
+    bench = SimpleNamespace(options=OPTIONS, training=None, foretell=lambda *_: None)
+    best = flexible._fit_table(bench, found, member, base, True)
+    assert best.fitted is few
+    assert (few.finer is more) == (lost == 0)
 
 
 def test_more_knots_end_sooner_where_a_closed_form_is_far_ahead():
@@ -318,6 +359,59 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
     best, close = foremost(pool, OPTIONS)
     assert best.name == "quadratic_drag"
     assert [one.name for one in close] == rivals
+
+
+@pytest.mark.parametrize("better", [80.0, 20.0])
+def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better):
+    """What a set is held against must not be caught in a minimum that the set left."""
+    alone = [contender("second_barrier", 50.0), contender("sensor_gain", 40.0), contender("viscous", 30.0)]
+    led = contender("second_barrier", better)
+    names = ("second_barrier", "sensor_gain")
+    whole = replace(alone[0], fitted=replace(alone[0].fitted, names=names))
+    first = SimpleNamespace(base=None, foretold=None, judged=list(alone), rank=lambda: None)
+    asked = []
+
+    def led_by(data, one, other):
+        asked.append(one.names)
+        return led.fitted if one.names == led.fitted.names else one
+
+    monkeypatch.setattr(several, "led_by", led_by)
+    monkeypatch.setattr(several, "judged", lambda *_: led)
+    bench = SimpleNamespace(training=None, foretell=lambda *_: None)
+    part = several._led_by(bench, first, whole, alone[0])
+    assert asked == [("second_barrier",), ("sensor_gain",)]
+    assert part is (led if better > 50 else alone[0])
+    assert first.judged == [part, *alone[1:]]
+
+
+@pytest.mark.parametrize(("information", "own", "needed"), [
+    (1e-3, 1.0, True),
+    (1e3, 1.0, False),
+    # faults of the rig may be all that it explains
+    (1e-3, 0.1, False),
+])  # fmt: skip
+def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_it(
+    monkeypatch, information, own, needed
+):
+    """As of restitution in impacts of one speed, which noise makes 0.5 worse there."""
+
+    def one(*names, evidence):
+        return SimpleNamespace(
+            fitted=replace(base, names=names), evidence=evidence, prediction=SimpleNamespace()
+        )
+
+    base = fitted("", np.full(COUNT, 100.0))
+    whole = one("quadratic_drag", "restitution_slope", evidence=100.0)
+    parts = {name: one(name, evidence=20.0) for name in whole.fitted.names}
+    over = {
+        "restitution_slope": foretold(np.ones(12), np.ones(12)),
+        "quadratic_drag": foretold(np.array([*6 * [0.95], *6 * [-1.0]]), np.full(12, information)),
+    }
+    monkeypatch.setattr(several, "without", lambda *_: parts["restitution_slope"])
+    monkeypatch.setattr(several, "shares_beside_faults", lambda *_: (own, own))
+    monkeypatch.setattr(several, "over_base", lambda bench, base, *_: over[base.names[0]])
+    bench = SimpleNamespace(options=OPTIONS)
+    assert several._all_needed(bench, None, whole, parts["quadratic_drag"]) == needed
 
 
 def test_each_of_several_effects_is_held_against_its_family(monkeypatch):

@@ -16,11 +16,13 @@ from separatrix.discovery.fitting.heldout import Known, predict
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.rig import (
+    Contest,
     beside_faults,
     cleaned,
     cleaned_prediction,
+    evidence_of_faults,
     share_beside_faults,
-    share_foretold,
+    shares_beside_faults,
 )
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -73,12 +75,30 @@ def test_a_sensor_that_is_more_curved_than_rigs_are_is_a_gap():
 
 def test_an_effect_is_its_own_as_far_as_it_is_larger_than_faults_of_a_rig():
     shares = []
-    for drag in (0.01, 0.05, 0.3):
+    for drag in (0.02, 0.05, 0.3):
         base, true = fitted_base(drag=drag, curved=0.0)
         shares.append(share_beside_faults(with_drag(base, true), base))
         assert ceiling(base.problem, base.fit, 1.0).p < 1e-6 or drag < 0.05
     assert shares == sorted(shares)
     assert shares[-1] > 0.8
+
+
+@pytest.mark.parametrize(("gain", "faults", "beside", "lead"), [
+    # nothing speaks for faults: all of the gain is evidence
+    (20.0, (-12.0, -5.0, -2.0), (1.0, 2.0, 5.0), 20.0),
+    # one effect says with less what sixteen faults say too
+    (150.0, (124.0, 120.0, 97.0), (9.0, 20.0, 47.0), 26.0),
+    # the rig has faults, which say nearly all that the effect says
+    (11.0, (33.0, 30.0, 21.0), (0.3, 0.8, 2.8), 0.3),
+])  # fmt: skip
+def test_a_rig_has_faults_or_it_has_none(gain, faults, beside, lead):
+    """An effect has to beat the better of the two, and may have faults beside it itself."""
+    contest = Contest(gain, np.array(faults), np.array(beside))
+    assert contest.lead == pytest.approx(lead)
+    # that a rig has faults is known from all of its records
+    clean = Contest(5.0, np.full(3, -4.0), np.full(3, 0.1))
+    more = (contest + clean).lead - contest.lead
+    assert more < 0.2 if lead < 1 else more >= 5.0
 
 
 def test_what_is_a_fault_of_the_rig_is_no_effect():
@@ -139,5 +159,15 @@ def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_expla
         predict(held_out, one.model, one.problem.free, Known(one.fit.values, one.covariance, one.unseen))
         for one in (effect, without)
     ]
-    share = share_foretold(*told, without)
+    _, share = shares_beside_faults((effect, without), tuple(told))
     assert share > 0.6 if drag else share < 0.2
+
+
+@pytest.mark.parametrize("curved", [1e-3, 0.0])
+def test_the_evidence_of_faults_of_a_rig_is_that_of_all_records(curved):
+    base, prepared = three_records((curved, -curved, curved))
+    fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
+    known = Known(fitted.fit.values, fitted.covariance, fitted.unseen)
+    told = predict(gather(prepared[2:], 1.0, None), base, fitted.problem.free, known)
+    evidence = evidence_of_faults(fitted, told)
+    assert evidence > 100 if curved else evidence < 3

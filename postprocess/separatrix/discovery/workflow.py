@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.discovery.decision.added import with_law
-from separatrix.discovery.decision.characterise import characterised
+from separatrix.discovery.decision.characterise import characterised, remembered
 from separatrix.discovery.decision.decide import decide
 from separatrix.discovery.decision.partial import decide_in_part, nearest
 from separatrix.discovery.decision.rounds import Bench
@@ -79,7 +79,7 @@ def investigate(
     if options.partial:
         decision = decide_in_part(bench, fitted)
     else:
-        decision = decide(bench, fitted)
+        decision = remembered(bench, decide(bench, fitted))
         decision.reasons += nearest(bench, decision)
         options.progress("asking what the rest of the gap depends on", 0.9)
         decision = with_law(bench, characterised(bench, decision))

@@ -12,12 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from separatrix.discovery.decision.decide import Decision
-from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, motion_of
+from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, memories, motion_of
 from separatrix.discovery.decision.joint_hypotheses import hypotheses_at, motion_at
 from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
+from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.rig import evidence_of_faults
 from separatrix.discovery.fitting.sensed import SensedData
 
 # least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
@@ -86,8 +89,7 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
         training, held_out = motion_at(base, bench.training), motion_at(foretold, bench.held_out)
         tried = hypotheses_at(training)
     else:
-        natural = _natural_frequency(bench)
-        training, held_out = (motion_of(one, bench.scales.mass, natural) for one in (base, foretold))
+        training, held_out = _motions(bench, base, foretold)
         tried = hypotheses(training)
     found = [_best(training, held_out, one) for one in tried]
     best = max(found, key=lambda one: one.evidence)
@@ -99,6 +101,47 @@ def characterised(bench: Bench, decision: Decision) -> Decision:
         if (close or _akin(one, best)) and one.hypothesis.depends_on != best.hypothesis.depends_on:
             others.setdefault(one.hypothesis.depends_on, one)
     return replace(decision, outcome="characterised", characters=[best, *others.values()])
+
+
+def remembered(bench: Bench, decision: Decision) -> Decision:
+    """The decision without its names where a hidden state explains clearly more than they do.
+
+    It is no effect of the catalogue, and what it does a function of speed, place or phase does in part. A
+    right name leaves nothing to it: it has to explain more beside the names too, and than faults of a rig.
+    """
+    base, foretold = decision.rounds[0].base, decision.foretold
+    if not decision.accepted or foretold is None or foretold.fit.excess <= 0:
+        return decision
+    if bench.options.quick or isinstance(base.problem, CoordinateProblem):
+        return decision
+    training, held_out = _motions(bench, base, foretold)
+    best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
+    name = decision.accepted[0]
+    if name.prediction is None:
+        return decision
+    faults = evidence_of_faults(name.fitted, name.prediction)
+    least = bench.options.needed * bench.options.separation
+    lead = best.evidence - name.evidence / max(1.0, name.fitted.fit.reduced_chi2) - faults
+    if lead < least:
+        return decision
+    beside = _best(*_motions(bench, name.fitted, name.prediction), best.hypothesis)
+    if beside.evidence - faults < least:
+        return decision
+    gap = replace(
+        decision, outcome="not-in-catalogue", accepted=[], alternatives=[], rivals=[], equivalent=False
+    )
+    told = characterised(bench, gap)
+    if not told.characters or told.characters[0].hypothesis.depends_on != best.hypothesis.depends_on:
+        return decision
+    said = f"a hidden state explains more than {' and '.join(name.fitted.names)} (log-likelihood {lead:.3g})"
+    return replace(told, reasons=[said])
+
+
+def _motions(bench: Bench, base: Fitted, foretold: Prediction) -> tuple[Motion, Motion]:
+    """The motion of one body in training and on held-out records."""
+    natural = _natural_frequency(bench)
+    training, held_out = (motion_of(one, bench.scales.mass, natural) for one in (base, foretold))
+    return training, held_out
 
 
 def _known(best: Character, bench: Bench) -> bool:

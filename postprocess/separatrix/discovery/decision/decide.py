@@ -120,12 +120,15 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
         return _give_up(bench, decision, best)
-    rounds = list(decision.rounds)
+    rounds, before = list(decision.rounds), list(found.judged)
     *more, closed = with_more(bench, rounds, best)
+    alone = None if closed else _led_alone(bench, found, before)
+    if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
+        return _conclude(bench, decision, *alone)
     if shaped is not None:
         # a table for each direction says what a law over the speed and one of the direction say with less
         closed = closed and more[0].evidence > shaped[0].evidence
-        if not closed:
+        if not closed and not _only_follows(bench, shaped[0]):
             return _conclude(bench, decision, *shaped)
     decision.rounds = rounds
     if closed:
@@ -138,6 +141,14 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     return _give_up(bench, decision, best)
 
 
+def _led_alone(bench: Bench, found: Round, before: list[Judged]) -> tuple[Judged, list[Judged]] | None:
+    """An effect alone that closes the gap since several led it out of a wrong minimum, and its rivals."""
+    if all(any(one is other for other in before) for one in found.judged):
+        return None
+    best, rivals = _lead(bench, found)
+    return (best, rivals) if _detected(best) and best.gates["adequate"] else None
+
+
 def _with_more_foretold(
     bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]
 ) -> tuple[Judged, list[Judged]]:
@@ -148,7 +159,7 @@ def _with_more_foretold(
     told = best.prediction
     if told is None or bench.options.quick or bench.options.most_effects < 2 or best.leaves != NOISE:
         return best, rivals
-    if not misses(told, best.fitted.fit, bench.options):
+    if not _only_follows(bench, best):
         return best, rivals
     rounds = list(decision.rounds)
     whole, others, closed = with_more(bench, rounds, best)
@@ -163,7 +174,7 @@ def _with_more_foretold(
 def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
     """A family as a function where none of its closed forms, nor any other effect, stands out of chance."""
     shaped = _shaped(bench, found) if decision.outcome == "not-in-catalogue" else None
-    if shaped is None:
+    if shaped is None or _only_follows(bench, shaped[0]):
         return decision
     decision.reasons.clear()
     return _conclude(bench, decision, *shaped)
@@ -198,6 +209,18 @@ def _of_several(bench: Bench, one: Judged) -> bool:
     if bench.options.quick or one.prediction is None:
         return _of_two_directions(one)
     return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, bench.options)
+
+
+def _only_follows(bench: Bench, one: Judged) -> bool:
+    """Whether a machine follows fitted records, as a function has the freedom to, and misses held-out ones.
+
+    What faults of a rig may explain of those is taken off.
+    """
+    told = one.prediction
+    if told is None or not misses(told, one.fitted.fit, bench.options):
+        return False
+    told = replace(told, fit=cleaned_prediction(one.fitted, told))
+    return misses(told, one.fitted.fit, bench.options)
 
 
 def _of_two_directions(one: Judged) -> bool:

@@ -110,6 +110,9 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
             if made is None:
                 break
             bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
+            if made.fit.good.sum() < bench.options.followed * found.base.fit.good.sum():
+                # what it lost would pass for a gain
+                continue
             if not made.fit.converged:
                 # more knots than these records can tell apart, no function, or one far from its shape yet
                 if best is not None and made.fit.total < best.fitted.fit.total + WORSE:

@@ -23,7 +23,7 @@ from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import share_beside_faults, share_foretold
+from separatrix.discovery.fitting.rig import share_beside_faults, shares_beside_faults
 from separatrix.discovery.options import Options
 
 
@@ -56,9 +56,11 @@ def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]
 def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
     """Set the p value of a candidate and every gate but the adequacy."""
     options = bench.options
-    best.own = share_beside_faults(best.fitted, base)
-    if best.prediction is not None and best.foretold is not None:
-        best.own_foretold = share_foretold(best.prediction, best.foretold, base)
+    if best.prediction is None or best.foretold is None:
+        best.own = share_beside_faults(best.fitted, base)
+    else:
+        told = (best.prediction, best.foretold)
+        best.own, best.own_foretold = shares_beside_faults((best.fitted, base), told)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.settled
     best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)

@@ -114,7 +114,7 @@ def hypotheses(training: Motion) -> Iterator[Hypothesis]:
     """All that are tried; knots and scales are those of the training records."""
     yield from _smooth(training)
     yield from _times(training)
-    yield from _memories(training)
+    yield from memories(training)
     if training.problem.in_force:
         yield _after_turning(training)
         yield Hypothesis(
@@ -138,7 +138,13 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
     yield _function(("place",), lambda m: splines(m.x, over_x, m.good))
     if training.spring is not None:
         over_s = knots_of(training.spring[training.good], 7)
-        yield _function(("stretch",), lambda m: splines(m.spring, over_s, m.good))
+
+        def stretched(m: Motion) -> np.ndarray:
+            # of records whose machine cannot be asked nothing is foretold
+            known = m.good if m.spring is not None else np.zeros_like(m.good)
+            return splines(m.x if m.spring is None else m.spring, over_s, known)
+
+        yield _function(("stretch",), stretched)
     yield _function(
         ("speed", "place"), lambda m: _products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
     )
@@ -168,7 +174,7 @@ def _times(training: Motion) -> Iterator[Hypothesis]:
         )  # fmt: skip
 
 
-def _memories(training: Motion) -> Iterator[Hypothesis]:
+def memories(training: Motion) -> Iterator[Hypothesis]:
     """Hidden states: one that relaxes, one that is late, a mass on a spring of its own."""
     period = 2 * np.pi / training.natural
     yield Hypothesis(

@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
-from separatrix.discovery.decision.judge import Judged, admissible, judged
+from separatrix.discovery.decision.judge import Judged, admissible, beyond_doubt, judged
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.refit import Fitted, hopeless, refit
+from separatrix.discovery.fitting.refit import Fitted, hopeless, led_by, refit
+from separatrix.discovery.fitting.rig import shares_beside_faults
 from separatrix.discovery.fitting.screen import screen, signature
 
 _PAIRS = 6
@@ -42,6 +43,8 @@ def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, 
             larger, close = choice(bench, first.base, first.foretold, [*grown, *swapped], foremost)
         pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
         judge_ceiling(bench, larger)
+        if larger.gates["adequate"]:
+            found = _led_by(bench, first, larger, found)
         larger.gates["drop"] = _all_needed(bench, first, larger, found)
         if larger.gates["adequate"] and larger.gates["drop"]:
             return larger, close, True
@@ -98,24 +101,58 @@ def _closes_most(before: Judged, after: Judged) -> bool:
     return all(share is None or share > _CLOSES for share in shares)
 
 
+def _led_by(bench: Bench, first: Round, whole: Judged, part: Judged) -> Judged:
+    """Let each effect alone, and `part` of a set, follow the set that closes the gap; return that part.
+
+    What a set is held against must not be in a minimum that the set left. Those alone are put into the round.
+    """
+    for place, one in enumerate(first.judged):
+        if one.name in whole.fitted.names:
+            first.judged[place] = _followed(bench, first, whole, one)
+    first.rank()
+    if len(part.fitted.names) > 1:
+        return _followed(bench, first, whole, part)
+    return next((one for one in first.judged if one.name == part.name), part)
+
+
+def _followed(bench: Bench, first: Round, whole: Judged, one: Judged) -> Judged:
+    """A part of a set from where the set ended, if there is more evidence of it."""
+    better = led_by(bench.training, one.fitted, whole.fitted)
+    if better is one.fitted:
+        return one
+    found = judged(first.base, first.foretold, better, bench.foretell(better, whole.prediction))
+    return found if found.evidence > one.evidence else one
+
+
 def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool:
-    """Whether each effect of a set is worth it over the set without it, on held-out records too."""
+    """Whether each effect of a set is worth it over the set without it, on held-out records too, as far as
+    those say anything of it."""
     least = bench.options.needed * bench.options.separation
     for name in whole.fitted.names:
         if set(part.fitted.names) == {*whole.fitted.names} - {name}:
             other: Judged | None = part
         else:
             other = without(bench, first, name, whole.fitted.names)
+            if other is not None and len(other.fitted.names) > 1 and whole.gates.get("adequate", False):
+                other = _followed(bench, first, whole, other)
         if other is None:
             # it cannot be fitted
             continue
         if whole.evidence - other.evidence < least:
             return False
         if whole.prediction is not None and other.prediction is not None:
-            over = judged(other.fitted, other.prediction, whole.fitted, whole.prediction)
-            if over.held_out <= 0:
+            over = over_base(bench, other.fitted, other.prediction, whole)
+            if over.held_out <= 0 and not beyond_doubt(over, other.fitted, bench.options):
+                return False
+            if _beside_faults(over, other) < least:
                 return False
     return True
+
+
+def _beside_faults(over: Judged, other: Judged) -> float:
+    """Evidence of what a set has more than a part of it, against that part with faults of a rig, too."""
+    own, own_foretold = shares_beside_faults((over.fitted, other.fitted), (over.prediction, other.prediction))
+    return own * over.training + own_foretold * max(0.0, over.held_out) - over.parameters
 
 
 def without(bench: Bench, first: Round, name: str, names: Iterable[str]) -> Judged | None:

@@ -41,7 +41,7 @@ def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
 
 
 def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
-    """Stretch of the spring at the samples [m]; None where there is no linear spring."""
+    """Stretch of the spring at the samples [m]; None where there is no linear spring that can be asked."""
     if "restoring.stiffness" not in problem.model.parameters:
         return None
     found = np.zeros(problem.segments.inside.shape)
@@ -50,7 +50,10 @@ def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
         if not rows.size:
             continue
         stamps = prepared.samples.t[problem.segments.index[rows]]
-        where = CubicSpline(_ANGLES, _slack_places(problem, fit, number), bc_type="periodic")
+        slack = _slack_places(problem, fit, number)
+        if not np.isfinite(slack).all():
+            return None
+        where = CubicSpline(_ANGLES, slack, bc_type="periodic")
         angle = np.mod(problem.crank_angle(number, fit.values, stamps), 2 * np.pi)
         found[rows] = where(angle) - fit.evaluation.x[rows]
     return found
@@ -59,7 +62,8 @@ def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
 def _slack_places(problem: Problem, fit: Fit, number: int) -> np.ndarray:
     """Places at which the spring pulls nothing [m], at the crank angles `_ANGLES` of a record.
 
-    From the force on a body in the middle of the motion when only the spring acts.
+    From the force on a body in the middle of the motion when only the spring acts; no numbers where the
+    machine cannot be flown there.
     """
     model, x = problem.model, float(np.median(fit.evaluation.x[problem.segments.inside]))
     values = problem.machine_values(number, fit.values)

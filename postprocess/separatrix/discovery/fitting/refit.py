@@ -291,6 +291,11 @@ def in_place_of(data: Data, one: Fitted, other: Fitted, candidate: Candidate) ->
     return _from(data, found, sized.values, other)
 
 
+def led_by(data: Data, one: Fitted, other: Fitted) -> Fitted:
+    """A fit tried again from the end of a machine that contains it; the better of both."""
+    return _from(data, one, shared_values(one, other), other)
+
+
 def _from(data: Data, one: Fitted, values: np.ndarray, other: Fitted) -> Fitted:
     """The better of a fit and another from given values and the starts of another machine."""
     fit = minimise(one.problem, values, other.fit.starts, most=15)

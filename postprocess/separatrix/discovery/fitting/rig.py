@@ -22,13 +22,16 @@ from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, 
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
 from separatrix.discovery.fitting.response import force_columns, sample_times
-from separatrix.discovery.fitting.screen import project
 
 _POWERS = (2, 3)
 _HARMONICS = 6
 # standard deviations that a fault may have, and by which factors its prior is made narrower for that
 _LARGEST = 3.0
 _NARROWER, _NARROWEST = 4.0, 1e15
+# precisions over that of the prior: faults of half and of a quarter of its size are as usual
+_SIZES = (1.0, 4.0, 16.0)
+# least eigenvalue of scaled equations that says something
+_SHOWN = 1e-11
 
 
 def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
@@ -187,41 +190,136 @@ def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -
     return found[0] - found[1]
 
 
-def share_foretold(one: Prediction, other: Prediction, base: Fitted) -> float:
-    """The same of what is foretold; the other machine, `base`, is known as training records know it."""
-    beside = _shared(base)
-    without = Beside(np.zeros(beside.shift.size), other.covariance)
-    return share_beside_faults(one, other, (without, beside))
+@dataclass(frozen=True)
+class Contest:
+    """A machine against another one that may have faults of a rig, linearised, in units of log-likelihood.
 
-
-def share_beside_faults(
-    one: Fitted | Prediction, other: Fitted | Prediction, known: tuple[Beside, Beside] | None = None
-) -> float:
-    """Share of what one machine explains of what another leaves over that faults of a rig do not.
-
-    Linearised, the parameters of the other machine fitted beside them; those that held-out records do not
-    tell as they are `known` without and beside faults.
+    `gain`: what it explains of what the other one leaves over. For each usual size of faults, `faults`: the
+    evidence of the other one with them over without them, and `beside`: what the machine explains then.
     """
+
+    gain: float
+    faults: np.ndarray
+    beside: np.ndarray
+
+    def __add__(self, other: "Contest") -> "Contest":
+        """Of two groups of records of one rig."""
+        return Contest(self.gain + other.gain, self.faults + other.faults, self.beside + other.beside)
+
+    @property
+    def lead(self) -> float:
+        """Evidence of the machine over the other one: a rig has faults of one size or it has none."""
+        return max(self.gain, float(np.max(self.faults + self.beside))) - max(0.0, float(self.faults.max()))
+
+
+def share_beside_faults(one: Fitted, other: Fitted) -> float:
+    """Share of what one machine explains of what another leaves over that is evidence against faults too."""
+    return _share(_contest(one, other))
+
+
+def shares_beside_faults(
+    fitted: tuple[Fitted, Fitted], told: tuple[Prediction, Prediction]
+) -> tuple[float, float]:
+    """The same in training, and of what two machines foretell: one rig made all the records."""
+    training, held_out = _contest(*fitted), _foretold_contest(told, fitted[1])
+    return _share(training), _share(held_out, training)
+
+
+def evidence_of_faults(fitted: Fitted, told: Prediction) -> float:
+    """Evidence that a rig has faults where a machine is right but for them; 0 if nothing speaks for them."""
+    both = _contest(fitted, fitted) + _foretold_contest((told, told), fitted)
+    return max(0.0, float(both.faults.max()))
+
+
+def _foretold_contest(told: tuple[Prediction, Prediction], other: Fitted) -> Contest:
+    """Of what they foretell; the other one is known as training records know it, without or beside faults."""
+    beside = _shared(other)
+    without = Beside(np.zeros(beside.shift.size), told[1].covariance)
+    return _contest(*told, (without, beside))
+
+
+def _share(new: Contest, known: Contest | None = None) -> float:
+    """Share of a gain that is evidence, on top of what is known."""
+    if new.gain <= 0:
+        return 1.0
+    lead = new.lead if known is None else (new + known).lead - known.lead
+    return float(np.clip(lead / new.gain, 0.0, 1.0))
+
+
+def _contest(
+    one: Fitted | Prediction, other: Fitted | Prediction, known: tuple[Beside, Beside] | None = None
+) -> Contest:
+    """Hold a machine against another one whose parameters are `known` without and beside faults, or free."""
     evaluation, both = other.fit.evaluation, common(one, other)
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
     faults = fault_columns(other.problem, other.fit)
     p, q = evaluation.by_parameter.shape[2], faults.shape[2]
     columns = np.concatenate([evaluation.by_parameter, faults, moved], axis=2)
-    weights = evaluation.used * both[:, None]
+    misfit = one.misfit if isinstance(one, Prediction) else max(1.0, one.fit.reduced_chi2)
+    weights = evaluation.used * both[:, None] / misfit
     reduced, _, _ = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))
-    gains = []
-    for place, kept in enumerate((np.r_[:p, p + q], np.r_[: p + q + 1])):
-        matrix, gradient = reduced.total()
-        matrix, gradient = matrix[np.ix_(kept, kept)], gradient[kept]
-        open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(kept.size - p - 1, bool)]
+    open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(q + 1, bool)]
+    equations = _Evidence(*reduced.total(), open_, p)
+    without, beside = known or (None, None)
+    prior = equations.narrowest(beside)
+    plain = equations.of(without, None)
+    tried = [equations.of(beside, prior * narrower) for narrower in _SIZES]
+    return Contest(
+        plain[1], np.array([told - plain[0] for told, _ in tried]), np.array([gain for _, gain in tried])
+    )
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """Normal equations of p parameters, of faults, and of what another machine explains, which is last."""
+
+    matrix: np.ndarray
+    gradient: np.ndarray
+    open_: np.ndarray
+    p: int
+
+    def narrowest(self, known: Beside | None) -> float:
+        """Precision of faults with which none is larger than such faults are."""
+        matrix, gradient, open_ = self._known(known)
+        inner = matrix[:-1, :-1]
+        bounded = _bounded(inner, gradient[:-1], self.p, open_[:-1])
+        return float(np.max(np.diag(bounded - inner)))
+
+    def of(self, known: Beside | None, prior: float | None) -> tuple[float, float]:
+        """Log evidence (up to a constant) with faults of a precision, or none; what is explained then."""
+        matrix, gradient, open_ = self._known(known)
+        kept = np.ones(gradient.size, bool)
+        logarithm = _surprise(known)
+        if prior is None:
+            kept[self.p : -1] = False
+        else:
+            matrix[self.p : -1, self.p : -1] += prior * np.eye(gradient.size - 1 - self.p)
+            logarithm += (gradient.size - 1 - self.p) * np.log(prior)
+        kept &= open_
+        machine = kept & (np.arange(kept.size) < kept.size - 1)
+        found = [0.5 * gradient @ solve_scaled(matrix, gradient, which) for which in (machine, kept)]
+        spread = 0.5 * (_log_determinant(matrix, machine) - logarithm)
+        return float(found[0] - spread), float(found[1] - found[0])
+
+    def _known(self, known: Beside | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        matrix, gradient, open_ = self.matrix.copy(), self.gradient.copy(), self.open_.copy()
         if known is not None:
-            known[place].add_to(matrix, gradient, open_)
-        matrix[:-1, :-1] = _bounded(matrix[:-1, :-1], gradient[:-1], p, open_)
-        gains.append(_gain(*project(matrix, gradient, kept.size - 1, open_)))
-    without, beside = gains
-    return float(np.clip(beside / without, 0.0, 1.0)) if without > 0 else 1.0
+            known.add_to(matrix, gradient, open_)
+        return matrix, gradient, open_
 
 
-def _gain(left: np.ndarray, score: np.ndarray) -> float:
-    size = left[0, 0]
-    return float(score[0] ** 2 / size) if size > 0 else 0.0
+def _surprise(known: Beside | None) -> float:
+    """Logarithm of the precision with which parameters are known, less the square of where they are."""
+    if known is None:
+        return 0.0
+    seen = np.diag(known.covariance) > 0
+    precision = _inverse(known.covariance, seen)
+    return _log_determinant(precision, seen) - float(known.shift @ precision @ known.shift)
+
+
+def _log_determinant(matrix: np.ndarray, open_: np.ndarray) -> float:
+    """Of the open unknowns that are shown, without directions that nothing is known of."""
+    shown = open_ & (np.diag(matrix) > 0)
+    size = np.sqrt(np.diag(matrix)[shown])
+    values = np.linalg.eigvalsh(matrix[np.ix_(shown, shown)] / np.outer(size, size))
+    return float(np.log(np.maximum(values, _SHOWN)).sum() + 2 * np.log(size).sum())
