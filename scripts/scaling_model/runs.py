@@ -80,7 +80,9 @@ class Program:
     def command(self, ranks: int, name: str, case: Path, *words: object) -> tuple[list[str], Path]:
         """Return the command of a basin map under mpirun, and its file."""
         path = self.folder / f"{name}.h5"
-        command = ["mpirun", "-n", ranks, self.program, "basin", case, "-o", path, "--force", "-q", *words]
+        # two programs of one rank would both be bound to the first core
+        start = ["mpirun", "--bind-to", "none", "-n", ranks]
+        command = [*start, self.program, "basin", case, "-o", path, "--force", "-q", *words]
         return [str(word) for word in command], path
 
     def start(self, ranks: int, name: str, case: Path, *words: object) -> subprocess.Popen:
