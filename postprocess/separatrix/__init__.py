@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from separatrix.orbits import Stability as Stability
     from separatrix.orbits import branches as branches
     from separatrix.orbits import stability as stability
+    from separatrix.orbits import stability_of_map as stability_of_map
 
 _HOME = {
     "Case": "separatrix.cases",
@@ -63,6 +64,7 @@ _HOME = {
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
     "stability": "separatrix.orbits",
+    "stability_of_map": "separatrix.orbits",
     "survival": "separatrix.measuring.survival",
     "sweep": "separatrix.maps",
     "table": "separatrix.open",

@@ -49,7 +49,7 @@ def boundary(
         target = (Path(folder) / "boundary.h5" if output is None else Path(output).expanduser()).absolute()
         if output is not None and target.exists() and not overwrite:
             raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", CANNOT_CREATE)
-        source = _file(basins, Path(folder), ranks, progress)
+        source = file_of_map(basins, Path(folder), "boundary", ranks, progress)
         command = ["boundary", str(source), "-o", str(target), "--json"]
         command += [] if grow is None else ["--grow", str(float(grow))]
         command += ["--force"] if overwrite else []
@@ -60,14 +60,20 @@ def boundary(
             return kept_in_memory(result)
 
 
-def _file(
-    basins: xr.Dataset | str | Path, folder: Path, ranks: int | None, progress: bool | Report | None
+def file_of_map(
+    basins: xr.Dataset | str | Path,
+    folder: Path,
+    command: str,
+    ranks: int | None,
+    progress: bool | Report | None,
 ) -> Path:
-    """The file of a map; of one in memory that of the same run once more."""
+    """Return the file of a map for a command; of one in memory that of the same run once more, in `folder`."""
     if not isinstance(basins, xr.Dataset):
         return Path(basins).expanduser().absolute()
     if basins.attrs.get("kind") != "basin":
-        raise SeparatrixError(f"boundary: found a {basins.attrs.get('kind')}, allowed a map of basins", USAGE)
+        raise SeparatrixError(
+            f"{command}: found a {basins.attrs.get('kind')}, allowed a map of basins", USAGE
+        )
     source = basins.encoding.get("source")
     if source and Path(source).is_file():
         return Path(source)

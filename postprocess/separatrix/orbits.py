@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`branches` of periodic orbits over a parameter, and `stability` of one motion."""
+"""`branches` of periodic orbits over a parameter, `stability` of one motion and of those of a map."""
 
 import math
 import tempfile
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from separatrix.boundaries import file_of_map
 from separatrix.cases import Case, as_case, linspace, toml
 from separatrix.errors import CANNOT_CREATE, INTERNAL, USAGE, SeparatrixError
 from separatrix.maps import kept_in_memory, with_axes
@@ -17,7 +18,7 @@ from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.runner import run_at_once
 
-__all__ = ["Stability", "branches", "stability"]
+__all__ = ["Stability", "branches", "stability", "stability_of_map"]
 
 # What the program names by its options.
 _IN_PYTHON = {
@@ -38,8 +39,8 @@ class Stability:
     """
 
     motion: str = "not_known"
-    exponents: tuple[float, float] = (math.nan, math.nan)
-    errors: tuple[float, float] = (math.nan, math.nan)
+    exponents: tuple[float, ...] = (math.nan, math.nan)
+    errors: tuple[float, ...] = (math.nan, math.nan)
     sum_found: float = math.nan
     sum_exact: float = math.nan
     zero_one: float = math.nan
@@ -142,6 +143,50 @@ def stability(
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         _run("stability", case, Path(folder), options, False, events.append)
     return _stability(events)
+
+
+def stability_of_map(
+    basins: xr.Dataset | str | Path,
+    *,
+    periods: int | None = None,
+    progress: bool | Report | None = None,
+) -> dict[int, Stability]:
+    """Return, by attractor, what kind of motion each one of a map is that has no known period.
+
+    Parameters
+    ----------
+    basins
+        The map: its file, or the result of `basin` or `open_result`. One that is in memory only is computed
+        once more, into a temporary file.
+    periods
+        Drive periods watched, after a quarter as many, 64 or more; 20000 if not given.
+    progress
+        As for `basin`, where the map has to be computed. Ctrl-C is a KeyboardInterrupt.
+    """
+    events: list[dict] = []
+    with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
+        command = ["stability", str(file_of_map(basins, Path(folder), "stability", None, progress)), "--json"]
+        command += [] if periods is None else ["--periods", str(periods)]
+        with Progress(False) as told:
+            run_at_once(command, told, rename=_IN_PYTHON, take=events.append)
+    return {event["attractor"]: _entry(event) for event in events if event.get("event") == "entry"}
+
+
+def _entry(event: dict) -> Stability:
+    """One attractor of a map."""
+    values = event.get("exponents") or ()
+    return Stability(
+        motion=str(event["type"]),
+        exponents=tuple(-math.inf if one is None else one for one in values) or Stability.exponents,
+        errors=tuple(math.nan if one is None else one for one in event.get("errors") or ())
+        or Stability.errors,
+        sum_found=event.get("sum", math.nan),
+        sum_exact=event.get("exact_sum", math.nan),
+        zero_one=event.get("zero_one", math.nan),
+        periods=event.get("periods", 0),
+        impacts=event.get("impacts", 0),
+        report=str(event["message"]),
+    )
 
 
 def _ends(name: str, given: tuple[float, float]) -> linspace:

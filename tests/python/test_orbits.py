@@ -108,3 +108,20 @@ def test_stability_is_that_of_the_program(source_dir: Path, separatrix: Path, tm
     with pytest.raises(sx.CaseError, match=r"^start.x0=1.0: key 'start.x0': found"):
         sx.stability(case, x0=1.0)
     assert sx.stability(source_dir / "examples" / "pair_backlash.toml", periods=500).impacts > 0
+
+
+def test_motions_of_a_map_without_a_period_have_a_kind(source_dir: Path, separatrix: Path) -> None:
+    case = sx.load(source_dir / "examples" / "validation" / "budd_dux.toml").with_(contact__upper=0.0)
+    small = {"x0": (-3, 0, 4), "v0": (-1, 1, 4)}
+    found = sx.stability_of_map(sx.basin(case, **small, progress=False), periods=5000)
+    assert [one.motion for one in found.values()] == ["chaotic"]
+    (one,) = found.values()
+    assert one.sum_found == pytest.approx(one.sum_exact, abs=1e-8)
+    assert one.exponents[0] > 10 * one.errors[0]
+    assert "attractor 1: chaotic" in str(one)
+    periodic = sx.basin(
+        source_dir / "examples" / "basin_coulomb.toml", x0=(0, 1, 3), v0=(-1, 1, 3), progress=False
+    )
+    assert sx.stability_of_map(periodic) == {}
+    with pytest.raises(sx.SeparatrixError, match="^stability: found a branches, allowed a map"):
+        sx.stability_of_map(sx.branches(case, "contact.upper", 0, 0.01, searches=1, progress=False))
