@@ -67,7 +67,10 @@ def file_of_map(
     ranks: int | None,
     progress: bool | Report | None,
 ) -> Path:
-    """Return the file of a map for a command; of one in memory that of the same run once more, in `folder`."""
+    """Return the file of a map for a command.
+
+    Of one in memory that of the same run once more, in `folder`.
+    """
     if not isinstance(basins, xr.Dataset):
         return Path(basins).expanduser().absolute()
     if basins.attrs.get("kind") != "basin":
