@@ -67,7 +67,7 @@ contains
     end if
     goes_on = here(1)%label /= label_stiction
     if (goes_on) call change_all(at, passed, changed, goes_on)
-    beyond%now%orbit = changed
+    if (goes_on) beyond%now%orbit = changed
     if (goes_on) call enter_sequence(family, at, trace%step, beyond, goes_on)
     ! An orbit of a shorter period near by is not what goes on there.
     if (goes_on) goes_on = .not. is_repeated(beyond)

@@ -4,6 +4,7 @@
 !> Segments of one body, and those of its neighbours, many at once: machine by machine the segments are in lanes. What a lane
 !> leaves to the event loop flies there with all its neighbours.
 module segments_in_lanes
+  use contact_law, only: barrier_positions
   use fleet, only: prepare_flow
   use kinds, only: wp
   use lane_sampling, only: can_sample, sample_in_lanes, sampled_t
@@ -66,11 +67,12 @@ contains
     integer, allocatable :: which(:), offset(:)
     real(wp), allocatable :: instants(:)
     integer :: i, k
+    if (.not. any(asked)) return
     call prepare_flow(moving, flow)
     asked = asked .and. can_sample(flow)
     which = pack([(i, i=1, size(asked))], asked)
     if (size(which) == 0) return
-    allocate (states(size(which)), sampled(size(which)), offset(size(which) + 1), instants(0))
+    allocate (states(size(which)), sampled(size(which)), offset(size(which) + 1))
     offset(1) = 0
     do k = 1, size(which)
       associate (from => start(:, which(k)), machine => moving%machine)
@@ -78,7 +80,10 @@ contains
       end associate
       offset(k + 1) = offset(k) + first(which(k) + 1) - first(which(k))
     end do
-    instants = [(times(first(which(k)) + 1:first(which(k) + 1)), k=1, size(which))]
+    allocate (instants(offset(size(which) + 1)))
+    do k = 1, size(which)
+      instants(offset(k) + 1:offset(k + 1)) = times(first(which(k)) + 1:first(which(k) + 1))
+    end do
     call sample_in_lanes(flow, states, offset, instants, sampled)
     do k = 1, size(which)
       asked(which(k)) = sampled(k)%flown
@@ -92,6 +97,7 @@ contains
     type(state_t), intent(in) :: state
     type(sampled_t), intent(in) :: sampled
     type(flight_t), intent(inout) :: flight
+    real(wp) :: barriers(2)
     flight%reason = 0
     flight%origin = state%time
     flight%count = sampled%impacts
@@ -103,11 +109,10 @@ contains
     flight%x_max = maxval([state%x, sampled%x])
     flight%x_min = minval([state%x, sampled%x])
     ! Between samples a body turns round no nearer to a barrier than that.
-    associate (contact => moving%machine%contact, margin => sampled%grazing_margin)
-      associate (upper => min(contact%upper, contact%soft_upper), lower => max(contact%lower, contact%soft_lower))
-        if (upper < huge(upper)) flight%x_max = max(flight%x_max, upper - margin)
-        if (lower > -huge(lower)) flight%x_min = min(flight%x_min, lower + margin)
-      end associate
+    barriers = barrier_positions(moving%machine%contact)
+    associate (margin => sampled%grazing_margin)
+      if (barriers(1) < huge(margin)) flight%x_max = max(flight%x_max, barriers(1) - margin)
+      if (barriers(2) > -huge(margin)) flight%x_min = min(flight%x_min, barriers(2) + margin)
     end associate
   end subroutine describe
 

@@ -32,10 +32,11 @@ int separatrix_lane_width(void) {
   return 2;
 }
 
-void separatrix_lane_sizes(size_t *machine, size_t *regions, size_t *batch) {
+void separatrix_lane_sizes(size_t *machine, size_t *regions, size_t *batch, size_t *impacts) {
   *machine = sizeof(lane_machine);
   *regions = sizeof(lane_regions);
   *batch = sizeof(lane_batch);
+  *impacts = most_impacts * impact_rows * sizeof(double);
 }
 
 void separatrix_fly_lanes(int width, const lane_machine *machine, const lane_regions *regions,

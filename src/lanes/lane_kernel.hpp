@@ -378,7 +378,8 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
   lane_group g;
   lane_modes f(m);
   load<true>(batch, first, g);
-  f.enter((g.status == lane_fresh) | (g.status == lane_flying), g);
+  // Idle lanes, too: what they hold is evaluated with the others.
+  f.enter(~mask{}, g);
   begin_flight<true, false>(f, g);
   mask flying = g.status == lane_flying, sent = flying;
   vec limit = 1e300;

@@ -125,7 +125,7 @@ private:
   int64_t *impacts[vec_size], *taken[vec_size];
   // Time of the next sample, by lane.
   double next[vec_size], *step_count;
-  vec upcoming, steps, released_at = for_ever, surface, last;
+  vec upcoming, steps, released_at = for_ever, surface = {}, last;
 
   LANE_LEAF void to_array(const vec &from, double (&to)[vec_size]) { memcpy(to, &from, sizeof to); }
 };

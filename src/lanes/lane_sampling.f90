@@ -5,7 +5,8 @@
 !> kernel is C++: `lane_samples.hpp`).
 module lane_sampling
   use kinds, only: wp
-  use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_fresh, lane_stopped, machine_t
+  use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_fresh, lane_stopped, impact_rows, &
+    machine_t, most_impacts
   use lanes, only: occupy_lane, take_counts
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
@@ -14,8 +15,6 @@ module lane_sampling
 
   public :: can_sample, sample_in_lanes
 
-  !> Impacts that are kept of a flight.
-  integer, parameter, public :: most_impacts = 16
   !> Flights, and steps of series, after which a body is left to the event loop.
   real(wp), parameter :: most_flights = 4000, most_steps = 20000
 
@@ -27,7 +26,7 @@ module lane_sampling
     integer :: impacts = 0
     !> By impact: time [s, on the clock of the start], speeds before and after [m/s] (after a soft contact: when it ends, not a
     !> number if it lasts), +1 upper or -1 lower barrier.
-    real(wp) :: impact(4, most_impacts) = 0
+    real(wp) :: impact(impact_rows, most_impacts) = 0
     !> Smallest distance to a barrier at a turning point that missed it [m].
     real(wp) :: grazing_margin = huge(1.0_wp)
   end type sampled_t
@@ -35,7 +34,7 @@ module lane_sampling
   interface
     pure subroutine separatrix_sample_lanes(width, machine, batch, most, count, times, taken, x, v, impacts, impact, &
                                               most_steps, steps) bind(c)
-      import :: c_double, c_int, c_int64_t, lane_batch_t, lane_count, machine_t, most_impacts
+      import :: c_double, c_int, c_int64_t, impact_rows, lane_batch_t, lane_count, machine_t, most_impacts
       integer(c_int), value :: width
       type(machine_t), intent(in) :: machine
       type(lane_batch_t), intent(inout) :: batch
@@ -44,7 +43,7 @@ module lane_sampling
       real(c_double), intent(in) :: times(most, lane_count)
       integer(c_int64_t), intent(inout) :: taken(lane_count), impacts(lane_count)
       real(c_double), value :: most_steps
-      real(c_double), intent(inout) :: x(most, lane_count), v(most, lane_count), impact(4, most_impacts, lane_count), &
+      real(c_double), intent(inout) :: x(most, lane_count), v(most, lane_count), impact(impact_rows, most_impacts, lane_count), &
         steps(lane_count)
     end subroutine separatrix_sample_lanes
   end interface
@@ -83,7 +82,7 @@ contains
     type(lane_batch_t) :: batch
     type(tally_t) :: tally
     real(wp), allocatable :: at(:, :), x(:, :), v(:, :)
-    real(wp) :: impact(4, most_impacts, lane_count), steps(lane_count)
+    real(wp) :: impact(impact_rows, most_impacts, lane_count), steps(lane_count)
     integer(c_int64_t), dimension(lane_count) :: count, taken, impacts
     integer :: lane, most
     most = max(1, maxval(first(2:) - first(:size(start))))
@@ -94,7 +93,7 @@ contains
     steps = 0
     do lane = 1, size(start)
       associate (given => times(first(lane) + 1:first(lane + 1)))
-        if (size(given) == 0 .or. .not. slips(flow, start(lane))) cycle
+        if (size(given) == 0 .or. .not. slips(start(lane))) cycle
         count(lane) = size(given)
         at(:size(given), lane) = start(lane)%time + given
         call occupy_lane(flow, lane, start(lane), .true., batch)
@@ -116,19 +115,17 @@ contains
         one%grazing_margin = tally%grazing_margin
         one%x = x(:n, lane)
         one%v = v(:n, lane)
-        ! A sample for which no root was found is not a number.
-        one%flown = all(abs(one%x) <= huge(1.0_wp))
+        ! A sample for which no root was found is not a number; the event loop has the reason of what leaves the domain.
+        one%flown = all(abs(one%x) <= flow%machine%domain)
         one%impacts = int(impacts(lane))
         one%impact(:, :one%impacts) = impact(:, :one%impacts, lane)
       end associate
     end do
   end subroutine sample_batch
 
-  !> Whether a lane can take a body.
-  pure logical function slips(flow, state)
-    type(lane_flow_t), intent(in) :: flow
+  pure logical function slips(state)
     type(state_t), intent(in) :: state
-    slips = (state%mode == mode_slip_plus .or. state%mode == mode_slip_minus) .and. abs(state%v) >= flow%slowest
+    slips = state%mode == mode_slip_plus .or. state%mode == mode_slip_minus
   end function slips
 
 end module lane_sampling

@@ -15,7 +15,7 @@ module lane_types
   public :: widest_lanes, lane_sizes, separatrix_fly_lanes, law_t, machine_t, mode_t, contact_series_t, region_t, regions_t, table_t
 
   integer, parameter, public :: lane_count = 16, most_harmonics = 64, layer_nodes = 10, most_regions = 64, &
-    series_order = 18
+    series_order = 18, most_impacts = 16, impact_rows = 4
 
   !> What a lane is doing: nothing, flying, stopped at its time, left to the event loop, just set off.
   real(wp), parameter, public :: lane_idle = 0, lane_flying = 1, lane_stopped = 2, lane_left = 3, lane_fresh = 4
@@ -128,10 +128,10 @@ module lane_types
       integer(c_int) :: width
     end function separatrix_lane_width
 
-    !> Bytes of lane_machine, lane_regions and lane_batch as C++ has them.
-    pure subroutine separatrix_lane_sizes(machine, regions, batch) bind(c)
+    !> Bytes of lane_machine, lane_regions, lane_batch and of the impacts of a sampled lane as C++ has them.
+    pure subroutine separatrix_lane_sizes(machine, regions, batch, impacts) bind(c)
       import :: c_size_t
-      integer(c_size_t), intent(out) :: machine, regions, batch
+      integer(c_size_t), intent(out) :: machine, regions, batch, impacts
     end subroutine separatrix_lane_sizes
 
     pure subroutine separatrix_fly_lanes(width, machine, regions, batch) bind(c)
@@ -152,12 +152,13 @@ contains
 
   !> Whether both sides of the boundary to C++ agree on the sizes of what they share.
   logical function lane_sizes()
-    integer(c_size_t) :: machine, regions, batch
+    integer(c_size_t) :: machine, regions, batch, impacts
     type(machine_t) :: one_machine
     type(regions_t) :: one_table
     type(lane_batch_t) :: one_batch
-    call separatrix_lane_sizes(machine, regions, batch)
-    lane_sizes = machine == c_sizeof(one_machine) .and. regions == c_sizeof(one_table) .and. batch == c_sizeof(one_batch)
+    call separatrix_lane_sizes(machine, regions, batch, impacts)
+    lane_sizes = machine == c_sizeof(one_machine) .and. regions == c_sizeof(one_table) .and. batch == c_sizeof(one_batch) .and. &
+      impacts == most_impacts*impact_rows*c_sizeof(1.0_c_double)
   end function lane_sizes
 
 end module lane_types

@@ -112,13 +112,11 @@ def remembered(bench: Bench, decision: Decision) -> Decision:
     base, foretold = decision.rounds[0].base, decision.foretold
     if not decision.accepted or foretold is None or foretold.fit.excess <= 0:
         return decision
-    if bench.options.quick or isinstance(base.problem, CoordinateProblem):
+    name = decision.accepted[0]
+    if bench.options.quick or isinstance(base.problem, CoordinateProblem) or name.prediction is None:
         return decision
     training, held_out = _motions(bench, base, foretold)
     best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
-    name = decision.accepted[0]
-    if name.prediction is None:
-        return decision
     faults = evidence_of_faults(name.fitted, name.prediction)
     least = bench.options.needed * bench.options.separation
     lead = best.evidence - name.evidence / max(1.0, name.fitted.fit.reduced_chi2) - faults

@@ -120,9 +120,10 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
         return _conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
         return _give_up(bench, decision, best)
-    rounds, before = list(decision.rounds), list(found.judged)
+    rounds = list(decision.rounds)
+    before = list(rounds[0].judged)
     *more, closed = with_more(bench, rounds, best)
-    alone = None if closed else _led_alone(bench, found, before)
+    alone = None if closed else _led_alone(bench, rounds[0], before)
     if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
         return _conclude(bench, decision, *alone)
     if shaped is not None:

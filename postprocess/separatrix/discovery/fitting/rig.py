@@ -113,7 +113,7 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
     without = solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     if known is not None:
         known.add_to(matrix, gradient, open_)
-    sizes = solve_scaled(_bounded(matrix, gradient, p, open_), gradient, open_)
+    sizes = solve_scaled(_bounded(matrix, gradient, p, open_)[0], gradient, open_)
     # a step that the fit has without faults is none of theirs
     sizes[:p] -= without
     residual = evaluation.residual - columns @ sizes
@@ -140,7 +140,7 @@ def beside_faults(problem: Problem, fit: Fit) -> Beside:
     """
     _, matrix, gradient, open_ = _equations(problem, fit)
     p = fit.evaluation.by_parameter.shape[2]
-    matrix = _bounded(matrix, gradient, p, open_)
+    matrix, _ = _bounded(matrix, gradient, p, open_)
     steps = solve_scaled(matrix, gradient, open_)[:p] - solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     shown = open_ & (np.diag(matrix) > 0)
     covariance = _inverse(matrix, shown)[:p, :p]
@@ -167,8 +167,8 @@ def _inverse(matrix: np.ndarray, shown: np.ndarray) -> np.ndarray:
     return found
 
 
-def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> np.ndarray:
-    """Normal equations of p parameters and of faults with their prior.
+def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> tuple[np.ndarray, float]:
+    """Normal equations of p parameters and of faults with their prior, and its precision.
 
     It is made narrower until no fault is larger than such faults are: what takes a larger one is none.
     """
@@ -176,7 +176,7 @@ def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray
     while True:
         known = matrix + np.diag(np.r_[np.zeros(p), np.full(gradient.size - p, prior)])
         if np.all(np.abs(solve_scaled(known, gradient, open_)[p:]) <= _LARGEST) or prior > _NARROWEST:
-            return known
+            return known, prior
         prior *= _NARROWER
 
 
@@ -281,9 +281,7 @@ class _Evidence:
     def narrowest(self, known: Beside | None) -> float:
         """Precision of faults with which none is larger than such faults are."""
         matrix, gradient, open_ = self._known(known)
-        inner = matrix[:-1, :-1]
-        bounded = _bounded(inner, gradient[:-1], self.p, open_[:-1])
-        return float(np.max(np.diag(bounded - inner)))
+        return _bounded(matrix[:-1, :-1], gradient[:-1], self.p, open_[:-1])[1]
 
     def of(self, known: Beside | None, prior: float | None) -> tuple[float, float]:
         """Log evidence (up to a constant) with faults of a precision, or none; what is explained then."""
