@@ -35,6 +35,8 @@ module aperiodic
   real(wp), parameter :: slowest_drift = 1e-3_wp
   !> One of a family of cycles comes back to this, in units of the motion's size, and has a multiplier that is 1 to that.
   real(wp), parameter :: comes_back = 1e-10_wp, neutral = 1 - unattractive
+  !> Share of a coordinate by which boxes of one motion may be apart.
+  real(wp), parameter :: same_place = 1e-12_wp
 
 contains
 
@@ -263,9 +265,11 @@ contains
   !> Whether the boxes of two motions have a point in common.
   pure logical function boxes_meet(a, b)
     type(attractor_t), intent(in) :: a, b
-    real(wp) :: box(most_coordinates, 2)
+    real(wp) :: box(most_coordinates, 2), room(most_coordinates)
     box = box_near(a%points(:, :2), b)
-    boxes_meet = all(box(:, 1) <= b%points(:, 2) .and. box(:, 2) >= b%points(:, 1))
+    ! Motions that rounding alone keeps from coming back have boxes of no size.
+    room = same_place*maxval(abs(b%points(:, :2)), dim=2)
+    boxes_meet = all(box(:, 1) <= b%points(:, 2) + room .and. box(:, 2) >= b%points(:, 1) - room)
   end function boxes_meet
 
   !> Widens the box of a motion by another; that of an angle up to the whole circle.

@@ -29,6 +29,8 @@ module cycle
   !> Differences that change by less when their step is quartered are taken as they are; divisions tried otherwise.
   real(wp), parameter :: smooth = 1e-6_wp
   integer, parameter :: most_divisions = 7
+  !> The metric of a speed that only a body at rest is near.
+  real(wp), parameter :: at_rest_only = 1e30_wp
   !> Directions and radii of the starts by which a neighbourhood is tested.
   integer, parameter, public :: directions = 24
   real(wp), parameter, public :: rings(4) = [1.0_wp, 0.6_wp, 0.3_wp, 0.1_wp]
@@ -280,14 +282,32 @@ contains
     type(attractor_t), intent(inout) :: attractor
     logical, intent(out) :: found
     type(tally_t) :: reference(longest_period)
-    real(wp) :: image(attractor%coordinates), smallest, bounds(2)
+    real(wp) :: image(attractor%coordinates)
     integer :: i
     logical :: ok
-    smallest = huge(smallest)
     do i = 1, attractor%period
       call map_point(moving, attractor%points(:attractor%coordinates, i), attractor%period, image, reference(i), ok)
       ! A neighbour of an equilibrium never comes to rest.
       if (has_no_clock(moving) .and. reference(i)%slips == 0) reference(i)%sticks = 0
+    end do
+    call halve_radius(moving, attractor, reference, found)
+    if (found .or. attractor%coordinates /= 2 .or. has_no_clock(moving)) return
+    ! Where more than sliding friction holds the body, any kick sets it sliding for good: near are those at rest alone.
+    do i = 1, attractor%period
+      if (rests_at(moving, attractor%points(:2, i))) attractor%metric(2:3, i) = [0.0_wp, at_rest_only]
+    end do
+    if (any(attractor%metric(3, :attractor%period) >= at_rest_only)) call halve_radius(moving, attractor, reference, found)
+  end subroutine verify_neighbourhood
+
+  pure subroutine halve_radius(moving, attractor, reference, found)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(inout) :: attractor
+    type(tally_t), intent(in) :: reference(:)
+    logical, intent(out) :: found
+    real(wp) :: smallest, bounds(2)
+    integer :: i
+    smallest = huge(smallest)
+    do i = 1, attractor%period
       bounds = eigenvalue_bounds(attractor, i)
       smallest = min(smallest, bounds(1))
     end do
@@ -297,7 +317,16 @@ contains
       if (found) return
       attractor%capture_radius = attractor%capture_radius/2
     end do
-  end subroutine verify_neighbourhood
+  end subroutine halve_radius
+
+  !> Whether friction, or a stop, holds the body at a section point.
+  pure logical function rests_at(moving, point)
+    type(motion_t), intent(in) :: moving
+    real(wp), intent(in) :: point(:)
+    type(strobe_t) :: strobe
+    strobe = strobe_at(moving, point)
+    rests_at = strobe%state%mode /= mode_slip_plus .and. strobe%state%mode /= mode_slip_minus
+  end function rests_at
 
   !> Bounds of the eigenvalues of the metric at the `i`-th point: exact up to two coordinates, else 1, which none is below,
   !> and their sum.
@@ -312,6 +341,7 @@ contains
         bounds = s(1)
       case (2)
         bounds = (s(1) + s(3))/2 + [-1, 1]*sqrt(((s(1) - s(3))/2)**2 + s(2)**2)
+        if (s(3) >= at_rest_only) bounds = s(1)
       case default
         bounds = [1.0_wp, sum([(s((k*(k + 1))/2), k=1, attractor%coordinates)])]
       end select
@@ -325,15 +355,13 @@ contains
     real(wp) :: radius, promised, bounds(2), lower(attractor%coordinates, attractor%coordinates)
     real(wp), dimension(attractor%coordinates) :: centre, point, image, second
     type(tally_t) :: tally
-    type(strobe_t) :: strobe
     integer :: i, ring, k, n
     logical :: ok, at_rest
     contracts = .false.
     n = attractor%coordinates
     do i = 1, attractor%period
       centre = attractor%points(:n, i)
-      strobe = strobe_at(moving, centre)
-      at_rest = strobe%state%mode /= mode_slip_plus .and. strobe%state%mode /= mode_slip_minus
+      at_rest = rests_at(moving, centre)
       lower = cholesky(matrix_of(attractor%metric(:, i), n))
       bounds = eigenvalue_bounds(attractor, i)
       promised = sqrt(max(0.0_wp, 1 - 1/bounds(2)))
@@ -342,6 +370,7 @@ contains
         radius = rings(ring)*attractor%capture_radius
         do k = 1, max(directions, 4*n)
           point = centre + attractor%scale(:n)*back_substituted(lower, radius*direction(k, n))
+          if (n == 2 .and. attractor%metric(min(3, size(attractor%metric, 1)), i) >= at_rest_only) point(2) = centre(2)
           if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
           call map_point(moving, point, attractor%period, image, tally, ok)
           ! Around a section point at rest every start slips first; there the next round must have the events.

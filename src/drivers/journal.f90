@@ -206,6 +206,8 @@ contains
       self%line_open = .true.
     else
       write (error_unit, '(a)') message
+      ! Who follows a log waits for it now.
+      flush (error_unit)
     end if
   end subroutine put_progress
 

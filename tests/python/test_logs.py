@@ -5,6 +5,7 @@
 import json
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import h5py
@@ -52,6 +53,21 @@ def test_the_log_grows_and_keeps_errors(separatrix, tmp_path):
     assert [line["event"] for line in lines if line["event"] == "error"] == ["error", "error"]
     assert len(lines) > first
     assert all(line["time"].endswith("Z") and line["seconds"] >= 0 for line in lines)
+
+
+def test_progress_is_in_a_log_at_once(separatrix, tmp_path):
+    write_case(tmp_path)
+    fine = ("--set=axis[1].count=4000", "--set=axis[2].count=4000", '--set=run.stop="duration"')
+    command = [separatrix, "basin", "case.toml", *fine, "-o", "map.h5", "--progress", "0.05"]
+    with (tmp_path / "err.txt").open("w") as log:
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=log)
+    deadline = time.monotonic() + 30
+    while "points" not in (tmp_path / "err.txt").read_text():
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
 
 
 def test_a_log_that_cannot_be_written(separatrix, tmp_path):
