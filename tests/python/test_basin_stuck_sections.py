@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A cycle of slips and sticks is the same attractor wherever the section lies, also where the body sticks there
-with more than sliding friction could hold: any kick would set it sliding."""
+"""A cycle of slips and sticks is one attractor wherever the section lies.
+
+Also where the body sticks there with more than sliding friction could hold: any kick would set it sliding.
+"""
 
 import pytest
 import separatrix as sx
