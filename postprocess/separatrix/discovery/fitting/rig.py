@@ -254,10 +254,14 @@ def _contest(
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
     faults = fault_columns(other.problem, other.fit)
     p, q = evaluation.by_parameter.shape[2], faults.shape[2]
+    # what one of them does not follow is not a number
     columns = np.concatenate([evaluation.by_parameter, faults, moved], axis=2)
+    columns[~both] = 0.0
+    residual = np.where(both[:, None], evaluation.residual, 0.0)
+    by_start = np.where(both[:, None, None], evaluation.by_start, 0.0)
     misfit = one.misfit if isinstance(one, Prediction) else max(1.0, one.fit.reduced_chi2)
     weights = evaluation.used * both[:, None] / misfit
-    reduced, _, _ = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))
+    reduced, _, _ = eliminate(blocks_of(by_start, columns, residual, weights))
     open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(q + 1, bool)]
     equations = _Evidence(*reduced.total(), open_, p)
     without, beside = known or (None, None)
