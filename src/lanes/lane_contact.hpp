@@ -211,6 +211,22 @@ LANE_DEVICE inline contact_stride look_along_contact(const lane_machine &m, cons
   return t;
 }
 
+// A step in series.
+struct series_motion {
+  const expansion &p;
+  vec from;
+
+  LANE_DEVICE inline void at(vec time, mask, vec &x, vec &v) const {
+    const vec s = time - from;
+    x = p.x[order];
+    v = {};
+    for (int k = order - 1; k >= 0; k--) {
+      x = x * s + p.x[k];
+      v = v * s + p.v[k];
+    }
+  }
+};
+
 // A step of the contacts. Where no root of the time is found, the sample is not a number.
 struct contact_motion {
   const contact_stride &t;

@@ -414,22 +414,6 @@ LANE_DEVICE inline stride_of_lanes look_for_events(const lane_machine &m, const 
   return t;
 }
 
-// A step in series.
-struct series_motion {
-  const expansion &p;
-  vec from;
-
-  LANE_DEVICE inline void at(vec time, mask, vec &x, vec &v) const {
-    const vec s = time - from;
-    x = p.x[order];
-    v = {};
-    for (int k = order - 1; k >= 0; k--) {
-      x = x * s + p.x[k];
-      v = v * s + p.v[k];
-    }
-  }
-};
-
 // Value of a table in its pieces.
 LANE_DEVICE inline vec value_in(const table_piece &piece, vec x) {
   vec u = x - piece.from;
