@@ -12,6 +12,7 @@ module coordinate_segments
   use kinds, only: wp
   use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
     tally_t
+  use segment_flight, only: between_impacts
   use status, only: exit_bad_case
   use variants, only: family_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
@@ -282,7 +283,6 @@ contains
     logical, intent(inout) :: open(:), steady
     real(wp), intent(inout) :: slope(:, :)
     logical :: between(size(times))
-    real(wp) :: rounding
     integer :: i
     call fly(moving, start, times, other)
     if (other%reason /= 0) return
@@ -291,12 +291,7 @@ contains
     else if (any(nint(other%impact([2, 5], :base%count)) /= nint(base%impact([2, 5], :base%count)))) then
       steady = .false.
     end if
-    between = .false.
-    do i = 1, min(base%count, other%count)
-      rounding = 32*epsilon(1.0_wp)*(base%origin + base%impact(1, i))
-      between = between .or. (times >= min(base%impact(1, i), other%impact(1, i)) - rounding &
-                              .and. times <= max(base%impact(1, i), other%impact(1, i)) + rounding)
-    end do
+    between = between_impacts(base%impact(1, :base%count), other%impact(1, :other%count), base%origin, times)
     do i = 1, size(times)
       if (open(i) .and. .not. between(i)) slope(:, i) = (other%motion(:, i) - base%motion(:, i))/step
     end do

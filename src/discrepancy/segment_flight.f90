@@ -11,7 +11,7 @@ module segment_flight
   implicit none
   private
 
-  public :: start_allowed, moved_start, add_differences, differentiate_sensor, grazes, untouched
+  public :: start_allowed, moved_start, between_impacts, add_differences, differentiate_sensor, grazes, untouched
 
   type, public :: flight_t
     integer :: reason = 0, count = 0
@@ -49,6 +49,20 @@ contains
     moved(k) = start(k) + sense*family%start_step(k)
   end function moved_start
 
+  !> Which of `times` lie between an impact of the base and the same impact of a neighbour, to rounding; impacts are counted from a
+  !> start at `origin` [s], which their instants have been taken off.
+  pure function between_impacts(base, other, origin, times) result(between)
+    real(wp), intent(in) :: base(:), other(:), origin, times(:)
+    logical :: between(size(times))
+    real(wp) :: rounding
+    integer :: i
+    between = .false.
+    do i = 1, min(size(base), size(other))
+      rounding = 32*epsilon(1.0_wp)*(origin + base(i))
+      between = between .or. (times >= min(base(i), other(i)) - rounding .and. times <= max(base(i), other(i)) + rounding)
+    end do
+  end function between_impacts
+
   !> Fills in the differences of a neighbour that is `step` away at the samples that are still open, but for those
   !> between an impact of the base and the same impact of the neighbour: there a velocity before it would be compared with
   !> one after it. A neighbour that could not be flown fills in none. Takes the steadiness away if the two do not meet the same
@@ -59,7 +73,6 @@ contains
     logical, intent(inout) :: open(:), steady
     real(wp), intent(inout) :: x_slope(:), v_slope(:)
     logical :: between(size(times))
-    real(wp) :: rounding
     integer :: i
     if (other%reason /= 0) return
     if (other%count /= base%count) then
@@ -67,12 +80,7 @@ contains
     else if (any(abs(other%impact(4, :base%count) - base%impact(4, :base%count)) > 0)) then
       steady = .false.
     end if
-    between = .false.
-    do i = 1, min(base%count, other%count)
-      rounding = 32*epsilon(1.0_wp)*(base%origin + base%impact(1, i))
-      between = between .or. (times >= min(base%impact(1, i), other%impact(1, i)) - rounding &
-                              .and. times <= max(base%impact(1, i), other%impact(1, i)) + rounding)
-    end do
+    between = between_impacts(base%impact(1, :base%count), other%impact(1, :other%count), base%origin, times)
     do i = 1, size(times)
       if (.not. open(i) .or. between(i)) cycle
       x_slope(i) = (other%x(i) - base%x(i))/step
