@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps what a campaign found in one file, from which the campaign goes on and the page can be written again.
 
-A line of JSON for each case, compressed by LZMA: its number, its seal, the text of its truth, its result.
-Records are not kept: the seed draws them again. Messages name files by their places among the cases.
+A line of JSON for each case, compressed by LZMA: its number, its seal, the text of its truth, its result,
+and the result with the record that its verdict asked for. Records are not kept: the seed draws them again.
+Messages name files by their places among the cases.
 """
 
 import json
@@ -25,6 +26,8 @@ def unpack(archive: Path, folders: object) -> int:
                 (folders.sealed / f"{number:04}.json").write_text(kept["truth"])
             (folders.seals / f"{number:04}.txt").write_text(f"{kept['result']['seal']}\n")
             folders.result(number).write_text(json.dumps(kept["result"]) + "\n")
+            if kept.get("follow_up"):
+                folders.follow_up(number).write_text(json.dumps(kept["follow_up"]) + "\n")
             written += 1
     return written
 
@@ -37,8 +40,10 @@ def pack(archive: Path, folders: object, numbers: Sequence[int]) -> int:
             continue
         sealed = folders.sealed / f"{number:04}.json"
         truth = sealed.read_text() if sealed.is_file() else None
-        result = folders.told(number)
-        lines.append(json.dumps({"number": number, "truth": truth, "result": result}) + "\n")
+        kept = {"number": number, "truth": truth, "result": folders.told(folders.result(number))}
+        if folders.follow_up(number).is_file():
+            kept["follow_up"] = folders.told(folders.follow_up(number))
+        lines.append(json.dumps(kept) + "\n")
     draft = archive.with_name(archive.name + ".new")
     draft.parent.mkdir(parents=True, exist_ok=True)
     with lzma.open(draft, "wt", preset=9) as out:

@@ -16,8 +16,11 @@ from scoring import PRECISE, Score
 LONG = 50_000
 
 
-def bars(found: list[Score]) -> list[list[str]]:
-    """Rows of the table of bars: figure, bar, found, met."""
+def bars(found: list[Score], with_asked: list[bool]) -> list[list[str]]:
+    """Rows of the table of bars: figure, bar, found, met.
+
+    `with_asked`: for each set of effects whether the record that its verdict asked for led to the right name.
+    """
     strong = [one for one in found if one.strong]
     decided = [one for one in strong if one.decided]
     outside = [one for one in found if one.kind == "outside"]
@@ -59,6 +62,7 @@ def bars(found: list[Score]) -> list[list[str]]:
             [o.region for o in strong if o.region is not None],
         ),
     ]
+    rows.append(at_least("a set becomes the right name with the record that it asks for", 0.80, with_asked))
     quick = [one.seconds for one in found if one.whole < LONG]
     mean = statistics.fmean(quick) if quick else math.nan
     rows.append(

@@ -27,12 +27,13 @@ sys.path[:0] = [str(SOURCE / "tests" / "generator"), str(SOURCE / "scripts")]
 import archive  # noqa: E402
 import records  # noqa: E402
 from design import Unreachable, draw  # noqa: E402
+from simulator import SimulationError  # noqa: E402
 
 CI_SEED, CI_CASES = 1, (0, 12, 14, 16, 17, 32)
 """Nothing hidden, one effect, an effect that is one of a set; quick ones."""
 KEPT = (
     "outcome effects alternatives equivalent in_families parameters gap gates leaves p_value reasons"
-    " detectable d_prime decoys character where warnings records seed version runtime_s"
+    " detectable d_prime decoys character where experiments warnings records seed version runtime_s"
 ).split()
 UNREACHABLE = "unreachable"
 
@@ -61,7 +62,7 @@ class Folders:
 
     def __init__(self, out: Path) -> None:
         self.cases, self.sealed, self.results = out / "cases", out / "sealed", out / "results"
-        self.seals = out / "seals"
+        self.seals, self.follow_ups = out / "seals", out / "follow_ups"
 
     def make(self) -> None:
         """Make them all."""
@@ -72,9 +73,13 @@ class Folders:
         """The result of a case."""
         return self.results / f"{number:04}.json"
 
-    def told(self, number: int) -> dict:
-        """The result of a case without the folders of the machine that its messages name."""
-        return json.loads(self.result(number).read_text().replace(f"{self.cases}/", ""))
+    def follow_up(self, number: int) -> Path:
+        """The result of a case with the record that its verdict asked for."""
+        return self.follow_ups / f"{number:04}.json"
+
+    def told(self, path: Path) -> dict:
+        """A result without the folders of the machine that its messages name."""
+        return json.loads(path.read_text().replace(f"{self.cases}/", ""))
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -98,7 +103,7 @@ def prepare(folders: Folders, seed: int, number: int) -> str:
     return kept.read_text().strip()
 
 
-def ask(case: Path, seed: int, limit: float) -> dict:
+def ask(case: Path, training: Sequence[str], seed: int, limit: float) -> dict:
     """The verdict of the discovery workflow."""
     from separatrix.discovery import Options, discover
     from separatrix.errors import SeparatrixError
@@ -109,8 +114,8 @@ def ask(case: Path, seed: int, limit: float) -> dict:
     signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, limit)
     try:
-        training = [case / name for name in records.TRAINING]
-        verdict = discover(case / records.BASE, training, [case / records.HELD_OUT], Options(seed=seed))
+        paths = [case / name for name in training]
+        verdict = discover(case / records.BASE, paths, [case / records.HELD_OUT], Options(seed=seed))
         return {key: verdict[key] for key in KEPT if key in verdict}
     except Late:
         return {"outcome": "failed", "reasons": [f"not done after {limit:g} s of processor time"]}
@@ -133,7 +138,7 @@ def run_case(folders: Folders, seed: int, number: int, limit: float, with_baseli
         return
     case = folders.cases / f"{number:04}"
     began = time.process_time()
-    verdict = ask(case, seed, limit)
+    verdict = ask(case, records.TRAINING, seed, limit)
     seconds = round(time.process_time() - began, 2)
     named = {}
     if with_baselines:
@@ -145,6 +150,34 @@ def run_case(folders: Folders, seed: int, number: int, limit: float, with_baseli
     write_whole(folders.result(number), json.dumps(result, default=plain) + "\n")
     told = " ".join(verdict.get("effects", [])) or "; ".join(verdict.get("reasons", []))
     print(f"case {number}: {verdict['outcome']} {told} ({seconds:.0f} s)", flush=True)
+
+
+def asks_for_more(folders: Folders, number: int) -> bool:
+    """Whether the verdict leaves effects that differ in what they do, and says what would tell them apart."""
+    verdict = json.loads(folders.result(number).read_text()).get("verdict", {})
+    one_answer = verdict.get("equivalent") or verdict.get("in_families")
+    return verdict.get("outcome") == "ambiguous" and not one_answer and bool(verdict.get("experiments"))
+
+
+def follow_up(folders: Folders, seed: int, number: int, limit: float) -> None:
+    """Make the first record that the verdict of a case asks for and that can be made, and ask again."""
+    told, case = folders.told(folders.result(number)), folders.cases / f"{number:04}"
+    drawn = draw(seed, number)
+    kept = records.write_case(case, folders.sealed / f"{number:04}.json", drawn)
+    if kept != told["seal"]:
+        raise SystemExit(f"discovery_campaign: case {number} is not drawn as it was")
+    found = {"number": number, "commit": commit(), "library": library(), "asked": None}
+    for one in told["verdict"]["experiments"]:
+        try:
+            records.write_asked(case / records.ASKED, drawn, one["drive_ratio"], one["scale"])
+        except SimulationError:
+            continue
+        began = time.process_time()
+        found |= {"asked": one, "verdict": ask(case, (*records.TRAINING, records.ASKED), seed, limit)}
+        found["seconds"] = round(time.process_time() - began, 2)
+        break
+    write_whole(folders.follow_up(number), json.dumps(found, default=plain) + "\n")
+    print(f"case {number} with what it asked for: {found.get('verdict', {}).get('outcome')}", flush=True)
 
 
 def plain(value: object) -> object:
@@ -195,6 +228,7 @@ def main() -> int:
     parser.add_argument("--limit", type=float, default=300.0)
     parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--summary", action="store_true")
+    parser.add_argument("--follow-up", action="store_true")
     parser.add_argument("--archive", type=Path)
     options = parser.parse_args()
     numbers: Sequence[int] = range(options.cases)
@@ -215,6 +249,10 @@ def main() -> int:
         work(
             missing, lambda number: run_case(folders, options.seed, number, options.limit, not options.subset)
         )
+    if options.follow_up:
+        given = [n for n in numbers if folders.result(n).is_file() and asks_for_more(folders, n)]
+        missing = [n for n in given if not folders.follow_up(n).is_file()]
+        work(missing, lambda number: follow_up(folders, options.seed, number, options.limit))
     if is_first:
         if options.archive:
             kept = archive.pack(options.archive, folders, numbers)

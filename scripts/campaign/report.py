@@ -10,6 +10,7 @@ from pathlib import Path
 
 import effects
 import figure
+import followed
 import records
 from bars import LONG, bars
 from markdown import table
@@ -154,7 +155,7 @@ def undecided(folders: object, found: list[Score]) -> list[list[str]]:
     for one in found:
         if not one.strong or one.decided:
             continue
-        verdict = folders.told(one.number)["verdict"]
+        verdict = folders.told(folders.result(one.number))["verdict"]
         for text in verdict.get("reasons") or ["nothing was detected"]:
             key = (one.column, text)
             reasons[key] = reasons.get(key, 0) + 1
@@ -166,6 +167,7 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
     rate_head = "cases, decided, right of the decided, truth in the set reported, wrong name".split(", ")
     noises = sorted({one.noise for one in found})
     strong = [one for one in found if one.strong]
+    pairs = followed.followed(folders, found)
     fields = {
         "cases": len(found),
         "asked": asked,
@@ -189,7 +191,12 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "right": sum(one.right for one in found if one.in_catalogue),
         "faulty": sum(one.rig for one in found),
         "rows": table(["hidden", "cases, d' >= 5", "decided"], rows_of_strong(found)),
-        "bars": table(["figure", "bar", "found", "met"], bars(found)),
+        "bars": table(["figure", "bar", "found", "met"], bars(found, followed.rightly(pairs))),
+        "followed": table(
+            ["hidden", "sets with such a record", "rightly answered with it", "wrongly named", "still a set"],
+            followed.rows(pairs),
+        ),
+        "followed_seconds": followed.seconds(pairs),
         "separable_bars": table(
             ["effects with d' of at least 5", "decided", "right of the decided", "wrong name"],
             [

@@ -39,6 +39,8 @@ ANOTHER_SHAPE = 2 / 3
 TARGETS = (3.0, 5.0, 10.0, 30.0)
 LEVELS = (0.001, 0.005, 0.01, 0.03, 0.05)
 PERIODS = 12
+PHASE_ERROR = 0.02
+"""Of the crank angle at the first sample where it is not measured [rad]."""
 ATTEMPTS = 12
 MEMORY = 0.5
 MARGIN = 1.2
@@ -266,7 +268,7 @@ def _draw(
         velocity=bool(random.random() < 0.3),
         crank_angle=name == "sensor_delay" or bool(random.random() < 0.4),
         tells_noise=bool(random.random() < 0.5),
-        phase_error=[float(error) for error in random.normal(0, 0.02, 3)],
+        phase_error=[float(error) for error in random.normal(0, PHASE_ERROR, 3)],
         target=target if name else 0.0,
         seed=[],
         rig=rig,

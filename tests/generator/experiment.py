@@ -79,6 +79,8 @@ class Experiment:
     sensor: dict[str, float] = field(default_factory=dict)
     """sensor_bias [m], sensor_gain [1], sensor_delay [s] of the position; sensor_curved and sensor_cubic:
     what square and cube of the signal over its standard deviation add to it."""
+    scale: float = 1.0
+    """Amplitude of the drive over that of the machine."""
 
     @property
     def frequency(self) -> float:
@@ -97,7 +99,7 @@ class Experiment:
 
     def driven(self, machine: Machine) -> Machine:
         """The machine with the drive of this experiment."""
-        return machine.copy(frequency=self.frequency, phase=self.phase)
+        return machine.copy(frequency=self.frequency, phase=self.phase, scale=self.scale * machine.scale)
 
     def substeps(self, steps_per_period: int) -> int:
         """Steps between two samples."""

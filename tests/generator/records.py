@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from design import MEMORY, Case, sizes_of_noise
+from design import MEMORY, PERIODS, PHASE_ERROR, Case, sizes_of_noise
 from experiment import ANGLE, COSINE, FINE, GRAVITY, REGIMES, SINE, STIFFNESS, Experiment, Regime
 from simulator import Machine, X
 from size import COARSE
@@ -16,6 +16,7 @@ from size import COARSE
 TRAINING = ("first.csv", "second.csv")
 HELD_OUT = "held_out.csv"
 BASE = "base.toml"
+ASKED = "asked.csv"
 QUANTUM = math.sqrt(6)
 """Resolution over the standard deviation of the noise, half of whose power it has."""
 FRICTION = {
@@ -70,13 +71,23 @@ def with_faults(case: Case, experiment: Experiment) -> tuple[Machine, dict[str, 
     return driven, {"sensor_curved": case.rig["curved"], "sensor_cubic": case.rig["cubic"]}
 
 
-def measured(case: Case, experiment: Experiment, random: np.random.Generator) -> tuple[dict, float, float]:
-    """Columns of a record as the sensors show them, the noise of the position, and its resolution [m]."""
+def seen_by(case: Case, experiment: Experiment) -> np.ndarray:
+    """Position and velocity (samples, 2) that the sensors show but for their noise."""
     driven, faults = with_faults(case, experiment)
     experiment.sensor = {**experiment.sensor, **faults}
     states, _ = experiment.states(driven, FINE)
-    seen = experiment.observe(driven, states, FINE)
-    sigma, sigma_v = sizes_of_noise(seen, case.level)
+    return experiment.observe(driven, states, FINE)
+
+
+def measured(
+    case: Case, experiment: Experiment, random: np.random.Generator, like: Experiment | None = None
+) -> tuple[dict, float, float]:
+    """Columns of a record as the sensors show them, the noise of the position, and its resolution [m].
+
+    The noise is as large as in the record `like`, or in proportion to the signal.
+    """
+    seen = seen_by(case, experiment)
+    sigma, sigma_v = sizes_of_noise(seen if like is None else seen_by(case, like), case.level)
     noise = random.standard_normal(seen.shape)
     resolution = 0.0
     if case.colour == "coloured":
@@ -99,14 +110,22 @@ def measured(case: Case, experiment: Experiment, random: np.random.Generator) ->
     return columns, sigma, resolution
 
 
-def write_record(path: Path, case: Case, which: int, random: np.random.Generator) -> None:
-    """A record of the CSV contract."""
-    experiment = [*case.training, case.held_out][which]
-    columns, sigma, resolution = measured(case, experiment, random)
+def write_record(
+    path: Path,
+    case: Case,
+    experiment: Experiment,
+    phase_error: float,
+    random: np.random.Generator,
+    like: Experiment | None = None,
+) -> None:
+    """A record of the CSV contract; `like`: the record whose noise it has."""
+    columns, sigma, resolution = measured(case, experiment, random, like)
     units = {"t": "s", "x": "m", "v": "m/s", "phi": "rad"}
     head = {"units": ", ".join(units[name] for name in columns)}
     head["sampling_rate_hz"] = repr(1 / experiment.interval)
     head["drive_ratio"] = repr(experiment.ratio)
+    if experiment.scale != 1:
+        head["drive_scale"] = repr(experiment.scale)
     if case.tells_noise:
         head["sensor_noise_sigma_m"] = repr(sigma)
     if resolution > 0:
@@ -114,11 +133,24 @@ def write_record(path: Path, case: Case, which: int, random: np.random.Generator
     if case.crank_angle and case.rig and case.tells_noise:
         head["phi_noise_sigma_rad"] = repr(case.rig["crank_noise"])
     if not case.crank_angle:
-        head["phase"] = f"{experiment.phase + case.phase_error[which]:.4f}"
+        head["phase"] = f"{experiment.phase + phase_error:.4f}"
     lines = [f"# {key}: {value}" for key, value in head.items()]
     lines.append(",".join(columns))
     lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*columns.values(), strict=True)]
     path.write_text("\n".join(lines) + "\n")
+
+
+def write_asked(path: Path, case: Case, ratio: float, scale: float) -> None:
+    """A record that a verdict asked for: as long as the first one and with its noise, at another drive."""
+    first = case.training[0]
+    random = np.random.default_rng([*case.seed, 11])
+    one = Experiment(ratio, 0.0, first.x0, first.v0, PERIODS, 1, 1, scale=scale)
+    period = 2 * math.pi / one.frequency
+    one.phase = float(random.uniform(0, 2 * math.pi))
+    one.samples_per_period = round(period / first.interval)
+    one.periods = max(1, round((first.count - 1) * first.interval / period))
+    one.sensor = dict(first.sensor)
+    write_record(path, case, one, float(random.normal(0, PHASE_ERROR)), random, first)
 
 
 def truth_of(case: Case) -> dict:
@@ -165,8 +197,9 @@ def write_case(folder: Path, sealed: Path, case: Case) -> str:
     (folder / BASE).write_text(base_case(REGIMES[case.regime], case.training[0].ratio))
     # the sensor's noise has nothing to do with the numbers that drew the case
     random = np.random.default_rng([*case.seed, 7])
-    for which, name in enumerate((*TRAINING, HELD_OUT)):
-        write_record(folder / name, case, which, random)
+    experiments = [*case.training, case.held_out]
+    for name, one, error in zip((*TRAINING, HELD_OUT), experiments, case.phase_error, strict=True):
+        write_record(folder / name, case, one, error, random)
     sealed.parent.mkdir(parents=True, exist_ok=True)
     sealed.write_text(json.dumps(truth_of(case), indent=1) + "\n")
     return seal(sealed)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The discovery campaign: its baselines, command line, page and archive, and that it can be killed."""
 
+import dataclasses
 import hashlib
 import json
 import lzma
@@ -28,7 +29,10 @@ class Options:
 def discover(base, records, hold_out, options):
     time.sleep({pause})
     gap = {{"training": {{"before": 2.0, "after": 1.0}}, "held_out": {{"before": 3.0, "after": 1.2}}}}
-    return {{"outcome": "named", "effects": ["cubic_spring"], "alternatives": [], "gap": gap, "version": "0",
+    doubts = {doubts} and len(records) == 2
+    return {{"outcome": "ambiguous" if doubts else "named", "effects": ["cubic_spring"],
+            "alternatives": ["viscous"] if doubts else [], "gap": gap, "version": "0",
+            "experiments": [{{"drive_ratio": 1.2, "scale": 0.6, "d_prime": 9.0}}] if doubts else [],
             "parameters": {{}}, "records": [str(len(records) + len(hold_out))], "seed": options.seed}}
 """
 
@@ -98,11 +102,11 @@ def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_
     program.library.cache_clear()
 
 
-def start(source_dir, folder, pause: float, *more: str) -> subprocess.Popen:
-    """A campaign with an answer that is always the same."""
+def start(source_dir, folder, pause: float, *more: str, doubts: bool = False) -> subprocess.Popen:
+    """A campaign with an answer that is always the same; it `doubts` with two records for training."""
     package = folder / "stand_in" / "separatrix"
     (package / "discovery").mkdir(parents=True, exist_ok=True)
-    (package / "discovery" / "__init__.py").write_text(STAND_IN.format(pause=pause))
+    (package / "discovery" / "__init__.py").write_text(STAND_IN.format(pause=pause, doubts=doubts))
     for name in ("errors", "style"):
         (package / f"{name}.py").write_text(
             (source_dir / "postprocess" / "separatrix" / f"{name}.py").read_text()
@@ -191,6 +195,37 @@ def test_the_page_can_be_written_again_from_the_archive_alone(source_dir, tmp_pa
     assert (again / "page.md").read_text() == (whole / "page.md").read_text()
     assert archive.read_bytes() == kept
     assert not any((again / "out" / f"seed_{SEED}" / "cases").iterdir())
+
+
+def test_the_record_that_a_set_asks_for_is_made_and_asked_with(campaign, source_dir, tmp_path):
+    import design
+    import records
+
+    archive = tmp_path / "archive.jsonl.xz"
+    words = ("--follow-up", "--archive", str(archive))
+    assert start(source_dir, tmp_path, 0.0, *words, doubts=True).wait(timeout=300) == 0
+    out = tmp_path / "out" / f"seed_{SEED}"
+    found = [json.loads(path.read_text()) for path in sorted((out / "follow_ups").iterdir())]
+    assert [one["number"] for one in found] == list(range(CASES))
+    assert {one["verdict"]["outcome"] for one in found} == {"named"}
+    first, asked = (
+        (out / "cases" / "0000" / name).read_text() for name in (records.TRAINING[0], records.ASKED)
+    )
+    assert "# drive_ratio: 1.2\n" in asked
+    assert "# drive_scale: 0.6\n" in asked
+    ends = [float(text.split("\n")[-2].split(",")[0]) for text in (first, asked)]
+    assert ends[1] == pytest.approx(ends[0], rel=0.06)
+    # the amplitude of the drive is what it was asked to be, and nothing else of the machine
+    case = design.draw(SEED, 0)
+    machine = case.training[0].driven(case.machine)
+    scaled = dataclasses.replace(case.training[0], scale=0.6).driven(case.machine)
+    assert scaled.scale == 0.6 * machine.scale
+    assert scaled.mean == machine.mean
+    page = (tmp_path / "page.md").read_text()
+    assert f"| nothing hidden | {sum(design.plan(SEED, n)[0] == 'none' for n in range(CASES))} |" in page
+    again = tmp_path / "again"
+    assert start(source_dir, again, 0.0, "--summary", "--archive", str(archive)).wait(timeout=300) == 0
+    assert (again / "page.md").read_text() == page
 
 
 def test_another_truth_than_the_sealed_one_is_noticed(campaign, source_dir, tmp_path):

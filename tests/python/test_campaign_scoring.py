@@ -299,5 +299,5 @@ def test_the_confusion_matrix_has_every_case_once(campaign):
     assert counts.sum() == len(JUDGED)
     assert counts[:, columns.index("right")].sum() == sum(flags[1] for _, _, flags, _ in JUDGED)
     assert sum(one.alarm for one in found if one.kind == "none") == 3
-    wrong = {row[0]: row[2] for row in campaign.bars.bars(found)}["wrong name, all cases"]
+    wrong = {row[0]: row[2] for row in campaign.bars.bars(found, [])}["wrong name, all cases"]
     assert f"({sum(flags[3] for _, _, flags, _ in JUDGED)} of {len(JUDGED)};" in wrong
