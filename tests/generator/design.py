@@ -155,16 +155,27 @@ def draw(seed: int, number: int, plain: bool = False) -> Case:
     `plain`: a short one with the law of the catalogue and no faults of the rig.
     """
     kind, name, target = plan(seed, number)
+    long = is_long(seed, number) and not plain
+    return _attempted(seed, number, plain, (kind, name, target, long, {}))
+
+
+def draw_shaped(seed: int, number: int, name: str, shape: dict[str, float], target: float) -> Case:
+    """A short case with one effect of a given shape and size, and no faults of the rig."""
+    return _attempted(seed, number, True, ("single", name, target, False, shape))
+
+
+def _attempted(seed: int, number: int, plain: bool, what: tuple) -> Case:
+    """The case in the first regime in which its effect can have its size."""
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, 3, number, attempt])
         more = None if plain else np.random.default_rng([seed, 5, number, attempt])
         try:
-            case = _draw(random, more, number, kind, name, target, is_long(seed, number) and not plain)
+            case = _draw(random, more, number, *what)
         except (SimulationError, Unreachable):
             continue
         case.seed = [seed, number, attempt]
         return case
-    raise Unreachable(f"case {number}: {name} with d' = {target:g}")
+    raise Unreachable(f"case {number}: {what[1]} with d' = {what[2]:g}")
 
 
 def _regime(random: np.random.Generator, name: str) -> str:
@@ -241,6 +252,7 @@ def _draw(
     name: str,
     target: float,
     long: bool,
+    shape: dict[str, float],
 ) -> Case:
     """A case; what is only drawn of some comes from `more`, if there is one."""
     regime = _regime(random, name)
@@ -273,6 +285,8 @@ def _draw(
         seed=[],
         rig=rig,
     )
+    if shape:
+        case.hidden[0].shape |= shape
     if name == "second_barrier":
         lowest = [
             experiment.states(experiment.driven(base), COARSE)[0][:, X].min() for experiment in experiments

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.base import _follows_better, fit_base
-from separatrix.discovery.fitting.curves import fit_member, function_of, knots_at
+from separatrix.discovery.fitting.curves import fit_member, knots_at
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.members import MEMBERS
 from separatrix.discovery.fitting.shapes import closed_forms, through
+from separatrix.discovery.fitting.smooth import function_of, roughness, smoothed
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.errors import SeparatrixError
@@ -113,14 +114,62 @@ def test_the_curve_that_is_drawn_is_that_of_the_law():
     assert np.allclose((after / before)[inside], 0.62 + through(speeds, wanted)(before[inside]), atol=1e-9)
 
 
+SHAPES = {
+    "straight": lambda v: 0.6 - 0.05 * v,
+    "bent": lambda v: 0.5 * v**-0.25,
+    "step": lambda v: 0.6 - 0.1 * np.tanh((v - 1.5) / 0.5),
+    "wave": lambda v: 0.6 + 0.05 * np.sin(4 * v),
+}
+
+
+@pytest.mark.parametrize("error", [1e-3, 1e-2, 5e-2])
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_band_of_a_smooth_function_has_it_on_as_much_as_it_says(name, error):
+    """Measured at 60 speeds with noise; the mean share of the support over 200 draws is about 95 %."""
+    knots, random = np.linspace(0.3, 4, 16), np.random.default_rng(7)
+    speeds = np.sort(random.uniform(0.3, 4, 60))
+    hats = np.array([through(knots, one)(speeds) for one in np.eye(16)]).T
+    right, shares = SHAPES[name](knots), []
+    for _ in range(200):
+        seen = SHAPES[name](speeds) + error * random.standard_normal(60)
+        pull = hats.T @ (seen - hats @ np.full(16, 0.5)) / error**2
+        mean, covariance = smoothed(hats.T @ hats / error**2, pull, np.full(16, 0.5), roughness(knots))
+        shares.append(np.mean(np.abs(mean - right) < 1.96 * np.sqrt(np.diag(covariance))))
+    assert 0.9 < np.mean(shares) < 0.999
+
+
+def test_a_straight_line_is_not_rough_and_a_parabola_is_by_its_bend():
+    knots = np.sort(np.random.default_rng(3).uniform(0, 2, 9))
+    penalty = roughness(knots)
+    line = 3 - 2 * knots
+    assert abs(line @ penalty @ line) < 1e-9
+    # on many knots the natural spline's straight ends are next to nothing of a cubic
+    fine = np.linspace(0, 1, 400)
+    cubic = fine**3 - 1.5 * fine**2
+    whole = np.trapezoid((6 * fine - 3) ** 2, fine)
+    assert cubic @ roughness(fine) @ cubic == pytest.approx(whole, rel=0.05)
+
+
+def test_a_function_that_nothing_tells_of_is_none():
+    penalty = roughness(np.linspace(0, 1, 6))
+    assert smoothed(np.zeros((6, 6)), np.zeros(6), np.zeros(6), penalty) is None
+    # one place tells nothing of the slope
+    one = np.zeros((6, 6))
+    one[2, 2] = 1e4
+    assert smoothed(one, np.zeros(6), np.zeros(6), penalty) is None
+
+
 def test_closed_forms_are_told_apart_by_the_values():
     at = np.linspace(0.3, 4, 8)
-    covariance = np.diag(np.full(8, 1e-8))
+    rows = 1e4 * np.eye(8)
 
     def fitting(effect, value):
-        return [name for name, one in closed_forms(effect, at, value, covariance).items() if one["fits"]]
+        return [
+            name for name, one in closed_forms(effect, at, value, rows, rows @ value).items() if one["fits"]
+        ]
 
-    power = closed_forms("restitution_curve", at, 0.5 * at**-0.25, covariance)
+    value = 0.5 * at**-0.25
+    power = closed_forms("restitution_curve", at, value, rows, rows @ value)
     assert [name for name, one in power.items() if one["fits"]] == ["power"]
     assert power["power"]["parameters"] == pytest.approx([0.5, 0.25], rel=1e-3)
     assert fitting("restitution_curve", 0.6 - 0.03 * at) == ["linear"]
@@ -151,9 +200,11 @@ def test_a_restitution_that_is_a_power_of_the_speed_is_found_as_a_function():
     part = verdict["function"]["parts"][0]
     at, value, band = (np.array(part[key]) for key in ("at", "value", "band_95"))
     right = 0.5 * at**-0.25
-    # between impacts a knot is known as its band tells; how many knots there are is a matter of rounding
-    assert np.mean(np.maximum(band[0] - right, right - band[1]) < 0.01 * right) >= 0.9
+    # 95 % in the mean over many records (docs/discovery_functions.md); neighbours err together
+    assert np.mean((band[0] < right) & (right < band[1])) >= 0.75
     assert np.mean(np.abs(value - right) < 0.03 * right) >= 0.8
+    assert verdict["function"]["closed_forms"]["power"]["fits"]
+    assert not verdict["function"]["closed_forms"]["linear"]["fits"]
     assert min(one["closed"] for one in verdict["remains"]) > 0.98
 
 
@@ -173,9 +224,10 @@ def test_friction_of_a_shape_that_no_effect_has_is_fitted_as_a_function():
         known = fit_member(data, first, MEMBERS[1], known, knots, alike=True)
     assert known.fit.converged
     assert known.fit.reduced_chi2 < 1.1
-    part = function_of(known).parts[0]
+    part = function_of(data, first, known).parts[0]
     off = part.value - (0.4905 + 0.6 / (1 + (part.at / 0.4) ** 2))
     assert np.all(np.abs(off) < 4 * part.error)
+    assert np.mean(np.abs(off) < 1.96 * part.error) >= 0.9
     assert np.all(np.abs(off[part.at < 1.4]) < 0.05)
     # both directions have one value, which the case has twice
     assert all(known.problem.free[i].also for i in known.added)
@@ -195,8 +247,7 @@ def test_friction_that_varies_over_the_place_as_a_sine_is_found_as_a_function():
     part = verdict["function"]["parts"][0]
     at, value, band = (np.array(part[key]) for key in ("at", "value", "band_95"))
     right = 0.08 * (1 + 0.6 * np.sin(9 * at))
-    off = np.maximum(band[0] - right, right - band[1])
-    assert np.mean(off < 0.02 * right) >= 0.9
+    assert np.mean((band[0] < right) & (right < band[1])) >= 0.9
     assert min(one["closed"] for one in verdict["remains"]) > 0.98
 
 

@@ -17,13 +17,14 @@ from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.curves import function_of
+from separatrix.discovery.fitting.curves import fits_machine, member_of, named_member, table_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.fitting.rig import beside_faults
+from separatrix.discovery.fitting.smooth import function_of
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
@@ -70,7 +71,7 @@ def verdict_of(findings: Findings) -> dict:
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
         "places": _places(final, named, decision),
         "families": [effect_of(name).family for name in final.names],
-        "function": _function(final),
+        "function": _function(findings, final),
         "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
         "leaves": best.leaves if decision.accepted else "",
@@ -137,14 +138,26 @@ def _remaining(findings: Findings) -> list[Remains]:
     return remains_of(findings.base, decision.foretold, decision.corrected, mass)
 
 
-def _function(fitted: Fitted) -> dict | None:
-    """The function that the accepted effect is, with its 95 % band and the closed forms that fit it."""
-    found = function_of(fitted)
+def _function(findings: Findings, final: Fitted) -> dict | None:
+    """The function that the accepted effect is, with its 95 % band and the closed forms that fit it.
+
+    A closed form is shown as the function of its family that the same records tell.
+    """
+    decision, bench = findings.decision, findings.bench
+    if isinstance(final.problem, CoordinateProblem) or not final.names:
+        return None
+    member = member_of(final) or named_member(final)
+    without = [one.base for one in decision.rounds if one.base.names == final.names[:-1]]
+    if member is None or not without or not fits_machine(member, without[-1].model):
+        return None
+    found = function_of(bench.training, without[-1], final, member)
     if found is None:
         return None
-    member = found.member
+    table = table_of(final) or []
     fitting = [name for name, one in found.forms.items() if one["fits"]]
-    shape = f"as {' or '.join(fitting)}" if fitting else "as no closed form that is known"
+    shape = "as no closed form that is known"
+    if fitting:
+        shape = f"as {' or '.join(fitting)}"
     return {
         "effect": member.effect,
         "variable": member.variable,
@@ -159,6 +172,7 @@ def _function(fitted: Fitted) -> dict | None:
             }
             for one in found.parts
         ],
+        "tables": [{"at": at, "value": value} for at, value in table],
         "closed_forms": found.forms,
         "text": "; ".join(
             f"{member.quantity}{f' {one.name}' if one.name else ''} {one.value[0]:.4g} at {one.at[0]:.3g} "

@@ -12,8 +12,6 @@ from scipy.stats import chi2
 
 # probability, or largest deviation over the largest value, from which on a closed form fits
 _LIKELY, _CLOSE = 0.01, 2e-3
-# share of the knots' square root of the largest variance that is added to each: tables are no exact functions
-_ROUGH = 1e-9
 
 
 @dataclass(frozen=True)
@@ -101,24 +99,26 @@ def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
     return CubicHermiteSpline(at, value, slopes)
 
 
-def closed_forms(effect: str, at: np.ndarray, value: np.ndarray, covariance: np.ndarray) -> dict[str, dict]:
-    """Closed forms held against values: parameters, probability, largest relative deviation, fit or not."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-24))
-    root = np.linalg.cholesky(covariance / np.outer(scale, scale) + _ROUGH * np.eye(at.size))
+def closed_forms(
+    effect: str, at: np.ndarray, value: np.ndarray, rows: np.ndarray, zero: np.ndarray
+) -> dict[str, dict]:
+    """Closed forms held against a function: parameters, probability, largest relative deviation, fit or not.
+
+    What a form misses of the records is |rows form(at) - zero|^2; `value` is the function that they tell.
+    """
     found = {}
     for name, form in FORMS[effect].items():
         starts = form.start(at)
-        if len(starts[0]) >= at.size:
+        freedom = zero.size - len(starts[0])
+        if freedom < 1:
             continue
 
         def off(parameters: np.ndarray, form: Form = form) -> np.ndarray:
-            return np.nan_to_num(
-                np.linalg.solve(root, (value - form.value(at, *parameters)) / scale), nan=1e9
-            )
+            return np.nan_to_num(rows @ form.value(at, *parameters) - zero, nan=1e9)
 
         fits = [least_squares(off, start, x_scale="jac", max_nfev=400) for start in starts]
         fit = min(fits, key=lambda one: one.cost)
-        p = float(chi2.sf(2 * fit.cost, at.size - len(starts[0])))
+        p = float(chi2.sf(2 * fit.cost, freedom))
         deviation = float(np.max(np.abs(form.value(at, *fit.x) - value)) / np.max(np.abs(value)))
         fine = np.linspace(at[0], at[-1], 60)
         found[name] = {

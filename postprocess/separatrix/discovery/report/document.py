@@ -137,8 +137,8 @@ def _first_page(section: Section, verdict: dict) -> None:
             Picture(
                 "function",
                 figures.function(verdict["function"]),
-                "The effect as it was found: values at the knots, the curve of the law through them, their "
-                "95 % band, and the closed forms that fit.",
+                "The effect as a function, as the records tell it, with its 95 % band, and the closed forms "
+                "that fit. Dots: the table that the corrected case has, where it has one.",
             )
         )
     section.body.insert(1, Beside(shown))

@@ -76,8 +76,9 @@ def function(found: dict) -> Figure:
         ax.fill_between(
             fine, through(at, low)(fine), through(at, high)(fine), color=colour, alpha=0.25, linewidth=0
         )
-        ax.plot(fine, through(at, value)(fine), color=colour, linewidth=1.2)
-        ax.plot(at, value, "o", color=colour, markersize=3, label=part["direction"] or None)
+        ax.plot(fine, through(at, value)(fine), color=colour, linewidth=1.2, label=part["direction"] or None)
+    for table, colour in zip(found["tables"], (AFTER, BEFORE), strict=False):
+        ax.plot(table["at"], table["value"], "o", color=colour, markersize=3)
     fitting = [(name, one) for name, one in found["closed_forms"].items() if one["fits"]]
     for (name, one), colour in zip(fitting[:3], style.OKABE_ITO[2:], strict=False):
         ax.plot(one["at"], one["curve"], "--", color=colour, linewidth=0.9, label=name)
