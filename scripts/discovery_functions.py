@@ -137,7 +137,11 @@ def examine(seed: int, number: int) -> Found | None:
         files = Path(folder)
         records.write_case(files, files / "truth.json", case)
         training = [files / one for one in records.TRAINING]
-        verdict = discover(files / records.BASE, training, [files / records.HELD_OUT], Options(seed=seed))
+        try:
+            verdict = discover(files / records.BASE, training, [files / records.HELD_OUT], Options(seed=seed))
+        except Exception as reason:
+            # one broken case must not end the measurement, and counts as a failure
+            return Found(name, target, f"failed: {reason}", False, False, math.nan, math.nan)
     said = ["+".join(verdict["effects"]), *verdict["alternatives"]]
     named = verdict["outcome"] in ("named", "ambiguous")
     right = named and all(one in FORMS for one in said)

@@ -104,7 +104,7 @@ def run(folder: Path, out: Path, *words: str) -> Run:
         sys.exit(f"discovery_speed: no verdict, exit code {started.returncode}: see {folder / 'log'}")
     verdict = json.loads((out / "verdict.json").read_text())
     said = f"{verdict['outcome']} {', '.join(verdict['effects'] or verdict['added'])}".strip()
-    return Run(said, wall, used.ru_utime + used.ru_stime, used.ru_maxrss / 1000)
+    return Run(said, wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6)
 
 
 def main() -> None:

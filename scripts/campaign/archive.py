@@ -20,14 +20,14 @@ def unpack(archive: Path, folders: object) -> int:
         for line in lines:
             kept = json.loads(line)
             number = kept["number"]
+            if kept.get("follow_up") and not folders.follow_up(number).is_file():
+                folders.follow_up(number).write_text(json.dumps(kept["follow_up"]) + "\n")
             if folders.result(number).is_file():
                 continue
             if kept["truth"] is not None:
                 (folders.sealed / f"{number:04}.json").write_text(kept["truth"])
             (folders.seals / f"{number:04}.txt").write_text(f"{kept['result']['seal']}\n")
             folders.result(number).write_text(json.dumps(kept["result"]) + "\n")
-            if kept.get("follow_up"):
-                folders.follow_up(number).write_text(json.dumps(kept["follow_up"]) + "\n")
             written += 1
     return written
 

@@ -163,7 +163,9 @@ def follow_up(folders: Folders, seed: int, number: int, limit: float) -> None:
     """Make the first record that the verdict of a case asks for and that can be made, and ask again."""
     told, case = folders.told(folders.result(number)), folders.cases / f"{number:04}"
     drawn = draw(seed, number)
-    kept = records.write_case(case, folders.sealed / f"{number:04}.json", drawn)
+    again = folders.follow_ups / f"{number:04}.truth"
+    kept = records.write_case(case, again, drawn)
+    again.unlink()
     if kept != told["seal"]:
         raise SystemExit(f"discovery_campaign: case {number} is not drawn as it was")
     found = {"number": number, "commit": commit(), "library": library(), "asked": None}
@@ -186,7 +188,7 @@ def plain(value: object) -> object:
 
 
 def work(numbers: list[int], do: Callable[[int], None]) -> None:
-    """Do all cases, handed out one by one by rank 0 where there is more than one rank."""
+    """Do all cases, handed out one by one by rank 0 where there is more than one rank; done when all are."""
     if int(os.environ.get("OMPI_COMM_WORLD_SIZE", "1")) == 1:
         for number in numbers:
             do(number)
@@ -196,9 +198,17 @@ def work(numbers: list[int], do: Callable[[int], None]) -> None:
     world = MPI.COMM_WORLD
     if world.rank == 0:
         hand_out(world, numbers)
-        return
-    while (number := world.sendrecv(None, 0, source=0)) is not None:
-        do(number)
+    else:
+        while (number := world.sendrecv(None, 0, source=0)) is not None:
+            do(number)
+    wait_for_all(world)
+
+
+def wait_for_all(world: object) -> None:
+    """A barrier that leaves the core to those who compute."""
+    request = world.Ibarrier()
+    while not request.Test():
+        time.sleep(0.02)
 
 
 def hand_out(world: object, numbers: Iterable[int]) -> None:

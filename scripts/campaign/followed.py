@@ -19,12 +19,18 @@ GROUPS: dict[str, Callable[[Score], bool]] = {
 
 
 def followed(folders: object, found: list[Score]) -> list[tuple[Score, Score]]:
-    """Cases with a record that was asked for, as they were judged before and with it."""
+    """Cases that asked for a record, as they were judged before and with it.
+
+    One whose records could not be made is as it was.
+    """
     pairs = []
     for before in found:
         path = folders.follow_up(before.number)
-        result = json.loads(path.read_text()) if path.is_file() else {}
+        if not path.is_file():
+            continue
+        result = json.loads(path.read_text())
         if "verdict" not in result:
+            pairs.append((before, before))
             continue
         truth = json.loads((folders.sealed / f"{before.number:04}.json").read_text())
         pairs.append((before, score(truth, result)))

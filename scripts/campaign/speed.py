@@ -61,7 +61,7 @@ def same(one: dict, other: dict) -> bool:
 
 def main() -> int:
     """Ask for each case and print a row; return 1 if a verdict is another than before."""
-    parser = argparse.ArgumentParser(prog="discovery_speed", description=__doc__)
+    parser = argparse.ArgumentParser(prog="speed.py", description=__doc__)
     parser.add_argument("--seed", type=int, default=41)
     parser.add_argument("--cases", default="0:40", help="FIRST:END or a list N,N,...")
     parser.add_argument("--keep", type=Path, help="append the answers here, one a line; those there are kept")

@@ -159,6 +159,33 @@ def test_a_soft_wall_is_told_by_its_family():
     )
 
 
+def test_the_force_of_a_soft_wall_is_drawn_as_a_function_and_is_that_of_hertz():
+    without = base(upper=0.55, amplitude=0.2)
+    true = without.with_effect("compliant_contact", {"stiffness": 20000.0, "damping": 0.3})
+    verdict, _ = ask(true, without, ("compliant_contact", "kelvin_voigt_contact", "restitution_slope"))
+    assert verdict["effects"] == ["compliant_contact"]
+    found = verdict["function"]
+    assert found["effect"] == "contact_curve"
+    part = found["parts"][0]
+    right, (low, high) = 20000 * part["at"] ** 1.5, part["band_95"]
+    assert np.mean((low <= right) & (right <= high)) >= 0.8
+    assert np.all(high - low < 0.1 * right)
+    fitting = {name: one["fits"] for name, one in found["closed_forms"].items()}
+    assert fitting == {"linear": False, "hertz": True, "power": True}
+
+
+def test_a_function_that_cannot_do_what_an_effect_does_is_not_drawn_for_it():
+    """A force k p + c p' of penetration and rate is no force f(p) (1 + d p')."""
+    without = base(upper=0.55, amplitude=0.2)
+    true = without.with_effect("kelvin_voigt_contact", {"stiffness": 3000.0, "damping": 12.0})
+    verdict, _ = ask(true, without, ("kelvin_voigt_contact", "restitution_slope"))
+    assert (verdict["effects"], verdict["function"]) == (["kelvin_voigt_contact"], None)
+    # one harmonic of the drive is its own formula
+    without = base()
+    verdict, _ = ask(without.with_effect("drive_ripple", {"sine": 0.003}), without, ("drive_ripple",))
+    assert (verdict["effects"], verdict["function"]) == (["drive_ripple"], None)
+
+
 def test_harmonics_of_the_drive_are_found_as_a_function():
     without = base()
     harmonics = {"cosine[1]": 0.0, "cosine[2]": 0.004, "cosine[3]": -0.002}

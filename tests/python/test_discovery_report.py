@@ -371,6 +371,7 @@ def test_a_function_is_drawn_on_the_first_page_with_its_band(tmp_path: Path) -> 
             }
             for name in ("upwards", "downwards")
         ],
+        "tables": [{"at": list(at), "value": list(1 + at)}],
         "closed_forms": {"linear": {"fits": True, "at": list(at), "curve": list(1 + at)}},
     }  # fmt: skip
     (tmp_path / "verdict.json").write_text(json.dumps(told))

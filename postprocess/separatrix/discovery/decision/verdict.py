@@ -22,6 +22,7 @@ from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
+from separatrix.discovery.fitting.members import friction_at
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.fitting.rig import beside_faults
 from separatrix.discovery.fitting.smooth import function_of
@@ -153,11 +154,16 @@ def _function(findings: Findings, final: Fitted) -> dict | None:
     found = function_of(bench.training, without[-1], final, member)
     if found is None:
         return None
-    table = table_of(final) or []
+    table = table_of(final, member) or []
+    if member.effect == "friction_curve":
+        # the law of the machine is in the friction too
+        table = [
+            (at, friction_at(final, at, sign)) for (at, _), sign in zip(table, (1.0, -1.0), strict=False)
+        ]
     fitting = [name for name, one in found.forms.items() if one["fits"]]
-    shape = "as no closed form that is known"
-    if fitting:
-        shape = f"as {' or '.join(fitting)}"
+    shape = f", as {' or '.join(fitting)}" if fitting else ""
+    if table and not fitting:
+        shape = ", as no closed form that is known"
     return {
         "effect": member.effect,
         "variable": member.variable,
@@ -179,7 +185,7 @@ def _function(findings: Findings, final: Fitted) -> dict | None:
             f"{member.unit} to {one.value[-1]:.4g} at {one.at[-1]:.3g} {member.unit}"
             for one in found.parts
         )
-        + f", {shape}",
+        + shape,
     }
 
 
@@ -236,7 +242,7 @@ def _warnings(findings: Findings) -> list[str]:
         notes.append("the base machine did not converge")
     added = findings.decision.added
     if added is not None and not added.fitted.fit.converged:
-        notes.append(f"the fit of effect.{added.name} did not converge: its band may be too narrow")
+        notes.append(f"the fit of effect.{added.name} did not converge")
     lost = int((~fit.good).sum())
     if lost:
         notes.append(

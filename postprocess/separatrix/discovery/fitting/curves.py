@@ -91,9 +91,14 @@ def with_table(
 
     `begun`: the function at the knots, for each direction; None where there is no such machine.
     """
+    if member.by_share and not begun[0][0] > 0:
+        # there is no share of nothing
+        return None
     values = {f"{member.knots}[{i}]": float(one) for i, one in enumerate(knots, start=1) if member.knots}
     values |= {f"{key}[{i}]": 0.0 for key in member.values for i in range(1, knots.size + 1)}
     if member.beside:
+        # a barrier that does not push is none
+        values |= {f"{member.values[0]}[{i}]": float(one) for i, one in enumerate(begun[0], start=1)}
         values[member.beside[0]] = 0.0
     try:
         extended = base.model.with_effect(member.effect, values)
@@ -125,13 +130,12 @@ def named_member(fitted: Fitted) -> Member | None:
     return next((one for one in MEMBERS if one.family == family), None)
 
 
-def table_of(fitted: Fitted) -> list[tuple[np.ndarray, np.ndarray]] | None:
-    """Knots and values of the table that a fitted machine holds, by direction; None without one.
+def table_of(fitted: Fitted, member: Member) -> list[tuple[np.ndarray, np.ndarray]] | None:
+    """Knots and values of the table of a family that a fitted machine holds, by direction; None without one.
 
     Beside an anchor the whole function.
     """
-    member = member_of(fitted)
-    if member is None or not member.knots:
+    if member.effect not in fitted.names or not member.knots:
         return None
     parameters = fitted.model.parameters
     free = {one.path: value for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)}

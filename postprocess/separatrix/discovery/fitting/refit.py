@@ -48,7 +48,7 @@ class Fitted:
     fit: Fit
     added: tuple[int, ...]
     tries: int = 1
-    # the same function on more knots, where one was fitted
+    # the same function on more knots, where one was tried, converged or not
     finer: "Fitted | None" = None
 
     @property

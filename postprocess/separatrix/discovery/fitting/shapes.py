@@ -81,7 +81,10 @@ FORMS: dict[str, dict[str, Form]] = {
     "contact_curve": {
         "linear": Form(lambda p, a: a * p, lambda x: [[1.0]]),
         "hertz": Form(lambda p, a: a * p**1.5, lambda x: [[1.0]]),
-        "power": Form(lambda p, a, b: a * p ** np.clip(b, 0.5, 10), lambda x: [[1.0, 1.5]]),
+        "power": Form(
+            lambda p, a, b: a * p ** np.clip(b, 0.5, 10),
+            lambda x: [[10.0**size, 1.5] for size in range(2, 9, 2)],
+        ),
     },
     # a series is its own closed form
     "drive_harmonics": {},

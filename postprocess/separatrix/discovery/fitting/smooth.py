@@ -4,8 +4,9 @@
 
 Whatever it was fitted as, the function is taken on many knots. A Gaussian prior on its second derivative
 stands for few of them: a smoothing spline. Over the size of that prior the posterior is averaged, each
-size weighed by its evidence, so that the band has what the records do not tell of the shape. Such a band
-holds a function on as much of its support as it says (G. Wahba, J. R. Stat. Soc. B 45 (1983) 133).
+size weighed by its evidence and as likely as any other before (A. Gelman, Bayesian Analysis 1 (2006) 515),
+so that the band has what the records do not tell of the shape. Such a band holds a function on as much of
+its support as it says (G. Wahba, J. R. Stat. Soc. B 45 (1983) 133).
 """
 
 from dataclasses import dataclass
@@ -14,19 +15,27 @@ import numpy as np
 
 from separatrix.discovery.fitting.curves import knots_over, member_of, table_of, with_table
 from separatrix.discovery.fitting.data import Data
-from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.members import Member, friction_at
-from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.shapes import closed_forms, through
 from separatrix.errors import SeparatrixError
+from separatrix.library import effects
 
-_KNOTS = 16
+# knots, and those of a table in which zero is implied
+_KNOTS, _KNOTS_BESIDE_ZERO = 16, 15
 # places at which a series is drawn
 _TURN = 49
+# share of the segments that a step must follow
+_FOLLOWED = 0.98
 # how often the motion is linearised anew, how often a step is halved, steps of the starts after it
 _ROUNDS, _HALVINGS, _FOLLOW = 4, 3, 6
-# squares by which another step would change nothing that shows
-_SETTLED = 0.1
+# squares by which another step would change nothing that shows; squares a value by which the end may miss
+_SETTLED, _NEAR = 0.1, 1.0
+# squares by which the function may follow the records worse than what it is drawn for
+_WORSE = 10.0
+# share of the promised change of the squares by which a step may miss it
+_AS_PROMISED = 0.3
 # precisions of the prior over what the records know, from rough to straight, in decades
 _DECADES = np.linspace(-6, 6, 49)
 # share of the largest eigenvalue, in units of the diagonal, below which a direction is not known
@@ -37,7 +46,7 @@ _UNKNOWN = 1e-10
 class Part:
     """A function by its values at knots, with their covariance, and what the records say alone.
 
-    `information` and `pull` are of a quadratic misfit about `centre`: d^T information d - 2 d^T pull.
+    `information` and `gradient` are of a quadratic misfit about `centre`: d^T information d - 2 d^T gradient.
     """
 
     name: str
@@ -45,7 +54,7 @@ class Part:
     value: np.ndarray
     covariance: np.ndarray
     information: np.ndarray
-    pull: np.ndarray
+    gradient: np.ndarray
     centre: np.ndarray
 
     @property
@@ -81,9 +90,9 @@ def roughness(at: np.ndarray) -> np.ndarray:
 
 
 def smoothed(
-    information: np.ndarray, pull: np.ndarray, centre: np.ndarray, penalty: np.ndarray
+    information: np.ndarray, gradient: np.ndarray, centre: np.ndarray, penalty: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Mean and covariance of values whose misfit is d^T information d - 2 d^T pull about a centre.
+    """Mean and covariance of values whose misfit is d^T information d - 2 d^T gradient about a centre.
 
     None where there are values that neither the records nor their being smooth tell of.
     """
@@ -100,10 +109,12 @@ def smoothed(
         if not values[0] > 1e-14 * values[-1]:
             continue
         inverse = (vectors / values) @ vectors.T / np.outer(size, size)
-        gradient = pull - precision * (penalty @ centre)
-        step = inverse @ gradient
-        evidence = 0.5 * (gradient @ step - precision * centre @ penalty @ centre + rank * np.log(precision))
+        slope = gradient - precision * (penalty @ centre)
+        step = inverse @ slope
+        evidence = 0.5 * (slope @ step - precision * centre @ penalty @ centre + rank * np.log(precision))
         evidence -= 0.5 * np.sum(np.log(values)) + np.sum(np.log(size))
+        # all sizes of the bend are alike before: steps of the logarithm of the precision are not
+        evidence -= 0.5 * np.log(precision)
         found.append((evidence, centre + step, inverse))
     if not found:
         return None
@@ -126,19 +137,26 @@ def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None 
     if member is None:
         return None
     if not member.knots:
-        return Function(member, [_series(fitted, member)], {})
+        # a series is its own function
+        return Function(member, [_series(fitted, member)], {}) if member.effect in fitted.names else None
+    if any(effects()[name].family == member.family for name in base.names):
+        # another effect of the family has a part of it
+        return None
     seen = member.seen(fitted)
     if seen.size < 3 or not np.ptp(seen) > 0:
         return None
-    curve = _Curve.begun(data, base, fitted, member, knots_over(member, seen, _KNOTS))
-    found = None if curve is None else curve.settle()
-    if found is None:
+    knots = knots_over(member, seen, _KNOTS_BESIDE_ZERO if member.beside else _KNOTS)
+    try:
+        curve = _Curve.begun(data, base, fitted, member, knots)
+        parts = None if curve is None else curve.settle()
+    except np.linalg.LinAlgError:
         return None
-    parts = curve.parts(*found)
+    if parts is None or not curve.follows(fitted):
+        return None
     whole = [closed_forms(member.effect, one.at, one.value, *_alone(one)) for one in parts]
     # with two directions a form must fit both; a constant beside an anchor is the machine without the effect
     forms = {
-        name: one | {"fits": all(other[name]["fits"] for other in whole)}
+        name: one | {"fits": all(name in other and other[name]["fits"] for other in whole)}
         for name, one in whole[0].items()
         if name != "constant" or not member.anchor
     }
@@ -165,10 +183,10 @@ class _Curve:
         cls, data: Data, base: Fitted, fitted: Fitted, member: Member, knots: np.ndarray
     ) -> "_Curve | None":
         """The function as it was fitted, on these knots."""
-        table = table_of(fitted)
+        table = table_of(fitted, member)
         alike = len(member.values) > 1 and (table is None or len(table) == 1)
         if table is not None:
-            begun = [_drawn(at, value, knots) for at, value in table]
+            begun = [_drawn(member, at, value, knots) for at, value in table]
             begun = begun * len(member.values) if alike else begun
         else:
             begun = member.known(fitted, base, knots)
@@ -218,33 +236,45 @@ class _Curve:
             slopes[1:, 0] = 1
         return slopes
 
-    def settle(self) -> tuple[np.ndarray, ...] | None:
-        """Mean and covariance of the values; information and pull about a centre, linearised there."""
+    def settle(self) -> list[Part] | None:
+        """The function by direction, the motion linearised about it; None where it is not reached."""
         for _ in range(_ROUNDS):
             known = self._known()
-            if known is None:
-                return None
-            information, pull, others = known
             centre = self.values + self.beside
-            found = smoothed(information, pull, centre, self.penalty)
+            found = (
+                None if known is None else smoothed(known.information, known.gradient, centre, self.penalty)
+            )
             if found is None:
                 return None
-            mean, covariance = found
-            inner = np.linalg.solve(self._slopes(), mean - centre)
-            step = others(inner)
+            inner = np.linalg.solve(self._slopes(), found[0] - centre)
+            step = known.others(inner)
             step[self.places] = inner
-            if not self._go(step):
+            if not self._go(step, known.promised(found[0] - centre)):
                 break
             moved = self.values + self.beside - centre
-            if moved @ information @ moved < _SETTLED:
+            if moved @ known.information @ moved < _SETTLED:
                 break
-        return mean, covariance, information, pull, centre
+        left = found[0] - self.values - self.beside
+        if left @ known.information @ left > _NEAR * left.size:
+            return None
+        return self._parts(*found, known, centre)
 
-    def _known(self) -> tuple | None:
-        """Information and pull of the values, all else free; and the step of all else after theirs."""
+    def follows(self, fitted: Fitted) -> bool:
+        """Whether the function follows the records as what it is drawn for does.
+
+        A law may do what no function of its family does.
+        """
+        behind = -gain_over(self.fitted, fitted)[0] / max(1.0, fitted.fit.reduced_chi2)
+        return 2 * behind < _WORSE
+
+    def _known(self) -> "_Known | None":
+        """What the records know of the values, all else free."""
         fit = self.fitted.fit
-        matrix = fit.reduced.matrix[fit.good].sum(axis=0) / max(1.0, fit.reduced_chi2)
-        gradient = fit.reduced.gradient[fit.good].sum(axis=0) / max(1.0, fit.reduced_chi2)
+        scale = max(1.0, fit.reduced_chi2)
+        matrix, gradient = (
+            one / scale
+            for one in (fit.reduced.matrix[fit.good].sum(axis=0), fit.reduced.gradient[fit.good].sum(axis=0))
+        )
         inside = np.zeros(gradient.size, bool)
         inside[self.places] = True
         open_ = np.flatnonzero(~inside & ~fit.at_bound & (np.diag(matrix) > 0))
@@ -252,47 +282,42 @@ class _Curve:
         units = np.outer(size, size)
         inner = np.linalg.pinv(matrix[np.ix_(open_, open_)] / units, rcond=1e-10, hermitian=True) / units
         across = matrix[np.ix_(self.places, open_)]
-        information = matrix[np.ix_(self.places, self.places)] - across @ inner @ across.T
-        pull = gradient[self.places] - across @ inner @ gradient[open_]
-        if not np.trace(information) > 0:
-            return None
-
-        def others(step: np.ndarray) -> np.ndarray:
-            whole = np.zeros(gradient.size)
-            whole[open_] = inner @ (gradient[open_] - across.T @ step)
-            return whole
-
         back = np.linalg.inv(self._slopes())
-        return back.T @ information @ back, back.T @ pull, others
+        alone = matrix[np.ix_(self.places, self.places)] - across @ inner @ across.T
+        slope = gradient[self.places] - across @ inner @ gradient[open_]
+        promised = float(gradient[open_] @ inner @ gradient[open_])
+        return _Known(
+            back.T @ alone @ back,
+            back.T @ slope,
+            open_,
+            inner,
+            across,
+            gradient[open_],
+            gradient.size,
+            promised,
+        )
 
-    def _go(self, step: np.ndarray) -> bool:
-        """Go as much of a step as lowers the misfit and the roughness together; false where none does."""
+    def _go(self, step: np.ndarray, promised: float) -> bool:
+        """Go as much of a step as changes the squares as `promised`; false where none does."""
         problem, fit = self.fitted.problem, self.fitted.fit
         bounds = np.array([(one.lower, one.upper) for one in problem.free]).T
         fixed = np.ones(fit.values.size, bool)
+        most = max(1.0, fit.reduced_chi2) * (max(0.0, promised) + 1 + _AS_PROMISED * abs(promised))
         for halving in range(_HALVINGS):
             values = np.clip(fit.values + 0.5**halving * step, *bounds)
             try:
                 tried = minimise(problem, values, fit.starts, most=_FOLLOW, fixed=fixed)
             except SeparatrixError:
                 continue
-            if self._lower(tried, fit):
+            both = tried.good & fit.good
+            followed = both.sum() >= _FOLLOWED * fit.good.sum()
+            if followed and tried.chi2[both].sum() < fit.chi2[both].sum() + most:
                 self.fitted.fit = tried
                 return True
         return False
 
-    def _lower(self, tried: Fit, fit: Fit) -> bool:
-        """Whether a fit follows the same segments no worse."""
-        both = tried.good & fit.good
-        return both.sum() >= 0.98 * fit.good.sum() and tried.chi2[both].sum() < fit.chi2[both].sum() + 1.0
-
-    def parts(
-        self,
-        mean: np.ndarray,
-        covariance: np.ndarray,
-        information: np.ndarray,
-        pull: np.ndarray,
-        centre: np.ndarray,
+    def _parts(
+        self, mean: np.ndarray, covariance: np.ndarray, known: "_Known", centre: np.ndarray
     ) -> list[Part]:
         """The function by direction."""
         names = [""] if self.alike or len(self.member.values) == 1 else self.member.values
@@ -301,19 +326,47 @@ class _Curve:
         for number, name in enumerate(names):
             here = np.arange(number * count, (number + 1) * count)
             there = np.setdiff1d(np.arange(mean.size), here)
-            alone, force = information[np.ix_(here, here)], pull[here]
+            alone, slope = known.information[np.ix_(here, here)], known.gradient[here]
             if there.size:
-                across = information[np.ix_(here, there)]
-                inner = np.linalg.pinv(information[np.ix_(there, there)], rcond=1e-12, hermitian=True)
-                alone, force = alone - across @ inner @ across.T, force - across @ inner @ pull[there]
+                across = known.information[np.ix_(here, there)]
+                inner = np.linalg.pinv(known.information[np.ix_(there, there)], rcond=1e-12, hermitian=True)
+                alone = alone - across @ inner @ across.T
+                slope = slope - across @ inner @ known.gradient[there]
             found.append(
-                Part(name, self.knots, mean[here], covariance[np.ix_(here, here)], alone, force, centre[here])
+                Part(name, self.knots, mean[here], covariance[np.ix_(here, here)], alone, slope, centre[here])
             )
         return found
 
 
-def _drawn(at: np.ndarray, value: np.ndarray, knots: np.ndarray) -> np.ndarray:
+@dataclass
+class _Known:
+    """Information and gradient of the values of a function, all else free, and what all else does then."""
+
+    information: np.ndarray
+    gradient: np.ndarray
+    open_: np.ndarray
+    inner: np.ndarray
+    across: np.ndarray
+    beside: np.ndarray
+    count: int
+    # fall of the squares where all else alone goes to its minimum
+    alone: float
+
+    def others(self, step: np.ndarray) -> np.ndarray:
+        """The step of all else after one of the values."""
+        whole = np.zeros(self.count)
+        whole[self.open_] = self.inner @ (self.beside - self.across.T @ step)
+        return whole
+
+    def promised(self, moved: np.ndarray) -> float:
+        """Change of the squares where the function moves by so much."""
+        return float(moved @ self.information @ moved - 2 * moved @ self.gradient) - self.alone
+
+
+def _drawn(member: Member, at: np.ndarray, value: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """The curve of a table at other knots."""
+    if member.beside:
+        at, value = np.append(0.0, at), np.append(0.0, value)
     return through(at, value)(np.clip(knots, at[0], at[-1]))
 
 
@@ -326,7 +379,7 @@ def _alone(part: Part) -> tuple[np.ndarray, np.ndarray]:
     values, vectors = np.linalg.eigh(part.information / np.outer(size, size))
     kept = values > _UNKNOWN * values[-1]
     rows = (np.sqrt(values[kept])[:, None] * vectors[:, kept].T) * size
-    offset = (vectors[:, kept].T @ (part.pull / size)) / np.sqrt(values[kept])
+    offset = (vectors[:, kept].T @ (part.gradient / size)) / np.sqrt(values[kept])
     return rows, rows @ part.centre + offset
 
 
