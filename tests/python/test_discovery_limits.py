@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.decision.experiments import d_prime
+from separatrix.discovery.decision.experiments import d_primes, experiments
 from separatrix.discovery.decision.limits import detectable
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free, base_parameters
@@ -55,9 +55,9 @@ def fitted(stiffness: float) -> Fitted:
 
 def test_both_machines_get_the_same_drive_from_the_same_states():
     one, other = fitted(1.0), fitted(1.04)
-    assert d_prime(one, one, 1.1, 1.6) == pytest.approx(0, abs=1e-3)
+    assert d_primes(one, [one], 1.1, 1.6) == [pytest.approx(0, abs=1e-3)]
     one.model.asked.clear()
-    assert d_prime(one, other, 1.1, 1.6) > 1
+    assert d_primes(one, [other], 1.1, 1.6)[0] > 1
     # how it settles, and the periods that are compared
     (_, begun), (values, start) = one.model.asked
     (other_values, other_start) = other.model.asked[0]
@@ -71,13 +71,26 @@ def test_both_machines_get_the_same_drive_from_the_same_states():
     assert values["drive.cosine[1]"] == other_values["drive.cosine[1]"] == pytest.approx(0.8 * amplitude)
 
 
+def test_of_several_rivals_the_nearest_counts():
+    one, near, far = fitted(1.0), fitted(1.02), fitted(1.06)
+    found = experiments(one, [far, near])
+    sizes = [each.d_prime for each in found]
+    assert sizes == sorted(sizes, reverse=True)
+    best = found[0]
+    apart = d_primes(one, [far, near], best.drive_ratio, best.scale)
+    assert apart == [d_primes(one, [each], best.drive_ratio, best.scale)[0] for each in (far, near)]
+    assert (best.d_prime, best.rival) == (min(apart), int(np.argmin(apart)))
+    assert {each.rival for each in found} <= {0, 1}
+    assert f"one and {'near' if best.rival else 'far'} would differ" in best.text("one", ["far", "near"])
+
+
 def test_what_the_parameters_of_a_machine_can_be_is_not_apart():
     """A stiffness that the record leaves free tells nothing; the same difference with a known one does."""
     one, other = fitted(1.0), fitted(1.0002)
-    free = d_prime(one, other, 1.1, 1.0)
+    free = d_primes(one, [other], 1.1, 1.0)[0]
     reduced = one.fit.reduced
     reduced.matrix[:] = 1e6 * reduced.matrix
-    assert d_prime(one, other, 1.1, 1.0) > 3 * free
+    assert d_primes(one, [other], 1.1, 1.0)[0] > 3 * free
 
 
 @pytest.mark.parametrize(

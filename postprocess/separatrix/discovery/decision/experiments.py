@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What to measure next: the experiments of the rig, by how far apart they would put two machines.
+"""What to measure next: the experiments of the rig, by how far they would put a machine from its rivals.
 
-One machine is flown to its motion at another drive, the other from the same states, drive period by drive
+One machine is flown to its motion at another drive, the others from the same states, drive period by drive
 period. What the starts of these and the parameters can imitate, the parameters within what the records leave
-of their errors, is projected out; the rest over the noise is d', the size in standard errors.
+of their errors, is projected out; the rest over the noise is d', the size in standard errors. Of several
+rivals that one counts which is hardest to tell.
 """
 
 from collections.abc import Iterator
@@ -28,16 +29,19 @@ _SETTLING, _PERIODS, _STEPS = 12, 12, 40
 
 @dataclass(frozen=True)
 class Experiment:
-    """A record as long as the first one: its drive ratio, scale of the drive or of the start, d'."""
+    """A record as long as the first one: its drive ratio, scale of the drive or of the start, least d'."""
 
     drive_ratio: float | None
     scale: float
     d_prime: float
+    # place of the rival that is hardest to tell
+    rival: int
     # of a joint that is driven along the motion of the first record: how many times as fast
     rate: float | None = None
 
-    def text(self, one: str, other: str) -> str:
+    def text(self, one: str, others: list[str]) -> str:
         """In words."""
+        other = others[self.rival]
         if self.rate is not None:
             return (
                 f"a record along the motion of the first one with {self.scale:g} times the amplitude, "
@@ -51,11 +55,11 @@ class Experiment:
         return f"{what} {where}: {one} and {other} would differ by {self.d_prime:.3g} standard errors"
 
 
-def experiments(one: Fitted, other: Fitted) -> list[Experiment]:
+def experiments(one: Fitted, others: list[Fitted]) -> list[Experiment]:
     """What the rig allows, the most telling first; none where the force on the body must be known."""
     first = one.problem.prepared[0]
     if first.in_force:
-        return _along_other_motions(one, other)
+        return _along_other_motions(one, others)
     if first.record.force is not None:
         return []
     ratios = [None] if first.frequency is None else [float(ratio) for ratio in _RATIOS]
@@ -63,40 +67,44 @@ def experiments(one: Fitted, other: Fitted) -> list[Experiment]:
     for ratio in ratios:
         for scale in _SCALES:
             try:
-                apart = d_prime(one, other, ratio, scale)
+                apart = d_primes(one, others, ratio, scale)
             except SeparatrixError:
                 # no such machine
                 continue
-            if np.isfinite(apart):
-                found.append(Experiment(ratio, scale, apart))
+            if np.isfinite(apart).all():
+                found.append(Experiment(ratio, scale, min(apart), int(np.argmin(apart))))
     return sorted(found, key=lambda experiment: -experiment.d_prime)
 
 
-def d_prime(one: Fitted, other: Fitted, ratio: float | None, scale: float) -> float:
-    """Size in standard errors of what tells two machines apart in a record at a drive ratio of the case."""
+def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: float) -> list[float]:
+    """What tells a machine from others in a record at a drive ratio of the case, in standard errors."""
     first = one.problem.prepared[0]
     frequency = None if ratio is None else one.model.drive_frequency({"drive.ratio": ratio})
     length = 2 * np.pi / (frequency or first.natural or 2 * np.pi / (first.record.t[-1] / _PERIODS))
-    values = [_values(fitted, frequency, scale) for fitted in (one, other)]
-    start = _states(one, values[0], frequency, length, scale)
+    values = _values(one, frequency, scale)
+    start = _states(one, values, frequency, length, scale)
     times = np.tile(np.arange(_STEPS) * length / _STEPS, _PERIODS)
     edges = np.arange(_PERIODS + 1) * _STEPS
-    paths, directions, prior = _directions(one, values[0], scale if ratio is not None else 1.0)
+    paths, directions, prior = _directions(one, values, scale if ratio is not None else 1.0)
     flown = one.model.segments(
-        paths, np.array([values[0][path] for path in paths]), start, edges, times, directions=directions
-    )
-    beside = other.model.segments(
-        list(values[1]), np.array(list(values[1].values())), start, edges, times, derivatives=False
+        paths, np.array([values[path] for path in paths]), start, edges, times, directions=directions
     )
     shape = (_PERIODS, _STEPS)
-    apart = ((beside.x - flown.x) / first.sigma).reshape(shape)
     slopes = (flown.jacobian / first.sigma).reshape(*shape, -1)
-    usable = np.isfinite(apart).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)) & flown.steady
-    if not usable.any():
-        return np.nan
-    # samples of a whole record for each of these
-    seen = np.ptp(first.record.t) / first.record.interval / (usable.sum() * _STEPS)
-    return _left(apart[usable], slopes[usable], directions.shape[0], seen, prior)
+    found = []
+    for other in others:
+        its = _values(other, frequency, scale)
+        beside = other.model.segments(
+            list(its), np.array(list(its.values())), start, edges, times, derivatives=False
+        )
+        apart = ((beside.x - flown.x) / first.sigma).reshape(shape)
+        usable = np.isfinite(apart).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)) & flown.steady
+        if not usable.any():
+            return [np.nan]
+        # samples of a whole record for each of these
+        seen = np.ptp(first.record.t) / first.record.interval / (usable.sum() * _STEPS)
+        found.append(_left(apart[usable], slopes[usable], directions.shape[0], seen, prior))
+    return found
 
 
 def _values(fitted: Fitted, frequency: float | None, scale: float) -> dict[str, float]:
@@ -175,13 +183,13 @@ def _prior(one: Fitted, places: list[int]) -> np.ndarray:
     return prior
 
 
-def _along_other_motions(one: Fitted, other: Fitted) -> list[Experiment]:
+def _along_other_motions(one: Fitted, others: list[Fitted]) -> list[Experiment]:
     """Records of a driven joint along the motion of the first one, larger or smaller, faster or slower."""
-    found = [
-        Experiment(None, scale, _apart_in_force(one, other, scale, rate), rate)
-        for scale in _AMPLITUDES
-        for rate in _RATES
-    ]
+    found = []
+    for scale in _AMPLITUDES:
+        for rate in _RATES:
+            apart = [_apart_in_force(one, other, scale, rate) for other in others]
+            found.append(Experiment(None, scale, min(apart), int(np.argmin(apart)), rate))
     return sorted(found, key=lambda experiment: -experiment.d_prime)
 
 

@@ -30,8 +30,8 @@ from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
 
-# experiments that are told
-_EXPERIMENTS = 5
+# experiments that are told, rivals that they are to tell apart
+_EXPERIMENTS, _RIVALS = 5, 4
 
 
 @dataclass
@@ -120,13 +120,15 @@ def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     if isinstance(final.problem, CoordinateProblem):
         # experiments are flown by one body
         return {"separating_experiment": "", "experiments": []}
-    other = rivals[0] if rivals else findings.base
-    names = [" with ".join(one.names) or "the machine without it" for one in (final, other)]
-    found = [one for one in experiments(final, other) if one.d_prime > 1][:_EXPERIMENTS]
-    said = [one for one in (advice(final, rivals), *(one.text(*names) for one in found[:1])) if one]
+    others = rivals[:_RIVALS] or [findings.base]
+    name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
+    found = [one for one in experiments(final, others) if one.d_prime > 1][:_EXPERIMENTS]
+    said = [one for one in (advice(final, rivals), *(one.text(name, names) for one in found[:1])) if one]
     return {
         "separating_experiment": "; or ".join(said),
-        "experiments": [asdict(one) | {"text": one.text(*names)} for one in found],
+        "experiments": [
+            asdict(one) | {"rival": names[one.rival], "text": one.text(name, names)} for one in found
+        ],
     }
 
 
