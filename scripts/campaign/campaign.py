@@ -103,8 +103,8 @@ def prepare(folders: Folders, seed: int, number: int) -> str:
     return kept.read_text().strip()
 
 
-def ask(case: Path, training: Sequence[str], seed: int, limit: float) -> dict:
-    """The verdict of the discovery workflow."""
+def ask(case: Path, asked: dict[str, list[str]], seed: int, limit: float) -> dict:
+    """The verdict of the discovery workflow; `asked`: records that were made later, by their use."""
     from separatrix.discovery import Options, discover
     from separatrix.errors import SeparatrixError
 
@@ -114,8 +114,10 @@ def ask(case: Path, training: Sequence[str], seed: int, limit: float) -> dict:
     signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, limit)
     try:
-        paths = [case / name for name in training]
-        verdict = discover(case / records.BASE, paths, [case / records.HELD_OUT], Options(seed=seed))
+        training = [*records.TRAINING, *asked.get("training", [])]
+        held_out = [records.HELD_OUT, *asked.get("held out", [])]
+        paths = [[case / name for name in names] for names in (training, held_out)]
+        verdict = discover(case / records.BASE, *paths, Options(seed=seed))
         return {key: verdict[key] for key in KEPT if key in verdict}
     except Late:
         return {"outcome": "failed", "reasons": [f"not done after {limit:g} s of processor time"]}
@@ -138,7 +140,7 @@ def run_case(folders: Folders, seed: int, number: int, limit: float, with_baseli
         return
     case = folders.cases / f"{number:04}"
     began = time.process_time()
-    verdict = ask(case, records.TRAINING, seed, limit)
+    verdict = ask(case, {}, seed, limit)
     seconds = round(time.process_time() - began, 2)
     named = {}
     if with_baselines:
@@ -175,7 +177,8 @@ def follow_up(folders: Folders, seed: int, number: int, limit: float) -> None:
         except SimulationError:
             continue
         began = time.process_time()
-        found |= {"asked": one, "verdict": ask(case, (*records.TRAINING, records.ASKED), seed, limit)}
+        use = {one.get("use", "training"): [records.ASKED]}
+        found |= {"asked": one, "verdict": ask(case, use, seed, limit)}
         found["seconds"] = round(time.process_time() - began, 2)
         break
     write_whole(folders.follow_up(number), json.dumps(found, default=plain) + "\n")

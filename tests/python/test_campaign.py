@@ -30,9 +30,10 @@ def discover(base, records, hold_out, options):
     time.sleep({pause})
     gap = {{"training": {{"before": 2.0, "after": 1.0}}, "held_out": {{"before": 3.0, "after": 1.2}}}}
     doubts = {doubts} and len(records) == 2
+    asked = {{"drive_ratio": 1.2, "scale": 0.6, "d_prime": 9.0, "use": "training"}}
     return {{"outcome": "ambiguous" if doubts else "named", "effects": ["cubic_spring"],
             "alternatives": ["viscous"] if doubts else [], "gap": gap, "version": "0",
-            "experiments": [{{"drive_ratio": 1.2, "scale": 0.6, "d_prime": 9.0}}] if doubts else [],
+            "experiments": [asked] if doubts else [],
             "parameters": {{}}, "records": [str(len(records) + len(hold_out))], "seed": options.seed}}
 """
 

@@ -226,7 +226,10 @@ def test_the_experiment_that_is_asked_for_settles_an_ambiguous_verdict():
     assert sizes == sorted(sizes, reverse=True)
     asked = verdict["experiments"][0]
     assert asked["text"] in verdict["separating_experiment"]
-    # once to be fitted, once to be held out
+    # no other record bears it out, and that is what is asked for
+    assert asked["use"] == "held out"
+    assert asked["text"].endswith("; hold it out")
+    # so small an effect needs it once to be fitted, too
     further = [record_at(true, asked["drive_ratio"], asked["scale"], seed, 12.0) for seed in (5, 6)]
     verdict = discover(without, [*records[:2], further[0]], [records[2], further[1]], options)
     assert (verdict["outcome"], verdict["effects"]) == ("named", ["quadratic_drag"])

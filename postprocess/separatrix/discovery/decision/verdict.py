@@ -123,11 +123,19 @@ def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     others = rivals[:_RIVALS] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
     found = [one for one in experiments(final, others) if one.d_prime > 1][:_EXPERIMENTS]
-    said = [one for one in (advice(final, rivals), *(one.text(name, names) for one in found[:1])) if one]
+    # what was fitted is in no doubt, but no other record bears it out
+    use = (
+        "held out"
+        if not rivals and not findings.decision.accepted[0].gates.get("hold-out", True)
+        else "training"
+    )
+    texts = [f"{one.text(name, names)}{'; hold it out' if use == 'held out' else ''}" for one in found]
+    said = [one for one in (advice(final, rivals), *texts[:1]) if one]
     return {
         "separating_experiment": "; or ".join(said),
         "experiments": [
-            asdict(one) | {"rival": names[one.rival], "text": one.text(name, names)} for one in found
+            asdict(one) | {"rival": names[one.rival], "use": use, "text": text}
+            for one, text in zip(found, texts, strict=True)
         ],
     }
 
