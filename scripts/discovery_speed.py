@@ -26,18 +26,12 @@ sys.path.insert(0, str(SOURCE / "tests" / "generator"))
 import design  # noqa: E402
 import effects  # noqa: E402
 import records  # noqa: E402
-from simulator import STEP  # noqa: E402
 
 SEED = 5
 HIDDEN = (
     ("nothing", "", 0.0, {}),
     ("quadratic drag", "quadratic_drag", 0.05, {}),
-    (
-        "a step of the restitution at 1.2 m/s",
-        "restitution_slope",
-        0.15,
-        {"restitution_shape": STEP, "restitution_constant": 1.2},
-    ),
+    ("spring that hardens with the power 2.2", "cubic_spring", 20.0, {"cubic_exponent": 2.2}),
     ("Maxwell element", "maxwell_element", 1.0, {"maxwell_time": 0.1}),
 )
 """What is hidden, its name, its size, and its shape."""

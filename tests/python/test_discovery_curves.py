@@ -233,6 +233,27 @@ def test_friction_of_a_shape_that_no_effect_has_is_fitted_as_a_function():
     assert all(known.problem.free[i].also for i in known.added)
 
 
+def test_a_closed_form_that_the_function_refutes_is_not_named():
+    """An excess 0.35/(1 + (v/0.4)^2) N is followed by Stribeck's form to the noise, and yet is none."""
+    base = Model.from_text(CASE.format(contact=NEWTON))
+    speeds = np.concatenate([np.linspace(0, 1.2, 12), [1.8, 2.5, 3.5, 5.0]])
+    table = {f"speed[{i}]": one for i, one in enumerate(speeds, start=1)}
+    for key in ("upwards", "downwards"):
+        table |= {f"{key}[{i}]": 0.35 / (1 + (v / 0.4) ** 2) for i, v in enumerate(speeds, start=1)}
+    true = base.with_effect("friction_curve", table)
+    stribeck = base.with_effect("stribeck", {"excess": 0.35, "velocity": 0.3})
+    options = Options(quick=True, most_effects=1, candidates=("stribeck", "viscous", "quadratic_drag"))
+    verdicts = []
+    for machine in (true, stribeck):
+        records = records_of(machine, seconds=8.0)
+        verdicts.append(discover(base, records[:2], records[2:], options))
+    assert [one["outcome"] for one in verdicts] == ["named", "named"]
+    assert [one["effects"] for one in verdicts] == [["friction_curve"], ["stribeck"]]
+    assert not verdicts[0]["function"]["closed_forms"]["stribeck"]["fits"]
+    assert verdicts[1]["function"]["closed_forms"]["stribeck"]["fits"]
+    assert verdicts[0]["function"]["text"].endswith("as no closed form that is known")
+
+
 def test_friction_that_varies_over_the_place_as_a_sine_is_found_as_a_function():
     """Coefficient 0.08 (1 + 0.6 sin(9 x)): no effect has that shape, the family as a table has."""
     case = CASE.format(contact=NEWTON).replace("0.05", "0.08")

@@ -83,6 +83,20 @@ def test_damaged_files_are_refused(tmp_path, ending):
         read_record(path)
 
 
+@pytest.mark.parametrize("share", [0.4, 0.9])
+def test_a_file_that_was_cut_off_is_refused(tmp_path, share):
+    np.savez_compressed(tmp_path / "whole.npz", t=T, x=X)
+    whole = (tmp_path / "whole.npz").read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(SeparatrixError, match="cut"):
+        read_record(tmp_path / "cut.npz")
+    # the directory is there, a member is not what it says
+    middle = len(whole) // 2
+    (tmp_path / "bent.npz").write_bytes(whole[:middle] + b"\0" * 64 + whole[middle + 64 :])
+    with pytest.raises(SeparatrixError, match="bent"):
+        read_record(tmp_path / "bent.npz")
+
+
 def test_what_is_missing_is_told(tmp_path):
     np.savez(tmp_path / "a.npz", time=T, x=X)
     with pytest.raises(SeparatrixError, match=r"found time, x; 't' is missing of t, x\[, v, force, phi\]"):

@@ -11,6 +11,7 @@ import numpy as np
 from separatrix.discovery.decision.added import with_law
 from separatrix.discovery.decision.characterise import characterised, remembered
 from separatrix.discovery.decision.decide import decide
+from separatrix.discovery.decision.forms import with_form
 from separatrix.discovery.decision.partial import decide_in_part, nearest
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.decision.verdict import Findings, verdict_of
@@ -79,7 +80,7 @@ def investigate(
     if options.partial:
         decision = decide_in_part(bench, fitted)
     else:
-        decision = remembered(bench, decide(bench, fitted))
+        decision = with_form(bench, remembered(bench, decide(bench, fitted)))
         decision.reasons += nearest(bench, decision)
         options.progress("asking what the rest of the gap depends on", 0.9)
         decision = with_law(bench, characterised(bench, decision))

@@ -57,6 +57,8 @@ class Decision:
     # what is told only if it closes the gap as a table
     suspected: object | None = None
     not_added: str = ""
+    # what the records tell of the family of a closed form that is named
+    function: object | None = None
 
     @property
     def in_families(self) -> list[str]:
@@ -113,11 +115,11 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
             # the base itself explains what the effect did
             return _without_name(bench, decision)
     if best.gates["adequate"]:
-        return _conclude(bench, decision, *_with_more_foretold(bench, decision, best, rivals))
+        return conclude(bench, decision, *_with_more_foretold(bench, decision, best, rivals))
     if shaped is None and found is not first:
         shaped = _shaped(bench, found, first)
     if shaped is not None and not (_of_several(bench, shaped[0]) and bench.options.most_effects > 1):
-        return _conclude(bench, decision, *shaped)
+        return conclude(bench, decision, *shaped)
     if bench.options.most_effects < 2:
         return _give_up(bench, decision, best)
     rounds = list(decision.rounds)
@@ -125,15 +127,15 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     *more, closed = with_more(bench, rounds, best)
     alone = None if closed else _led_alone(bench, rounds[0], before)
     if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
-        return _conclude(bench, decision, *alone)
+        return conclude(bench, decision, *alone)
     if shaped is not None:
         # a table for each direction says what a law over the speed and one of the direction say with less
         closed = closed and more[0].evidence > shaped[0].evidence
         if not closed and not _only_follows(bench, shaped[0]):
-            return _conclude(bench, decision, *shaped)
+            return conclude(bench, decision, *shaped)
     decision.rounds = rounds
     if closed:
-        return _conclude(bench, decision, *more)
+        return conclude(bench, decision, *more)
     if not settled and more[0].fitted.fit.like_noise(2) and _noise_renewed(bench, more[0]):
         # the memory of the noise is seen only where several effects together leave nothing else
         base = decision.rounds[0].base
@@ -178,7 +180,7 @@ def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
     if shaped is None or _only_follows(bench, shaped[0]):
         return decision
     decision.reasons.clear()
-    return _conclude(bench, decision, *shaped)
+    return conclude(bench, decision, *shaped)
 
 
 def _shaped(bench: Bench, found: Round, earlier: Round | None = None) -> tuple[Judged, list[Judged]] | None:
@@ -304,7 +306,7 @@ def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     return choice(bench, found.base, found.foretold, able or found.judged, foremost)
 
 
-def _conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
+def conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
     """A name, if every gate is passed; else what it could be."""
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]

@@ -25,6 +25,7 @@ from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import friction_at
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.fitting.rig import beside_faults
+from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import function_of
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
@@ -161,7 +162,7 @@ def _function(findings: Findings, final: Fitted) -> dict | None:
     without = [one.base for one in decision.rounds if one.base.names == final.names[:-1]]
     if member is None or not without or not fits_machine(member, without[-1].model):
         return None
-    found = function_of(bench.training, without[-1], final, member)
+    found = decision.function or function_of(bench.training, without[-1], final, member)
     if found is None:
         return None
     table = table_of(final, member) or []
@@ -172,7 +173,8 @@ def _function(findings: Findings, final: Fitted) -> dict | None:
         ]
     fitting = [name for name, one in found.forms.items() if one["fits"]]
     shape = f", as {' or '.join(fitting)}" if fitting else ""
-    if table and not fitting:
+    refuted = found.forms.get(FORM_OF.get(final.names[-1], ""), {"fits": True})["fits"] is False
+    if (table or refuted) and not fitting:
         shape = ", as no closed form that is known"
     return {
         "effect": member.effect,

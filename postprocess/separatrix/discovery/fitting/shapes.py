@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 # probability, or largest deviation over the largest value, from which on a closed form fits
-_LIKELY, _CLOSE = 0.01, 2e-3
+LIKELY, _CLOSE = 0.01, 2e-3
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ FORMS: dict[str, dict[str, Form]] = {
             lambda v, a, b, c: a + b * np.abs(v) ** np.clip(c, 0.1, 8), lambda x: [[0.5, 0.1, 1.5]]
         ),
         "stribeck": Form(
-            lambda v, a, b, c: a + b * np.exp(-((v / c) ** 2)),
+            # an excess that fades within the speeds seen: else it is a parabola
+            lambda v, a, b, c: a + abs(b) * np.exp(-((v / np.clip(abs(c), 1e-3 * v[-1], v[-1])) ** 2)),
             lambda x: [[0.5, 0.2, share * x[-1]] for share in (0.1, 0.3, 0.6)],
         ),
     },
@@ -90,6 +91,17 @@ FORMS: dict[str, dict[str, Form]] = {
     "drive_harmonics": {},
 }
 """By effect: the function over its variable."""
+FORM_OF = {
+    "viscous": "linear",
+    "coulomb": "constant",
+    "quadratic_drag": "quadratic",
+    "stribeck": "stribeck",
+    "position_dependent_friction": "linear",
+    "restitution_slope": "linear",
+    "cubic_spring": "cubic",
+    "compliant_contact": "hertz",
+}
+"""Closed form of its family that an effect is."""
 
 
 def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
@@ -128,7 +140,7 @@ def closed_forms(
             "parameters": [float(one) for one in fit.x],
             "p": p,
             "deviation": deviation,
-            "fits": p > _LIKELY or deviation < _CLOSE,
+            "fits": p > LIKELY or deviation < _CLOSE,
             "at": fine,
             "curve": form.value(fine, *fit.x),
         }

@@ -12,13 +12,14 @@ its support as it says (G. Wahba, J. R. Stat. Soc. B 45 (1983) 133).
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from separatrix.discovery.fitting.curves import knots_over, member_of, table_of, with_table
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.refit import Fitted, gain_over
-from separatrix.discovery.fitting.shapes import closed_forms, through
+from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms, through
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
 
@@ -26,6 +27,10 @@ from separatrix.library import effects
 _KNOTS, _KNOTS_BESIDE_ZERO = 16, 15
 # places at which a series is drawn
 _TURN = 49
+# times that knots are laid
+_PASSES = 3
+# power of the second derivative that the density of knots follows
+_BENT = 0.4
 # share of the segments that a step must follow
 _FOLLOWED = 0.98
 # how often the motion is linearised anew, how often a step is halved, steps of the starts after it
@@ -70,6 +75,8 @@ class Function:
     member: Member
     parts: list[Part]
     forms: dict[str, dict]
+    # squares by which it follows the records better than what it is drawn for
+    gain: float = 0.0
 
 
 def roughness(at: np.ndarray) -> np.ndarray:
@@ -147,12 +154,12 @@ def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None 
         return None
     knots = knots_over(member, seen, _KNOTS_BESIDE_ZERO if member.beside else _KNOTS)
     try:
-        curve = _Curve.begun(data, base, fitted, member, knots)
-        parts = None if curve is None else curve.settle()
+        settled = _settled(data, base, fitted, member, knots)
     except np.linalg.LinAlgError:
         return None
-    if parts is None or not curve.follows(fitted):
+    if settled is None:
         return None
+    parts, gain = settled
     whole = [closed_forms(member.effect, one.at, one.value, *_alone(one)) for one in parts]
     # with two directions a form must fit both; a constant beside an anchor is the machine without the effect
     forms = {
@@ -160,7 +167,62 @@ def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None 
         for name, one in whole[0].items()
         if name != "constant" or not member.anchor
     }
-    return Function(member, parts, forms)
+    own = forms.get(FORM_OF.get(fitted.names[-1], ""))
+    if own is not None:
+        # its own machine says how well it follows the records: a table only draws near to it between knots
+        own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), knots.size)))
+        own["fits"] = own["fits"] or own["p"] > LIKELY
+    return Function(member, parts, forms, gain)
+
+
+def _settled(
+    data: Data, base: Fitted, fitted: Fitted, member: Member, knots: np.ndarray
+) -> tuple[list[Part], float] | None:
+    """The function on knots, and again on knots that lie closer where it bends, until that changes nothing.
+
+    What the last knots change beyond the errors, still closer ones may change again. Also the squares by
+    which it follows the records better than what it is drawn for.
+    """
+    parts, curve = None, None
+    for _ in range(_PASSES):
+        last = parts
+        at = knots if last is None else _closer(member, last)
+        again = _Curve.begun(data, base, fitted if curve is None else curve.fitted, member, at)
+        found = None if again is None else again.settle()
+        if found is None:
+            break
+        parts, curve = found, again
+        changed = [] if last is None else [
+            (_drawn(member, coarse.at, coarse.value, one.at) - one.value) ** 2
+            for one, coarse in zip(parts, last, strict=True)
+        ]  # fmt: skip
+        if changed and all(np.all(one < part.error**2) for one, part in zip(changed, parts, strict=True)):
+            break
+    gain = None if curve is None else curve.gain(fitted)
+    if gain is None or gain < -_WORSE:
+        # a law may do what no function of its family does
+        return None
+    for part, one in zip(parts, changed, strict=False):
+        part.covariance = part.covariance + np.diag(np.maximum(0.0, one - part.error**2))
+    return parts, gain
+
+
+def _closer(member: Member, parts: list[Part]) -> np.ndarray:
+    """As many knots over the same range, half of them where the function bends."""
+    at = np.append(0.0, parts[0].at) if member.beside else parts[0].at
+    bend = np.zeros(at.size)
+    for part in parts:
+        value = np.append(0.0, part.value) if member.beside else part.value
+        bend[1:-1] += np.abs(np.diff(np.diff(value) / np.diff(at)) / (at[2:] - at[:-2]))
+    bend[[0, -1]] = bend[[1, -2]]
+    density = bend**_BENT
+    density = (density[1:] + density[:-1]) / 2 * np.diff(at)
+    if not density.sum() > 0:
+        return parts[0].at
+    share = np.append(0.0, np.cumsum(density)) / density.sum()
+    share = 0.5 * share + 0.5 * np.linspace(0, 1, at.size)
+    found = np.interp(np.linspace(0, 1, at.size), share, at)
+    return found[1:] if member.beside else found
 
 
 @dataclass
@@ -259,13 +321,9 @@ class _Curve:
             return None
         return self._parts(*found, known, centre)
 
-    def follows(self, fitted: Fitted) -> bool:
-        """Whether the function follows the records as what it is drawn for does.
-
-        A law may do what no function of its family does.
-        """
-        behind = -gain_over(self.fitted, fitted)[0] / max(1.0, fitted.fit.reduced_chi2)
-        return 2 * behind < _WORSE
+    def gain(self, fitted: Fitted) -> float:
+        """Squares over the misfit by which the function follows the records better than a fitted machine."""
+        return 2 * float(gain_over(self.fitted, fitted)[0]) / max(1.0, fitted.fit.reduced_chi2)
 
     def _known(self) -> "_Known | None":
         """What the records know of the values, all else free."""

@@ -8,8 +8,10 @@ header are numbers and texts of their names.
 
 import importlib
 import re
+import zlib
 from pathlib import Path
 from types import ModuleType
+from zipfile import BadZipFile
 
 import h5py
 import numpy as np
@@ -32,6 +34,7 @@ _COLUMNS = ("t", *CHANNELS)
 _UNREADABLE = (
     ArithmeticError,
     AttributeError,
+    BadZipFile,
     LookupError,
     MemoryError,
     NotImplementedError,
@@ -39,6 +42,7 @@ _UNREADABLE = (
     RuntimeError,
     TypeError,
     ValueError,
+    zlib.error,
 )
 # specific data types of UFF 58 (displacement, velocity, force) and the columns that they are
 _OF_UFF = {8: "x", 11: "v", 9: "force", 13: "force"}
