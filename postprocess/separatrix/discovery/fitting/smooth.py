@@ -159,7 +159,7 @@ def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None 
         return None
     if settled is None:
         return None
-    parts, gain = settled
+    parts, gain, told = settled
     whole = [closed_forms(member.effect, one.at, one.value, *_alone(one)) for one in parts]
     # with two directions a form must fit both; a constant beside an anchor is the machine without the effect
     forms = {
@@ -170,18 +170,18 @@ def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None 
     own = forms.get(FORM_OF.get(fitted.names[-1], ""))
     if own is not None:
         # its own machine says how well it follows the records: a table only draws near to it between knots
-        own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), knots.size)))
+        own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), told)))
         own["fits"] = own["fits"] or own["p"] > LIKELY
     return Function(member, parts, forms, gain)
 
 
 def _settled(
     data: Data, base: Fitted, fitted: Fitted, member: Member, knots: np.ndarray
-) -> tuple[list[Part], float] | None:
+) -> tuple[list[Part], float, float] | None:
     """The function on knots, and again on knots that lie closer where it bends, until that changes nothing.
 
     What the last knots change beyond the errors, still closer ones may change again. Also the squares by
-    which it follows the records better than what it is drawn for.
+    which it follows the records better than what it is drawn for, and the numbers that records tell of it.
     """
     parts, curve = None, None
     for _ in range(_PASSES):
@@ -202,9 +202,10 @@ def _settled(
     if gain is None or gain < -_WORSE:
         # a law may do what no function of its family does
         return None
+    told = sum(float(np.trace(part.information @ part.covariance)) for part in parts)
     for part, one in zip(parts, changed, strict=False):
         part.covariance = part.covariance + np.diag(np.maximum(0.0, one - part.error**2))
-    return parts, gain
+    return parts, gain, told
 
 
 def _closer(member: Member, parts: list[Part]) -> np.ndarray:
