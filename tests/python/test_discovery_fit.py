@@ -387,7 +387,7 @@ def test_the_noise_is_measured_again_where_several_effects_leave_nothing_else(mo
     monkeypatch.setattr(decide_module, "with_more", lambda *_: (pair, [], next(closed)))
     monkeypatch.setattr(decide_module, "_noise_renewed", lambda *_: True)
     monkeypatch.setattr(decide_module, "minimise", lambda *_, **__: "fitted again")
-    monkeypatch.setattr(decide_module, "_conclude", lambda bench, decision, *found: (decision, *found))
+    monkeypatch.setattr(decide_module, "conclude", lambda bench, decision, *found: (decision, *found))
     bench = SimpleNamespace(options=Options(quick=True), foretell=lambda _: None)
     decision, best, rivals = decide_module.decide(bench, base)
     assert (best, rivals, settled) == (pair, [], [False, True])

@@ -251,7 +251,7 @@ def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, left, n
     monkeypatch.setattr(decide, "misses", lambda told, *_: told.fit > 1.1)
     monkeypatch.setattr(decide, "_shaped", lambda *_: (one, []))
     monkeypatch.setattr(
-        decide, "_conclude", lambda bench, decision, best, rivals: replace(decision, accepted=[best])
+        decide, "conclude", lambda bench, decision, best, rivals: replace(decision, accepted=[best])
     )
     gap = decide.Decision("not-in-catalogue", [], [], [], [], None, None)
     bench = SimpleNamespace(options=OPTIONS)
@@ -458,7 +458,7 @@ def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record
     decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
     options, data = replace(OPTIONS, adequate_chi2=2.0), SimpleNamespace(prepared=[])
     bench = SimpleNamespace(options=options, training=data)
-    assert decide._conclude(bench, decision, best, []).outcome == outcome
+    assert decide.conclude(bench, decision, best, []).outcome == outcome
 
 
 def test_forms_of_one_family_leave_the_family_in_no_doubt():

@@ -117,7 +117,7 @@ def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
 def closed_forms(
     effect: str, at: np.ndarray, value: np.ndarray, rows: np.ndarray, zero: np.ndarray
 ) -> dict[str, dict]:
-    """Closed forms held against a function: parameters, probability, largest relative deviation, fit or not.
+    """Closed forms held against a function: parameters, misfit, its freedom and probability, deviation, fit.
 
     What a form misses of the records is |rows form(at) - zero|^2; `value` is the function that they tell.
     """
@@ -138,6 +138,8 @@ def closed_forms(
         fine = np.linspace(at[0], at[-1], 60)
         found[name] = {
             "parameters": [float(one) for one in fit.x],
+            "misfit": float(2 * fit.cost),
+            "freedom": freedom,
             "p": p,
             "deviation": deviation,
             "fits": p > LIKELY or deviation < _CLOSE,

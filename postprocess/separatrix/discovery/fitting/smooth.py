@@ -169,10 +169,21 @@ def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None 
     }
     own = forms.get(FORM_OF.get(fitted.names[-1], ""))
     if own is not None:
-        # its own machine says how well it follows the records: a table only draws near to it between knots
-        own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), told)))
-        own["fits"] = own["fits"] or own["p"] > LIKELY
+        _judged_by_its_own(forms, own, gain, told)
     return Function(member, parts, forms, gain)
+
+
+def _judged_by_its_own(forms: dict[str, dict], own: dict, gain: float, told: float) -> None:
+    """Forms as they fit where the own machine of one says how well it follows the records.
+
+    A table only draws near to it between knots: what it misses of it more, it misses of the others too.
+    """
+    bias = max(0.0, own["misfit"] - max(0.0, gain))
+    for one in forms.values():
+        one["p"] = max(one["p"], float(chi2.sf(max(0.0, one["misfit"] - bias), one["freedom"])))
+    own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), told)))
+    for one in forms.values():
+        one["fits"] = one["fits"] or one["p"] > LIKELY
 
 
 def _settled(
