@@ -98,7 +98,7 @@ make_venv() {
   local install=(.venv/bin/python -m pip install --quiet --disable-pip-version-check)
   "${install[@]}" -r requirements.txt -r requirements-dev.txt
   # The Python package alone: the program is that of build/.
-  "${install[@]}" -e . -C wheel.cmake=false
+  "${install[@]}" -e . --config-settings=wheel.cmake=false
   wanted > "$stamp"
 }
 
