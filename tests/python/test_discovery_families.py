@@ -168,9 +168,8 @@ def test_the_force_of_a_soft_wall_is_drawn_as_a_function_and_is_that_of_hertz():
     assert found["effect"] == "contact_curve"
     part = found["parts"][0]
     right, (low, high) = 20000 * part["at"] ** 1.5, part["band_95"]
-    # a curve through 15 knots is no power between them: values are near, and bands hold half or more
-    assert np.mean(np.abs(part["value"] / right - 1) < 0.05) >= 0.8
-    assert np.mean((low <= right) & (right <= high)) >= 0.4
+    assert np.mean((low <= right) & (right <= high)) >= 0.8
+    assert np.all((high - low)[7:] < 0.3 * right[7:])
     fitting = {name: one["fits"] for name, one in found["closed_forms"].items()}
     assert fitting == {"linear": False, "hertz": True, "power": True}
 

@@ -27,6 +27,19 @@ from separatrix.library import Model
 RATE, LENGTH = 200, 60
 # zero of the sensor, and by how much the second record has another one
 BIAS, SHIFT = 0.02, 0.004
+SOFT = """[body]
+mass = 1.0
+[restoring]
+law = "linear"
+stiffness = 88.8
+[friction]
+law = "viscous"
+damping = 0.6
+[contact]
+law = "newton"
+restitution = 0.62
+upper = 0.55
+"""
 
 
 @pytest.fixture
@@ -78,6 +91,29 @@ def test_flights_of_a_small_motion_far_from_the_origin_stay_below_its_noise():
     assert tolerance(1e-6, 1.0, 1e-9) == pytest.approx(1e-11, rel=1e-5)
     assert tolerance(1e-6, -1.0, 1e-9) == pytest.approx(1e-11, rel=1e-5)
     assert tolerance(1e-6, 1.0, 1e-15) == 1e-14
+
+
+def test_derivatives_by_a_table_of_contact_forces_are_no_noise(library):
+    """What one value of a long table does is far less than what a flight with steps of its own may err by."""
+    knots = np.linspace(0.004, 0.06, 15)
+    table = {f"penetration[{i}]": one for i, one in enumerate(knots, start=1)}
+    table |= {f"force[{i}]": 20000 * one**1.5 for i, one in enumerate(knots, start=1)} | {"damping": 0.3}
+    model = Model.from_text(SOFT).with_effect("contact_curve", table)
+    random = np.random.default_rng(1)
+    start = np.column_stack([random.uniform(*ends, 40) for ends in ((0.3, 0.54), (2, 5), (0, 6))])
+    flight = (start, 60 * np.arange(41), np.tile(np.linspace(0, 0.6, 60), 40))
+    paths = [f"effect.contact_curve.force[{i}]" for i in (1, 4, 8)]
+    values = np.array([model.parameters[path].value for path in paths])
+    found = model.segments(paths, values, *flight).jacobian[:, : len(paths)]
+    for place, value in enumerate(values):
+        ends = [
+            model.segments(
+                paths, values + step * (np.arange(3) == place), *flight, derivatives=False, tolerance=1e-12
+            ).x
+            for step in (1e-3 * value, -1e-3 * value)
+        ]
+        right = (ends[0] - ends[1]) / (2e-3 * value)
+        assert np.linalg.norm(found[:, place] - right) < 0.1 * np.linalg.norm(right)
 
 
 def test_derivatives_are_central_differences(flown):
