@@ -51,9 +51,6 @@ processor seconds, largest resident memory. {processor} {load}
 
 Bars, for 3 records of 60 s at 10 kHz (1.8 million samples): {bar_wall:.0f} s, with `--quick`
 {bar_quick:.0f} s, {bar_memory:.0f} MB. {met}
-
-Memory grows with the files: they are read as tables of numbers, and only what segments and impacts need is
-condensed.
 """
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from separatrix.discovery.decision.added import with_law
 from separatrix.discovery.decision.characterise import characterised, remembered
 from separatrix.discovery.decision.decide import decide
-from separatrix.discovery.decision.forms import with_form
+from separatrix.discovery.decision.functions import with_function
 from separatrix.discovery.decision.partial import decide_in_part, nearest
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.decision.verdict import Findings, verdict_of
@@ -80,10 +80,11 @@ def investigate(
     if options.partial:
         decision = decide_in_part(bench, fitted)
     else:
-        decision = with_form(bench, remembered(bench, decide(bench, fitted)))
+        decision = remembered(bench, decide(bench, fitted))
         decision.reasons += nearest(bench, decision)
         options.progress("asking what the rest of the gap depends on", 0.9)
         decision = with_law(bench, characterised(bench, decision))
+    decision = with_function(bench, decision)
     # its noise may have been measured again
     findings = Findings(bench, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)

@@ -23,6 +23,7 @@ from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted, shared_values
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.fitting.rig import cleaned_prediction
+from separatrix.discovery.fitting.smooth import Function
 from separatrix.discovery.options import Options
 
 # how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
@@ -57,8 +58,8 @@ class Decision:
     # what is told only if it closes the gap as a table
     suspected: object | None = None
     not_added: str = ""
-    # what the records tell of the family of a closed form that is named
-    function: object | None = None
+    # what the records tell of the function that the last effect is
+    function: Function | None = None
 
     @property
     def in_families(self) -> list[str]:

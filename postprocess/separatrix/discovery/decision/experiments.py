@@ -100,7 +100,8 @@ def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: floa
         apart = ((beside.x - flown.x) / first.sigma).reshape(shape)
         usable = np.isfinite(apart).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)) & flown.steady
         if not usable.any():
-            return [np.nan]
+            found.append(np.nan)
+            continue
         # samples of a whole record for each of these
         seen = np.ptp(first.record.t) / first.record.interval / (usable.sum() * _STEPS)
         found.append(_left(apart[usable], slopes[usable], directions.shape[0], seen, prior))

@@ -17,7 +17,7 @@ from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.curves import fits_machine, member_of, named_member, table_of
+from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, place_of
@@ -26,7 +26,7 @@ from separatrix.discovery.fitting.members import friction_at
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.fitting.rig import beside_faults
 from separatrix.discovery.fitting.shapes import FORM_OF
-from separatrix.discovery.fitting.smooth import function_of
+from separatrix.discovery.fitting.smooth import Function
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
@@ -73,7 +73,7 @@ def verdict_of(findings: Findings) -> dict:
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
         "places": _places(final, named, decision),
         "families": [effect_of(name).family for name in final.names],
-        "function": _function(findings, final),
+        "function": _function(decision.function, final),
         "character": [one.told() for one in decision.characters],
         "gates": best.gates if best else {},
         "leaves": best.leaves if decision.accepted else "",
@@ -150,21 +150,11 @@ def _remaining(findings: Findings) -> list[Remains]:
     return remains_of(findings.base, decision.foretold, decision.corrected, mass)
 
 
-def _function(findings: Findings, final: Fitted) -> dict | None:
-    """The function that the accepted effect is, with its 95 % band and the closed forms that fit it.
-
-    A closed form is shown as the function of its family that the same records tell.
-    """
-    decision, bench = findings.decision, findings.bench
-    if isinstance(final.problem, CoordinateProblem) or not final.names:
-        return None
-    member = member_of(final) or named_member(final)
-    without = [one.base for one in decision.rounds if one.base.names == final.names[:-1]]
-    if member is None or not without or not fits_machine(member, without[-1].model):
-        return None
-    found = decision.function or function_of(bench.training, without[-1], final, member)
+def _function(found: Function | None, final: Fitted) -> dict | None:
+    """The function that the accepted effect is, with its 95 % band and the closed forms that fit it."""
     if found is None:
         return None
+    member = found.member
     table = table_of(final, member) or []
     if member.effect == "friction_curve":
         # the law of the machine is in the friction too

@@ -120,14 +120,12 @@ def with_table(
 
 
 def member_of(fitted: Fitted) -> Member | None:
-    """The family of which a fitted machine holds a table or a series."""
-    return next((one for one in MEMBERS if one.effect in fitted.names), None)
-
-
-def named_member(fitted: Fitted) -> Member | None:
-    """The function of the family that the last effect of a fitted machine is a closed form of."""
-    family = effects()[fitted.names[-1]].family if fitted.names else ""
-    return next((one for one in MEMBERS if one.family == family), None)
+    """The function that the last effect of a fitted machine is, or that it is a closed form of."""
+    last = fitted.names[-1] if fitted.names else ""
+    family = effects()[last].family if last else ""
+    return next((one for one in MEMBERS if one.effect == last), None) or next(
+        (one for one in MEMBERS if one.family == family), None
+    )
 
 
 def table_of(fitted: Fitted, member: Member) -> list[tuple[np.ndarray, np.ndarray]] | None:

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The function that an effect is, as the records tell it, with its band and the closed forms that fit it.
 
-Whatever it was fitted as, the function is taken on many knots. A Gaussian prior on its second derivative
-stands for few of them: a smoothing spline. Over the size of that prior the posterior is averaged, each
-size weighed by its evidence and as likely as any other before (A. Gelman, Bayesian Analysis 1 (2006) 515),
-so that the band has what the records do not tell of the shape. Such a band holds a function on as much of
-its support as it says (G. Wahba, J. R. Stat. Soc. B 45 (1983) 133).
+Whatever it was fitted as, the function is taken on many knots, with a smoothing spline's prior in place of
+few of them, in a machine that is refitted with it.
 """
 
 from dataclasses import dataclass
@@ -14,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.fitting.curves import knots_over, member_of, table_of, with_table
+from separatrix.discovery.fitting.curves import fits_machine, knots_over, member_of, table_of, with_table
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms, through
+from separatrix.discovery.fitting.spline import roughness, smoothed
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
 
@@ -41,8 +39,6 @@ _SETTLED, _NEAR = 0.1, 1.0
 _WORSE = 10.0
 # share of the promised change of the squares by which a step may miss it
 _AS_PROMISED = 0.3
-# precisions of the prior over what the records know, from rough to straight, in decades
-_DECADES = np.linspace(-6, 6, 49)
 # share of the largest eigenvalue, in units of the diagonal, below which a direction is not known
 _UNKNOWN = 1e-10
 
@@ -79,69 +75,13 @@ class Function:
     gain: float = 0.0
 
 
-def roughness(at: np.ndarray) -> np.ndarray:
-    """Matrix of the integral of the squared second derivative of the natural cubic spline through values.
-
-    P. J. Green and B. W. Silverman, Nonparametric Regression (1994), section 2.1.
-    """
-    h = np.diff(at)
-    inner = at.size - 2
-    slopes = np.zeros((at.size, inner))
-    bends = np.zeros((inner, inner))
-    for i in range(inner):
-        slopes[i : i + 3, i] = 1 / h[i], -1 / h[i] - 1 / h[i + 1], 1 / h[i + 1]
-        bends[i, i] = (h[i] + h[i + 1]) / 3
-        if i + 1 < inner:
-            bends[i, i + 1] = bends[i + 1, i] = h[i + 1] / 6
-    return slopes @ np.linalg.solve(bends, slopes.T)
-
-
-def smoothed(
-    information: np.ndarray, gradient: np.ndarray, centre: np.ndarray, penalty: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Mean and covariance of values whose misfit is d^T information d - 2 d^T gradient about a centre.
-
-    None where there are values that neither the records nor their being smooth tell of.
-    """
-    unit = np.trace(information) / np.trace(penalty)
-    if not unit > 0:
-        return None
-    rank = np.linalg.matrix_rank(penalty)
-    found = []
-    for precision in unit * 10**_DECADES:
-        matrix = information + precision * penalty
-        size = np.sqrt(np.diag(matrix))
-        scaled = matrix / np.outer(size, size)
-        values, vectors = np.linalg.eigh(scaled)
-        if not values[0] > 1e-14 * values[-1]:
-            continue
-        inverse = (vectors / values) @ vectors.T / np.outer(size, size)
-        slope = gradient - precision * (penalty @ centre)
-        step = inverse @ slope
-        evidence = 0.5 * (slope @ step - precision * centre @ penalty @ centre + rank * np.log(precision))
-        evidence -= 0.5 * np.sum(np.log(values)) + np.sum(np.log(size))
-        # all sizes of the bend are alike before: steps of the logarithm of the precision are not
-        evidence -= 0.5 * np.log(precision)
-        found.append((evidence, centre + step, inverse))
-    if not found:
-        return None
-    evidences = np.array([one[0] for one in found])
-    weights = np.exp(evidences - evidences.max())
-    weights /= weights.sum()
-    mean = sum(w * one[1] for w, one in zip(weights, found, strict=True))
-    covariance = sum(
-        w * (one[2] + np.outer(one[1] - mean, one[1] - mean)) for w, one in zip(weights, found, strict=True)
-    )
-    return mean, covariance
-
-
-def function_of(data: Data, base: Fitted, fitted: Fitted, member: Member | None = None) -> Function | None:
-    """The function of a fitted effect, a table or a closed form of the `member`; None where there is none.
+def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
+    """The function of the last effect of a fitted machine, be it a table or a closed form; None without one.
 
     `base`: the machine without it.
     """
-    member = member or member_of(fitted)
-    if member is None:
+    member = member_of(fitted)
+    if member is None or not fits_machine(member, base.model):
         return None
     if not member.knots:
         # a series is its own function
