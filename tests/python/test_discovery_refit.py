@@ -88,8 +88,13 @@ def test_segments_are_not_rescued_where_all_others_are_far_behind_a_rival(monkey
     poor.chi2[:] = [others, others, others, 9000.0]
     monkeypatch.setattr(data_module, "rescued", rescued)
     monkeypatch.setattr(data_module, "_without", lambda *_: poor)
-    records = SimpleNamespace(smoothed_starts=lambda _: poor.starts, smoothed_errors=lambda _: poor.starts)
+    records = SimpleNamespace(
+        smoothed_starts=lambda _: poor.starts,
+        smoothed_errors=lambda _: poor.starts,
+        last=0,
+        base_starts=poor.starts.copy(),
+    )
     found = data_module.polished(records, None, poor, 0, 8, rival=fit([8.0], 100.0))
     assert found is poor
-    # of the fit, and of the machine of the others; from the smoother, and from the rival
-    assert asked == ([2, 2] if tried else [])
+    # of the fit, and of the machine of the others; from the smoother, the rival, and the base machine
+    assert asked == ([3, 3] if tried else [])

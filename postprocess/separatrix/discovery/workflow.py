@@ -73,6 +73,7 @@ def investigate(
     fitted = fit_base(data, model, scales.mass if scales else 1.0)
     if not fitted.fit.good.any():
         raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
+    data.base_starts = fitted.fit.starts
     scales = scales or place_scales(fitted.problem, fitted.fit)
     if foretold is not None:
         _prepare_held_out(foretold, data, model, fitted, scales.mass)

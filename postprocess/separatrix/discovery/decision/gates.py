@@ -21,10 +21,17 @@ from separatrix.discovery.decision.judge import (
 from separatrix.discovery.decision.misfit import refuted
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.ceiling import ceiling
-from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.heldout import Prediction, gained_together
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import share_beside_faults, shares_beside_faults
+from separatrix.discovery.fitting.rig import share_beside_faults, shares_beside_faults, weight_of_faults
 from separatrix.discovery.options import Options
+
+# share of the evidence of the best from which on faults of a rig are weighed beside a candidate, and beside
+# how many
+_SHARE = 0.2
+_WEIGHED = 8
+# share of what faults of a rig explain that is known no better, as they are taken as linear
+_LINEAR = 0.1
 
 
 def choice(
@@ -32,15 +39,45 @@ def choice(
 ) -> tuple[Judged, list[Judged]]:
     """What `choose` takes from a pool, and its rivals.
 
-    Who was not asked to foretell is asked now, and the choice is made again.
+    Who was not asked to foretell is asked now, and where the best leaves more than noise or has rivals the
+    leaders are weighed with faults of a rig beside them; then the choice is made again.
     """
     pool = list(pool)
     while True:
         best, rivals = choose(pool, bench.options)
-        if best.prediction is not None or foretold is None:
+        if best.prediction is None and foretold is not None:
+            place = next(i for i, one in enumerate(pool) if one is best)
+            pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
+        elif best.faults is None and (rivals or not best.fitted.fit.like_noise(2)):
+            for one in _leading(pool, best, foretold is not None):
+                weigh_faults(bench, one)
+        else:
             return best, rivals
-        place = next(i for i, one in enumerate(pool) if one is best)
-        pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
+
+
+def weigh_faults(bench: Bench, one: Judged) -> None:
+    """Give the rig of a candidate its faults, where that was not done.
+
+    What faults have moved its parameters by in training they do not foretell with: held-out records are
+    foretold by the parameters beside them, where that is better.
+    """
+    if one.faults is not None:
+        return
+    one.faults = weight_of_faults(one.fitted, one.prediction)
+    if one.prediction is None or one.faults[0] <= 0:
+        return
+    told = bench.foretell_beside_faults(one.fitted, one.prediction)
+    parts, faults = gained_together(told, one.foretold), weight_of_faults(one.fitted, told)
+    if parts.sum() + faults[1] > one.foretold_evidence:
+        one.prediction, one.held_out_parts, one.held_out = told, parts, float(parts.sum())
+        one.faults = faults
+
+
+def _leading(pool: list[Judged], best: Judged, foretold: bool) -> list[Judged]:
+    """Those that faults of a rig may have put behind the best, and itself."""
+    able = [one for one in pool if one.prediction is not None or not foretold]
+    near = [one for one in able if one.evidence > _SHARE * best.evidence]
+    return [best, *sorted(near, key=lambda one: -one.evidence)[:_WEIGHED]]
 
 
 def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
@@ -63,7 +100,9 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
         best.own, best.own_foretold = shares_beside_faults((best.fitted, base), told)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.settled
-    best.gates["detect"] = best.p < options.detection_level and _of_some_size(best, options)
+    best.gates["detect"] = (
+        best.p < options.detection_level and _of_some_size(best, options) and not _within_faults(best)
+    )
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
         helps = any(low > 0 for low, _ in bounds) or foretells(best, options)
@@ -72,6 +111,13 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     best.gates["separate"] = not rivals
     best.gates["admissible"] = admissible(best, base, options)[0]
     best.gates["stable"] = stable(best, base, options) >= options.inclusion
+
+
+def _within_faults(best: Judged) -> bool:
+    """Whether what faults of a rig do not explain of a gain is within the errors of their being linear."""
+    gained = best.training + best.held_out
+    own = best.own * best.training + best.own_foretold * best.held_out
+    return own < _LINEAR * (gained - own)
 
 
 def _of_some_size(best: Judged, options: Options) -> bool:

@@ -26,6 +26,8 @@ _SILENT = 0.01
 _DOUBTLESS = 10.0
 # p value of so many segments in which a held-out record is foretold better
 _CHANCE = 0.05
+# share of what faults of a rig do that is not linear
+_LINEAR = 0.2
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
 _KINK_SHARE = 0.01
 
@@ -50,6 +52,9 @@ class Judged:
     foretold: Prediction | None = None
     # what it leaves, if it is adequate
     leaves: str = ""
+    # log-likelihood that faults of a rig beside it add, where it was fitted and where it foretold; None where
+    # that was not asked
+    faults: tuple[float, float] | None = None
 
     @property
     def name(self) -> str:
@@ -66,7 +71,17 @@ class Judged:
     @property
     def evidence(self) -> float:
         """Log-likelihood gained, less one per parameter (Akaike), plus the score on what was not fitted."""
-        return self.training - self.parameters + self.held_out
+        return self.fitted_evidence + self.foretold_evidence
+
+    @property
+    def fitted_evidence(self) -> float:
+        """Of the records that were fitted."""
+        return self.training - self.parameters + (self.faults[0] if self.faults else 0.0)
+
+    @property
+    def foretold_evidence(self) -> float:
+        """Of the records that were foretold."""
+        return self.held_out + (self.faults[1] if self.faults else 0.0)
 
 
 def judged(
@@ -85,8 +100,9 @@ def lead(one: Judged, other: Judged) -> float:
     """Evidence of one candidate over another, of the same base, held against each other."""
     if one.prediction is None or other.prediction is None:
         return one.evidence - other.evidence
-    fitted = one.training - one.parameters - (other.training - other.parameters)
-    return fitted + ahead(one.prediction, other.prediction)
+    fitted = one.fitted_evidence - other.fitted_evidence
+    more = (one.foretold_evidence - one.held_out) - (other.foretold_evidence - other.held_out)
+    return fitted + ahead(one.prediction, other.prediction) + more
 
 
 def detection(one: Judged, tested: float, inflation: float) -> float:
@@ -265,7 +281,10 @@ def clear_of(best: Judged, other: Judged, options: Options) -> bool:
     """
     least = margin(best, other, options)
     over = lead(best, other)
-    fitted = best.training - best.parameters - (other.training - other.parameters)
+    fitted = best.fitted_evidence - other.fitted_evidence
+    if best.faults and other.faults:
+        # both have them already, as far as they are linear
+        return over >= least and min(fitted, over - fitted) > -max(least, _LINEAR * over)
     if over < least or min(fitted, over - fitted) <= -least:
         return False
     return over * share_beside_faults(best.fitted, other.fitted) >= least

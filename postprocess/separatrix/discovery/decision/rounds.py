@@ -24,6 +24,7 @@ from separatrix.discovery.fitting.refit import (
     in_place_of,
     refit,
 )
+from separatrix.discovery.fitting.rig import beside_faults, cleaned
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
 
@@ -61,6 +62,15 @@ class Bench:
         misfit = max(1.0, fit.reduced_chi2)
         known = Known(fit.values, fitted.covariance, fitted.unseen)
         return predict(self.held_out, fitted.model, free, known, misfit, other)
+
+    def foretell_beside_faults(self, fitted: Fitted, other: Prediction) -> Prediction:
+        """The same by the parameters as they are beside faults of a rig in the training records."""
+        free, fit = fitted.problem.free, fitted.fit
+        beside = beside_faults(fitted.problem, fit)
+        lower, upper = (np.array([getattr(one, side) for one in free]) for side in ("lower", "upper"))
+        known = Known(np.clip(fit.values + beside.shift, lower, upper), beside.covariance, fitted.unseen)
+        misfit = max(1.0, cleaned(fitted.problem, fit).reduced_chi2)
+        return replace(predict(self.held_out, fitted.model, free, known, misfit, other), beside_faults=True)
 
 
 @dataclass

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
+from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates, weigh_faults
 from separatrix.discovery.decision.judge import Judged, admissible, beyond_doubt, judged
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
@@ -14,7 +14,6 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, hopeless, led_by, refit
-from separatrix.discovery.fitting.rig import shares_beside_faults
 from separatrix.discovery.fitting.screen import screen, signature
 
 _PAIRS = 6
@@ -138,21 +137,16 @@ def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool
         if other is None:
             # it cannot be fitted
             continue
+        weigh_faults(bench, whole)
+        weigh_faults(bench, other)
         if whole.evidence - other.evidence < least:
             return False
         if whole.prediction is not None and other.prediction is not None:
             over = over_base(bench, other.fitted, other.prediction, whole)
-            if over.held_out <= 0 and not beyond_doubt(over, other.fitted, bench.options):
-                return False
-            if _beside_faults(over, other) < least:
+            foretold = over.held_out + whole.faults[1] - other.faults[1]
+            if foretold <= 0 and not beyond_doubt(over, other.fitted, bench.options):
                 return False
     return True
-
-
-def _beside_faults(over: Judged, other: Judged) -> float:
-    """Evidence of what a set has more than a part of it, against that part with faults of a rig, too."""
-    own, own_foretold = shares_beside_faults((over.fitted, other.fitted), (over.prediction, other.prediction))
-    return own * over.training + own_foretold * max(0.0, over.held_out) - over.parameters
 
 
 def without(bench: Bench, first: Round, name: str, names: Iterable[str]) -> Judged | None:

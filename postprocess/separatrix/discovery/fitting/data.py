@@ -45,6 +45,8 @@ class Data:
     prepared: list[Prepared]
     smoothed: list[Smoothed]
     stages: list[Segments]
+    # starts of the longest segments by the base machine, tried where another machine is caught
+    base_starts: np.ndarray | None = None
 
     @property
     def last(self) -> int:
@@ -257,6 +259,8 @@ def polished(
     behind it on these, the suspects are not what the fit lacks.
     """
     tried = [data.smoothed_starts(stage), *([] if rival is None else [rival.starts])]
+    if stage == data.last and data.base_starts is not None and tried[-1] is not data.base_starts:
+        tried.append(data.base_starts)
     errors = data.smoothed_errors(stage)
     if suspects is None:
         suspects = suspicious(fit)

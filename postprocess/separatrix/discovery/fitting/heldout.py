@@ -38,6 +38,8 @@ class Prediction:
     misfit: float
     # of the parameters of the machine, which come first among those that are free and were not fitted here
     covariance: np.ndarray
+    # whether the parameters are those beside faults of a rig in the training records
+    beside_faults: bool = False
 
     @property
     def reduced_chi2(self) -> float:

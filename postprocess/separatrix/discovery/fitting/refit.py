@@ -357,7 +357,21 @@ def common(one: Fitted, other: Fitted) -> np.ndarray:
 
 
 def gain_over(one: Fitted, other: Fitted) -> tuple[float, np.ndarray]:
-    """Log-likelihood of `one` over that of `other`, and its parts by segment."""
-    both = common(one, other)
-    parts = np.where(both, 0.5 * (other.fit.chi2 - one.fit.chi2), 0.0)
+    """Log-likelihood of `one` over that of `other`, and its parts by segment.
+
+    A segment that one of them flies without steady impacts could not be fitted: its chi^2 is at most what is
+    found, and what that proves for the one that flies it counts.
+    """
+    parts = 0.5 * (other.fit.chi2 - one.fit.chi2)
+    proven = [
+        _bounded_by(one) & other.fit.good & (parts > 0),
+        one.fit.good & _bounded_by(other) & (parts < 0),
+    ]
+    parts = np.where(common(one, other) | proven[0] | proven[1], parts, 0.0)
     return float(parts.sum()), parts
+
+
+def _bounded_by(fitted: Fitted) -> np.ndarray:
+    """Segments that are flown to their end, but not with steady impacts."""
+    evaluation = fitted.fit.evaluation
+    return ~evaluation.failed & ~evaluation.steady & (fitted.fit.counts > 0)

@@ -124,13 +124,15 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
 
 def cleaned_prediction(fitted: Fitted, told: Prediction) -> Fit:
     """What a machine foretells, without what faults may explain of it and may have made of its parameters."""
-    return cleaned(told.problem, told.fit, _shared(fitted))
+    return cleaned(told.problem, told.fit, _shared(fitted, told))
 
 
-def _shared(fitted: Fitted) -> Beside:
-    """What training records know beside faults of the parameters that held-out records share with them."""
+def _shared(fitted: Fitted, told: Prediction) -> Beside:
+    """What training records know beside faults of the parameters that held-out records share with them, as a
+    step from those that foretold."""
     shared = [i for i, one in enumerate(fitted.problem.free) if one.record is None]
-    return beside_faults(fitted.problem, fitted.fit).of(shared)
+    known = beside_faults(fitted.problem, fitted.fit).of(shared)
+    return replace(known, shift=np.zeros_like(known.shift)) if told.beside_faults else known
 
 
 def beside_faults(problem: Problem, fit: Fit) -> Beside:
@@ -225,17 +227,35 @@ def shares_beside_faults(
     return _share(training), _share(held_out, training)
 
 
+def weight_of_faults(fitted: Fitted, told: Prediction | None) -> tuple[float, float]:
+    """Log-likelihood by which faults of a rig beside a machine follow records better, those that were fitted
+    and those that it foretold; nothing where they do not pay for their freedom in training.
+
+    The noise counts as known: what one machine leaves is held against what others leave.
+    """
+    training = _contest(fitted, fitted, noise_known=True)
+    size = int(np.argmax(training.faults))
+    if training.faults[size] <= 0:
+        return 0.0, 0.0
+    if told is None:
+        return float(training.faults[size]), 0.0
+    held_out = _foretold_contest((told, told), fitted, noise_known=True)
+    return float(training.faults[size]), float(held_out.faults[size])
+
+
 def evidence_of_faults(fitted: Fitted, told: Prediction) -> float:
     """Evidence that a rig has faults where a machine is right but for them; 0 if nothing speaks for them."""
     both = _contest(fitted, fitted) + _foretold_contest((told, told), fitted)
     return max(0.0, float(both.faults.max()))
 
 
-def _foretold_contest(told: tuple[Prediction, Prediction], other: Fitted) -> Contest:
+def _foretold_contest(
+    told: tuple[Prediction, Prediction], other: Fitted, noise_known: bool = False
+) -> Contest:
     """Of what they foretell; the other one is known as training records know it, without or beside faults."""
-    beside = _shared(other)
+    beside = _shared(other, told[1])
     without = Beside(np.zeros(beside.shift.size), told[1].covariance)
-    return _contest(*told, (without, beside))
+    return _contest(*told, (without, beside), noise_known)
 
 
 def _share(new: Contest, known: Contest | None = None) -> float:
@@ -247,9 +267,15 @@ def _share(new: Contest, known: Contest | None = None) -> float:
 
 
 def _contest(
-    one: Fitted | Prediction, other: Fitted | Prediction, known: tuple[Beside, Beside] | None = None
+    one: Fitted | Prediction,
+    other: Fitted | Prediction,
+    known: tuple[Beside, Beside] | None = None,
+    noise_known: bool = False,
 ) -> Contest:
-    """Hold a machine against another one whose parameters are `known` without and beside faults, or free."""
+    """Hold a machine against another one whose parameters are `known` without and beside faults, or free.
+
+    Unless the noise is known, it counts as larger where the machine is worse than it.
+    """
     evaluation, both = other.fit.evaluation, common(one, other)
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
     faults = fault_columns(other.problem, other.fit)
@@ -260,7 +286,7 @@ def _contest(
     residual = np.where(both[:, None], evaluation.residual, 0.0)
     by_start = np.where(both[:, None, None], evaluation.by_start, 0.0)
     misfit = one.misfit if isinstance(one, Prediction) else max(1.0, one.fit.reduced_chi2)
-    weights = evaluation.used * both[:, None] / misfit
+    weights = evaluation.used * both[:, None] / (1.0 if noise_known else misfit)
     reduced, _, _ = eliminate(blocks_of(by_start, columns, residual, weights))
     open_ = np.r_[~other.fit.at_bound & other.fit.movable, np.ones(q + 1, bool)]
     equations = _Evidence(*reduced.total(), open_, p)

@@ -232,7 +232,7 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
             raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no stretch to be fitted")
-    return SensedData(prepared, calm, stages, model, bodies)
+    return SensedData(prepared, calm, stages, model=model, bodies=bodies)
 
 
 def _calm(structure: Structure, t: np.ndarray, seen: dict[str, Smoothed]) -> Smoothed:
