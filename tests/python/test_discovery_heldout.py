@@ -36,7 +36,9 @@ def candidate(foretold, parameters, training):
         reduced_chi2=foretold.misfit,
         chi2=np.full(count, -2 * training / count),
         good=foretold.good,
+        counts=foretold.fit.counts,
         at_bound=np.zeros(parameters, bool),
+        evaluation=SimpleNamespace(failed=~foretold.good, steady=foretold.good),
     )
     free = [SimpleNamespace(record=None, positive=True) for _ in range(parameters)]
     fitted = SimpleNamespace(fit=fit, added=tuple(range(parameters)), problem=SimpleNamespace(free=free))

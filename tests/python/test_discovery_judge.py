@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, flexible, judge, several
-from separatrix.discovery.decision.gates import foremost
+from separatrix.discovery.decision import decide, flexible, gates, judge, several
+from separatrix.discovery.decision.gates import choice, foremost
 from separatrix.discovery.decision.judge import (
     Judged,
     _together_clear,
@@ -361,6 +361,28 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
     assert [one.name for one in close] == rivals
 
 
+@pytest.mark.parametrize(("explained", "first"), [(15.0, "viscous"), (25.0, "stribeck")])
+def test_the_better_of_two_is_so_with_faults_of_a_rig_beside_both(monkeypatch, explained, first):
+    """Two effects that leave more than noise: faults of the rig explain more of it beside the second."""
+    pool = [contender("viscous", 50.0), contender("stribeck", 40.0)]
+    for one in pool:
+        one.fitted.fit.chi2 = np.full(COUNT, 60.0)
+    weights = {"viscous": 10.0, "stribeck": explained}
+    monkeypatch.setattr(gates, "weight_of_faults", lambda fitted, _: (weights[fitted.names[-1]], 0.0))
+    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
+    best, rivals = choice(SimpleNamespace(options=OPTIONS), None, None, pool, foremost)
+    assert best.name == first
+    assert rivals == []
+
+
+@pytest.mark.parametrize(("own", "within"), [(0.05, True), (0.2, False)])
+def test_what_is_left_of_a_gain_beside_faults_is_more_than_their_errors(own, within):
+    """A fault is known as far as the motion is linear in it, to a tenth."""
+    one = contender("viscous", 200.0)
+    one.own = own
+    assert gates._within_faults(one) == within
+
+
 @pytest.mark.parametrize("better", [80.0, 20.0])
 def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better):
     """What a set is held against must not be caught in a minimum that the set left."""
@@ -384,21 +406,26 @@ def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better
     assert first.judged == [part, *alone[1:]]
 
 
-@pytest.mark.parametrize(("information", "own", "needed"), [
-    (1e-3, 1.0, True),
-    (1e3, 1.0, False),
-    # faults of the rig may be all that it explains
-    (1e-3, 0.1, False),
+@pytest.mark.parametrize(("information", "faults", "needed"), [
+    (1e-3, 0.0, True),
+    (1e3, 0.0, False),
+    # faults of the rig explain what it does
+    (1e-3, 79.0, False),
 ])  # fmt: skip
 def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_it(
-    monkeypatch, information, own, needed
+    monkeypatch, information, faults, needed
 ):
     """As of restitution in impacts of one speed, which noise makes 0.5 worse there."""
 
     def one(*names, evidence):
         return SimpleNamespace(
-            fitted=replace(base, names=names), evidence=evidence, prediction=SimpleNamespace()
+            fitted=replace(base, names=names), evidence=evidence, prediction=SimpleNamespace(), faults=None
         )
+
+    def weigh(bench, one):
+        if one.faults is None:
+            one.faults = (0.0 if one is whole else faults, 0.0)
+            one.evidence += one.faults[0]
 
     base = fitted("", np.full(COUNT, 100.0))
     whole = one("quadratic_drag", "restitution_slope", evidence=100.0)
@@ -408,7 +435,7 @@ def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_
         "quadratic_drag": foretold(np.array([*6 * [0.95], *6 * [-1.0]]), np.full(12, information)),
     }
     monkeypatch.setattr(several, "without", lambda *_: parts["restitution_slope"])
-    monkeypatch.setattr(several, "shares_beside_faults", lambda *_: (own, own))
+    monkeypatch.setattr(several, "weigh_faults", weigh)
     monkeypatch.setattr(several, "over_base", lambda bench, base, *_: over[base.names[0]])
     bench = SimpleNamespace(options=OPTIONS)
     assert several._all_needed(bench, None, whole, parts["quadratic_drag"]) == needed

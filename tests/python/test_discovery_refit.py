@@ -98,3 +98,15 @@ def test_segments_are_not_rescued_where_all_others_are_far_behind_a_rival(monkey
     assert found is poor
     # of the fit, and of the machine of the others; from the smoother, the rival, and the base machine
     assert asked == ([3, 3] if tried else [])
+
+
+@pytest.mark.parametrize(("chi2", "gained"), [(60.0, 20.0), (140.0, 0.0)])
+def test_a_segment_with_unsteady_impacts_counts_for_what_its_squares_prove(chi2, gained):
+    """Its start could not be fitted, so that it may be followed better still: never worse."""
+    base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 100.0), ())
+    one = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 100.0), ())
+    one.fit.evaluation.steady = np.array([True, False, True, False])
+    one.fit.evaluation.failed = np.array([False, False, False, True])
+    one.fit.chi2[1], one.fit.chi2[3] = chi2, 0.0
+    assert refit.gain_over(one, base)[0] == pytest.approx(gained)
+    assert refit.gain_over(base, one)[0] == pytest.approx(-gained)

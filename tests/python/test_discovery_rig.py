@@ -66,6 +66,13 @@ def test_a_curved_sensor_is_no_gap():
     assert again.total == pytest.approx(gap.fit.total, abs=0.2 * (base.fit.total - gap.fit.total))
 
 
+@pytest.mark.parametrize("curved", [0.0, 2e-3])
+def test_a_bent_sensor_is_no_memory_of_the_noise(curved):
+    """It leaves kinks where the speed jumps, smooth otherwise: the noise is white all the same."""
+    base, _ = fitted_base(drag=0.0, curved=curved)
+    assert base.problem.prepared[0].memory == 0
+
+
 def test_a_sensor_that_is_more_curved_than_rigs_are_is_a_gap():
     base, _ = fitted_base(drag=0.0, curved=3e-3)
     gap = ceiling(base.problem, base.fit, 1.0)
