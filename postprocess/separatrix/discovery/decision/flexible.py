@@ -105,7 +105,7 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
         for count in KNOTS:
             knots = knots_at(member, seen, count)
             made = (
-                None if knots is None else fit_member(bench.training, found.base, member, known, knots, alike)
+                None if knots is None else fit_member(bench.training, found.base, member, known, knots, alike, ahead)
             )
             if made is None:
                 break

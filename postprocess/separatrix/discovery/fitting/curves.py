@@ -5,6 +5,8 @@
 The number of knots is chosen by the evidence.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from separatrix.discovery.fitting.data import Data, polished
@@ -12,7 +14,7 @@ from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.refit import Fitted, values_of
+from separatrix.discovery.fitting.refit import Fitted, beaten, values_of
 from separatrix.discovery.measured.bodies import is_structure
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
@@ -61,21 +63,31 @@ def knots_over(member: Member, seen: np.ndarray, count: int) -> np.ndarray:
 
 
 def fit_member(
-    data: Data, base: Fitted, member: Member, known: Fitted, knots: np.ndarray, alike: bool
+    data: Data,
+    base: Fitted,
+    member: Member,
+    known: Fitted,
+    knots: np.ndarray,
+    alike: bool,
+    ahead: Fitted | None = None,
 ) -> Fitted | None:
     """The base machine with a table in place of an effect, fitted from a `known` machine; None if none.
 
-    Where the table has values of both directions and they are `alike`, they are fitted as one.
+    Where the table has values of both directions and they are `alike`, they are fitted as one. What cannot come
+    near a machine `ahead` any more is not fitted to its end.
     """
     begun = member.known(known, base, knots)
     made = None if begun is None else with_table(data, base, member, known, knots, begun, alike)
     if made is None:
         return None
     model, problem, values = made
-    fit = minimise(problem, values, known.fit.starts, most=40, patient=True)
-    fit = polished(data, problem, fit, data.last, 40, rival=base.fit)
+    beat = None if ahead is None else ahead.fit.total
+    fit = minimise(problem, values, known.fit.starts, most=40, patient=True, beat=beat)
     added = [i for i, one in enumerate(problem.free) if one.path.startswith(f"effect.{member.effect}.")]
-    return Fitted((*base.names, member.effect), model, problem, fit, tuple(added))
+    found = Fitted((*base.names, member.effect), model, problem, fit, tuple(added))
+    if ahead is not None and beaten(found, ahead):
+        return found
+    return replace(found, fit=polished(data, problem, fit, data.last, 40, rival=base.fit))
 
 
 def with_table(
