@@ -104,9 +104,9 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in KNOTS:
             knots = knots_at(member, seen, count)
-            made = (
-                None if knots is None else fit_member(bench.training, found.base, member, known, knots, alike, ahead)
-            )
+            made = None
+            if knots is not None:
+                made = fit_member(bench.training, found.base, member, known, knots, alike, ahead)
             if made is None:
                 break
             bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)

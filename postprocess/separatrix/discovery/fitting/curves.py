@@ -73,8 +73,8 @@ def fit_member(
 ) -> Fitted | None:
     """The base machine with a table in place of an effect, fitted from a `known` machine; None if none.
 
-    Where the table has values of both directions and they are `alike`, they are fitted as one. What cannot come
-    near a machine `ahead` any more is not fitted to its end.
+    Where the table has values of both directions and they are `alike`, they are fitted as one. What cannot
+    come near a machine `ahead` any more is not fitted to its end.
     """
     begun = member.known(known, base, knots)
     made = None if begun is None else with_table(data, base, member, known, knots, begun, alike)
