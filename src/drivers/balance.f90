@@ -15,26 +15,34 @@ module balance
 
 contains
 
-  !> Says which share of the `elapsed` seconds the ranks computed (least, mean, most), the largest memory of a rank
-  !> and the bytes of results written. In plain text only for several ranks. Collective.
-  subroutine report_balance(team, journal, busy, elapsed)
+  !> Says which share of the `elapsed` seconds the ranks computed (least, mean, most), which of it those of `gpus` waited for
+  !> them, the largest memory of a rank and the bytes of results written. In plain text only for several ranks, or where a
+  !> GPU computes. Collective.
+  subroutine report_balance(team, journal, busy, waited, elapsed, gpus)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
-    real(wp), intent(in) :: busy, elapsed
+    real(wp), intent(in) :: busy, waited, elapsed
+    integer, intent(in) :: gpus
+    character(len=:), allocatable :: of_gpus
     real(wp), allocatable :: facts(:)
-    real(wp) :: shares(team%size())
+    real(wp) :: shares(team%size()), waiting
     integer(int64) :: resident
-    call team%gather([100*busy/max(elapsed, tiny(elapsed)), real(resident_bytes(), wp)], facts)
+    call team%gather([100*busy/max(elapsed, tiny(elapsed)), real(resident_bytes(), wp), &
+                      100*waited/max(elapsed, tiny(elapsed))], facts)
     journal%written = total(team, journal%written)
     if (.not. team%is_root()) return
-    shares = min(100.0_wp, facts(1::2))
-    resident = nint(maxval(facts(2::2)), int64)
+    shares = min(100.0_wp, facts(1::3))
+    resident = nint(maxval(facts(2::3)), int64)
+    waiting = sum(facts(3::3))/max(1, gpus)
+    of_gpus = ''
+    if (gpus > 0) of_gpus = ', waiting for a GPU '//to_text(waiting, 3)//' %'
     call journal%line('balance', 'ranks busy '//to_text(sum(shares)/size(shares), 3)//' % of the time ('// &
-      to_text(minval(shares), 3)//' to '//to_text(maxval(shares), 3)//' %), at most '//to_text(resident/2**20)// &
+      to_text(minval(shares), 3)//' to '//to_text(maxval(shares), 3)//' %)'//of_gpus//', at most '//to_text(resident/2**20)// &
       ' MiB each, '//to_text(journal%written)//' bytes written', &
       '"busy_percent_min": '//to_text(minval(shares), 6)//', "busy_percent_mean": '//to_text(sum(shares)/size(shares), 6)// &
       ', "busy_percent_max": '//to_text(maxval(shares), 6)//', "busy_percent": ['//to_text(shares(1), 4)//listed(shares(2:))// &
-      '], "resident_bytes_max": '//to_text(resident)//', "written_bytes": '//to_text(journal%written), plain=team%size() > 1)
+      '], "resident_bytes_max": '//to_text(resident)//', "written_bytes": '//to_text(journal%written)// &
+      ', "gpu_wait_percent_mean": '//to_text(waiting, 6), plain=team%size() > 1 .or. gpus > 0)
   end subroutine report_balance
 
   integer(int64) function total(team, mine)

@@ -17,7 +17,7 @@ module device_choice
   use refined_tile, only: layers_of
   use refinement, only: automatic_block
   use status, only: exit_usage
-  use system, only: host_name
+  use system, only: host_name, may_use_core, online_cores
   use team, only: host_length, team_t
   use text, only: join, to_text
   implicit none
@@ -28,7 +28,7 @@ module device_choice
   !> Starts that are to fly at once for `auto` to choose a GPU: it has room for a hundred times as many, and one thread of it is
   !> slow. The results are the same. For tests the environment may say another number.
   integer, parameter :: fewest_starts = 1024
-  character(len=*), parameter :: fewest_variable = 'SEPARATRIX_GPU_STARTS'
+  character(len=*), parameter :: fewest_variable = 'SEPARATRIX_GPU_STARTS', threads_variable = 'SEPARATRIX_GPU_THREADS'
 
 contains
 
@@ -40,12 +40,12 @@ contains
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: why, asked
-    integer :: place, count
+    integer :: place, neighbours, count
     integer(int64) :: starts
     call use_gpu(-1)
     asked = trim(command%device)
     ! Before any return, as ranks may be asked for different things.
-    place = place_on_host(team)
+    call find_place(team, place, neighbours)
     if (asked == 'cpu') return
     starts = starts_at_once(command, the_case, team%size())
     if (asked == 'auto' .and. starts < fewest()) return
@@ -66,19 +66,26 @@ contains
       call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several '// &
                 'bodies); allowed are auto and cpu')
     end if
-    if (count > 0) call use_gpu(gpu_number(modulo(place, count)))
+    if (count > 0) call use_gpu(gpu_number(modulo(place, count)), threads_of(neighbours))
   end subroutine choose_device
 
   !> What `auto` asks for.
   integer function fewest()
+    fewest = asked_number(fewest_variable, fewest_starts)
+  end function fewest
+
+  !> The number, at least 1, that a variable of the environment has, else `usual`.
+  integer function asked_number(variable, usual) result(number)
+    character(len=*), intent(in) :: variable
+    integer, intent(in) :: usual
     character(len=16) :: text
     integer :: asked, status
-    fewest = fewest_starts
-    call get_environment_variable(fewest_variable, text, status=status)
+    number = usual
+    call get_environment_variable(variable, text, status=status)
     if (status /= 0) return
     read (text, *, iostat=status) asked
-    if (status == 0) fewest = max(1, asked)
-  end function fewest
+    if (status == 0) number = max(1, asked)
+  end function asked_number
 
   !> About so many starts of one machine fly together, if every rank has a GPU: those of a tile. 0 where all are flown one by
   !> one; many where the case lacks what the command needs, which is said later.
@@ -129,9 +136,19 @@ contains
     close (unit)
   end function lines_of
 
-  !> Number of this rank among those of its host, from 0. Collective.
-  integer function place_on_host(team) result(place)
+  !> Threads that attend to the bodies of a rank that has so many `neighbours` on its host, itself included: one for each of its
+  !> cores.
+  integer function threads_of(neighbours) result(threads)
+    integer, intent(in) :: neighbours
+    integer :: cores, i
+    cores = online_cores()
+    threads = asked_number(threads_variable, max(1, min(cores/neighbours, count([(may_use_core(i), i=0, cores - 1)]))))
+  end function threads_of
+
+  !> Number of this rank among the `neighbours` on its host, from 0. Collective.
+  subroutine find_place(team, place, neighbours)
     class(team_t), intent(in) :: team
+    integer, intent(out) :: place, neighbours
     character(len=host_length), allocatable :: names(:)
     real(wp), allocatable :: hosts(:)
     character(len=host_length) :: mine
@@ -139,7 +156,8 @@ contains
     call team%hosts(mine, names)
     call team%allgather([real(findloc(names == mine, .true., dim=1), wp)], hosts)
     place = count(nint(hosts(:team%rank())) == nint(hosts(team%rank() + 1)))
-  end function place_on_host
+    neighbours = count(nint(hosts) == nint(hosts(team%rank() + 1)))
+  end subroutine find_place
 
   !> Whether bodies of the case fly in lanes; `on_gpu`: in those that a GPU has, which know one body. Asks the case itself, not
   !> along its axes.

@@ -9,6 +9,7 @@ module tiled_run
   use files, only: file_exists
   use journal, only: duration_text
   use kinds, only: int64, wp
+  use lane_gpu, only: seconds_waited
   use map_file, only: create_working, map_file_t, open_working, working_path
   use map_final, only: finalise
   use map_reader, only: open_final, reader_t
@@ -111,7 +112,7 @@ contains
     type(error_t), allocatable :: error
     integer, allocatable :: mine(:), unfinished(:)
     integer(int64) :: computed(1)
-    real(wp) :: busy, begun
+    real(wp) :: busy, waited, begun
     integer :: tile, position
     logical :: whole
     associate (command => session%command)
@@ -132,6 +133,7 @@ contains
     watch%session => session
     computed = 0
     busy = 0
+    waited = seconds_waited()
     call session%journal%begin('points', watch%total, watch%before)
     do
       call scheduler%next(position)
@@ -146,7 +148,8 @@ contains
     begun = scheduler%started
     call scheduler%finish()
     call write_tile_times(session, scheduler, unfinished)
-    call report_balance(session%team, session%journal, busy, monotonic_seconds() - begun)
+    call report_balance(session%team, session%journal, busy, seconds_waited() - waited, monotonic_seconds() - begun, &
+                        session%gpus)
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles

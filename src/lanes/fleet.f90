@@ -19,7 +19,8 @@ module fleet
   implicit none
   private
 
-  public :: prepare_flow, open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, fly_fleet
+  public :: prepare_flow, open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, put_into_batch, &
+    take_from_batch, fly_fleet
 
   !> Every lane is controlled by `batch`; the motion of several bodies is in `structures`.
   type, public :: fleet_t
@@ -91,12 +92,24 @@ contains
     class(strobe_t), intent(in) :: strobe
     logical, intent(in) :: new
     type(fleet_t), intent(inout) :: fleet
-    if (allocated(moving%jointed)) then
-      call occupy_structure_lane(moving%jointed, lane, strobe%jointed, fleet%batch, fleet%structures)
-    else
-      call occupy_lane(flow, lane, strobe%state, new, fleet%batch)
-    end if
+    call put_into_batch(moving, flow, lane, strobe, new, fleet%batch, fleet%structures)
   end subroutine put_into_lane
+
+  !> The same for a batch by itself; `structures` are asked for by several bodies alone.
+  pure subroutine put_into_batch(moving, flow, lane, strobe, new, batch, structures)
+    type(motion_t), intent(in) :: moving
+    type(lane_flow_t), intent(in) :: flow
+    integer, intent(in) :: lane
+    class(strobe_t), intent(in) :: strobe
+    logical, intent(in) :: new
+    type(lane_batch_t), intent(inout) :: batch
+    type(structure_batch_t), allocatable, intent(inout) :: structures
+    if (allocated(moving%jointed)) then
+      call occupy_structure_lane(moving%jointed, lane, strobe%jointed, batch, structures)
+    else
+      call occupy_lane(flow, lane, strobe%state, new, batch)
+    end if
+  end subroutine put_into_batch
 
   !> The motion in a lane, where it stopped or at the start of the flight that is left to the event loop; what the lane has
   !> counted goes to the tally. Not a function: the copy of its result, just written, would stall every stop.
@@ -106,15 +119,26 @@ contains
     type(fleet_t), intent(inout) :: fleet
     class(strobe_t), intent(inout) :: strobe
     type(tally_t), intent(inout) :: tally
-    if (allocated(moving%jointed)) then
-      call structure_lane_state(moving%jointed, fleet%structures, lane, strobe%jointed)
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
-      call take_structure_counts(fleet%structures, lane, tally)
-    else
-      call lane_state(fleet%batch, lane, strobe%state)
-    end if
-    call take_counts(fleet%batch, lane, tally)
+    call take_from_batch(moving, lane, fleet%batch, fleet%structures, strobe, tally)
   end subroutine take_from_lane
+
+  !> The same from a batch by itself.
+  pure subroutine take_from_batch(moving, lane, batch, structures, strobe, tally)
+    type(motion_t), intent(in) :: moving
+    integer, intent(in) :: lane
+    type(lane_batch_t), intent(inout) :: batch
+    type(structure_batch_t), allocatable, intent(inout) :: structures
+    class(strobe_t), intent(inout) :: strobe
+    type(tally_t), intent(inout) :: tally
+    if (allocated(moving%jointed)) then
+      call structure_lane_state(moving%jointed, structures, lane, strobe%jointed)
+      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      call take_structure_counts(structures, lane, tally)
+    else
+      call lane_state(batch, lane, strobe%state)
+    end if
+    call take_counts(batch, lane, tally)
+  end subroutine take_from_batch
 
   !> Flies every occupied lane until it has stopped or is left to the event loop.
   pure subroutine fly_fleet(flow, fleet)

@@ -5,14 +5,15 @@
 !> flies, the other can be attended to. What comes out is that of `fly_lanes`, to the bit.
 module lane_gpu
   use errors, only: error_t, fail
-  use kinds, only: int64
+  use kinds, only: int64, wp
   use lane_types, only: lane_batch_t, machine_t, regions_t
   use status, only: exit_resumable
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr
   implicit none
   private
 
-  public :: gpu_is_built, count_gpus, gpu_number, gpu_name, use_gpu, gpu_in_use, open_gpu, send_half, await_half
+  public :: gpu_is_built, count_gpus, gpu_number, gpu_name, use_gpu, gpu_in_use, gpu_threads, open_gpu, send_half, await_half, &
+    seconds_waited
 
   integer, parameter :: message_size = 256
 
@@ -23,6 +24,9 @@ module lane_gpu
 
   !> The GPU of this process, -1 = none.
   integer, protected :: gpu_in_use = -1
+
+  !> Threads of this process that attend to its bodies.
+  integer, protected :: gpu_threads = 1
 
   interface
     integer(c_int) function separatrix_gpu_built() bind(c)
@@ -69,6 +73,10 @@ module lane_gpu
       integer(c_int), value :: half, size
       character(kind=c_char), intent(inout) :: message(size)
     end function separatrix_gpu_wait
+
+    real(c_double) function separatrix_gpu_waited() bind(c)
+      import :: c_double
+    end function separatrix_gpu_waited
   end interface
 
 contains
@@ -102,10 +110,12 @@ contains
     name = text_of(text)
   end function gpu_name
 
-  !> From here on machines are made ready for this GPU, or with -1 for the processor's vectors.
-  subroutine use_gpu(device)
+  !> From here on machines are made ready for this GPU, or with -1 for the processor's vectors; so many `threads` attend to it.
+  subroutine use_gpu(device, threads)
     integer, intent(in) :: device
+    integer, intent(in), optional :: threads
     gpu_in_use = device
+    if (present(threads)) gpu_threads = max(1, threads)
   end subroutine use_gpu
 
   !> Both halves of the pool, of as many batches as are `wanted`, or as the GPU has room for. Code 75 if it fails, here and
@@ -148,6 +158,11 @@ contains
       call fail(error, exit_resumable, text_of(message))
     end if
   end subroutine await_half
+
+  !> How long this process has waited for its GPU so far [s].
+  real(wp) function seconds_waited()
+    seconds_waited = separatrix_gpu_waited()
+  end function seconds_waited
 
   pure function text_of(message) result(text)
     character(kind=c_char), intent(in) :: message(message_size)

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <iterator>
 #include <vector>
 
@@ -156,15 +157,18 @@ void gpu_free() {
   pool.batches = pool.asked = 0;
 }
 
-// Batches that a half can have: as many bodies as the GPU has threads, in a quarter of the memory that is
-// free now, as the kernels need some for what registers do not hold.
+// Batches that a half can have: as many bodies as the GPU flies at once, or $SEPARATRIX_GPU_BODIES, in a
+// quarter of the memory that is free now, as the kernels need some for what registers do not hold. More would
+// wait on the GPU, and what the host knows of them would not stay in its caches.
 int64_t gpu_room(gpu_attempt &attempt) {
-  int processors = 0, threads = 0;
+  int processors = 0;
   size_t free_bytes = 0, all_bytes = 0;
   GPU_ATTEMPT(attempt, cudaDeviceGetAttribute, &processors, cudaDevAttrMultiProcessorCount, pool.device);
-  GPU_ATTEMPT(attempt, cudaDeviceGetAttribute, &threads, cudaDevAttrMaxThreadsPerMultiProcessor, pool.device);
   GPU_ATTEMPT(attempt, cudaMemGetInfo, &free_bytes, &all_bytes);
-  const int64_t busy = (int64_t(processors) * threads + lanes - 1) / lanes;
+  const char *asked = std::getenv("SEPARATRIX_GPU_BODIES");
+  const int64_t bodies =
+      asked == nullptr ? int64_t(processors) * GPU_BODIES_AT_ONCE : std::max(1L, std::atol(asked));
+  const int64_t busy = (bodies + lanes - 1) / lanes;
   return std::max<int64_t>(1, std::min<int64_t>(busy, free_bytes / 8 / sizeof(lane_batch)));
 }
 

@@ -5,6 +5,7 @@
 #include "lane_types.hpp"
 #include "lane_untrapped.hpp"
 
+#include <chrono>
 #include <cstdlib>
 
 extern "C" {
@@ -46,8 +47,16 @@ int separatrix_gpu_send(int half, int64_t batches, const lane_machine *machine, 
   return gpu()->send(half, batches, machine, regions, message, size);
 }
 
+static double waited = 0;
+
 int separatrix_gpu_wait(int half, char *message, int size) {
   const untrapped around;
-  return gpu()->wait(half, message, size);
+  const auto begun = std::chrono::steady_clock::now();
+  const int failed = gpu()->wait(half, message, size);
+  waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return failed;
 }
+
+// Seconds that this process has waited for its GPU so far.
+double separatrix_gpu_waited(void) { return waited; }
 }

@@ -6,12 +6,13 @@
 module trajectories
   use attractors, only: attractor_t
   use errors, only: error_t
-  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_lane, take_from_lane
+  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_batch, take_from_batch
   use kinds, only: wp
-  use lane_gpu, only: await_half, gpu_half_t, open_gpu, send_half
+  use lane_gpu, only: await_half, gpu_half_t, gpu_threads, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
   use motion, only: motion_t
   use status, only: reason_left_domain
+  use structure_types, only: structure_batch_t
   use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_event, go_to_stop, outcome_t, pass_stop, &
     phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
@@ -39,14 +40,24 @@ module trajectories
   !> Batches of a GPU that are attended to between two looks at the watch.
   integer, parameter :: batches_per_look = 256
 
-  !> The trajectory in a lane: number of its start (0 = none), whether the extremes of its window went unseen, and the slips that
-  !> were counted up to its last stop.
+  !> The trajectory in a lane: number of its start among those of its thread (0 = none), whether the extremes of its window went
+  !> unseen, and the slips that were counted up to its last stop.
   type :: passenger_t
     integer :: start = 0
     type(course_t) :: course
     logical :: unseen = .false.
     integer(int64) :: slips = 0
   end type passenger_t
+
+  !> Batches that are worth a thread.
+  integer, parameter :: fewest_batches = 64
+
+  !> What one thread attends to: batches of a half and starts, from and to; the number among these of the start that comes next;
+  !> whether any of its lanes is to fly.
+  type :: part_t
+    integer :: batches(2) = [1, 0], starts(2) = [1, 0], next = 1
+    logical :: away = .false.
+  end type part_t
 
 contains
 
@@ -88,14 +99,14 @@ contains
     call open_fleet(journey%moving, lanes)
     call set_regions(journey%moving, catalogue, lanes)
     next = 1
-    call board_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+    call board_all(journey, catalogue, starts, next, passengers, lanes%batch, lanes%structures, outcomes)
     do while (any(passengers%start > 0))
       call fly_fleet(journey%flow, lanes)
-      call attend_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+      call attend_all(journey, catalogue, starts, next, passengers, lanes%batch, lanes%structures, outcomes)
     end do
   end subroutine run_trajectories
 
-  !> A GPU's lanes: while one half of them flies, the other is attended to. The watch is looked at whenever a
+  !> A GPU's lanes: while one half of them flies, the threads attend to the other. The watch is looked at whenever a
   !> half has come back and every few of its batches, until all outcomes are known.
   subroutine run_on_gpu(journey, catalogue, starts, outcomes, whole, error, watch)
     type(journey_t), intent(in) :: journey
@@ -106,9 +117,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
     type(passenger_t), allocatable :: passengers(:, :, :)
+    type(part_t), allocatable :: parts(:)
     type(gpu_half_t) :: halves(2)
     type(fleet_t) :: lanes
-    integer :: next, half, batches, k
+    integer :: half, batches
     logical :: away(2), stop_now
     stop_now = .false.
     call open_gpu(journey%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
@@ -117,73 +129,136 @@ contains
     call set_regions(journey%moving, catalogue, lanes)
     batches = size(halves(1)%batches)
     allocate (passengers(lane_count, batches, 2))
-    next = 1
+    call share_out(batches, size(starts, 2), parts)
     do half = 1, 2
-      do k = 1, batches
-        if (present(watch) .and. modulo(k, batches_per_look) == 0) call watch%look(stop_now)
-        if (stop_now) exit
-        lanes%batch = lane_batch_t()
-        call board_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
-        halves(half)%batches(k) = lanes%batch
-      end do
-      away(half) = any(passengers(:, :, half)%start > 0) .and. .not. stop_now
+      call attend_half(journey, catalogue, starts, .true., parts, passengers(:, :, half), halves(half)%batches, outcomes, &
+                       stop_now, watch)
+      away(half) = any(parts%away) .and. .not. stop_now
       if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
       if (allocated(error)) return
     end do
-    whole = .not. stop_now
     half = 1
     do while (any(away))
       if (away(half)) then
         call await_half(half, error)
         if (allocated(error)) return
-        do k = 1, batches
-          ! A half that is away when the run is to stop is awaited all the same: the GPU writes into its batches.
-          if (present(watch) .and. modulo(k, batches_per_look) == 1 .and. whole) call watch%look(stop_now)
-          whole = whole .and. .not. stop_now
-          if (.not. whole) exit
-          lanes%batch = halves(half)%batches(k)
-          call attend_all(journey, catalogue, starts, next, passengers(:, k, half), lanes, outcomes)
-          halves(half)%batches(k) = lanes%batch
-        end do
-        away(half) = whole .and. any(passengers(:, :, half)%start > 0)
+        ! A half that is away when the run is to stop is awaited all the same: the GPU writes into its batches.
+        call attend_half(journey, catalogue, starts, .false., parts, passengers(:, :, half), halves(half)%batches, outcomes, &
+                         stop_now, watch)
+        away(half) = any(parts%away) .and. .not. stop_now
         if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
         if (allocated(error)) return
       end if
       half = 3 - half
     end do
+    whole = .not. stop_now
   end subroutine run_on_gpu
 
+  !> A part of the batches and of the starts for each thread.
+  pure subroutine share_out(batches, starts, parts)
+    integer, intent(in) :: batches, starts
+    type(part_t), allocatable, intent(out) :: parts(:)
+    integer :: count, i
+    count = max(1, min(gpu_threads, batches/fewest_batches))
+    allocate (parts(count))
+    do i = 1, count
+      parts(i)%batches = 1 + [int((i - 1)*int(batches, int64)/count), int(i*int(batches, int64)/count) - 1]
+      parts(i)%starts = 1 + [int((i - 1)*int(starts, int64)/count), int(i*int(starts, int64)/count) - 1]
+    end do
+  end subroutine share_out
+
+  !> Half of the lanes, on the host: their first starts if they are `fresh`, else what is due after they have flown. The first
+  !> thread, which is the caller, looks at the watch.
+  subroutine attend_half(journey, catalogue, starts, fresh, parts, passengers, batches, outcomes, stop_now, watch)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    logical, intent(in) :: fresh
+    type(part_t), intent(inout) :: parts(:)
+    type(passenger_t), intent(inout) :: passengers(:, :)
+    type(lane_batch_t), intent(inout) :: batches(:)
+    type(outcome_t), intent(inout) :: outcomes(:)
+    logical, intent(inout) :: stop_now
+    class(watch_t), intent(inout), optional :: watch
+    integer :: i
+    !$omp parallel do schedule(static, 1) num_threads(size(parts)) if (size(parts) > 1)
+    do i = 1, size(parts)
+      call attend_part(journey, catalogue, starts, fresh, i == 1, parts(i), passengers, batches, outcomes, stop_now, watch)
+    end do
+  end subroutine attend_half
+
+  !> What one thread does of that. No thread touches what belongs to another, but `stop_now`.
+  subroutine attend_part(journey, catalogue, starts, fresh, looks, part, passengers, batches, outcomes, stop_now, watch)
+    type(journey_t), intent(in) :: journey
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: starts(:, :)
+    logical, intent(in) :: fresh, looks
+    type(part_t), intent(inout) :: part
+    type(passenger_t), intent(inout) :: passengers(:, :)
+    type(lane_batch_t), intent(inout) :: batches(:)
+    type(outcome_t), intent(inout) :: outcomes(:)
+    logical, intent(inout) :: stop_now
+    class(watch_t), intent(inout), optional :: watch
+    type(structure_batch_t), allocatable :: none
+    logical :: enough
+    integer :: k
+    part%away = .false.
+    associate (first => part%starts(1), last => part%starts(2))
+      do k = part%batches(1), part%batches(2)
+        !$omp atomic read
+        enough = stop_now
+        if (looks .and. present(watch) .and. .not. enough .and. modulo(k, batches_per_look) == merge(0, 1, fresh)) then
+          call watch%look(enough)
+          !$omp atomic write
+          stop_now = enough
+        end if
+        if (enough) return
+        if (fresh) then
+          batches(k) = lane_batch_t()
+          call board_all(journey, catalogue, starts(:, first:last), part%next, passengers(:, k), batches(k), none, &
+                         outcomes(first:last))
+        else
+          call attend_all(journey, catalogue, starts(:, first:last), part%next, passengers(:, k), batches(k), none, &
+                          outcomes(first:last))
+        end if
+        part%away = part%away .or. any(passengers(:, k)%start > 0)
+      end do
+    end associate
+  end subroutine attend_part
+
   !> The first starts of a batch.
-  pure subroutine board_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+  pure subroutine board_all(journey, catalogue, starts, next, passengers, batch, structures, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(inout) :: next
     type(passenger_t), intent(inout) :: passengers(:)
-    type(fleet_t), intent(inout) :: lanes
+    type(lane_batch_t), intent(inout) :: batch
+    type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcomes(:)
     integer :: lane
     do lane = 1, lane_count
-      call board(journey, catalogue, starts, lane, next, passengers(lane), lanes, outcomes)
+      call board(journey, catalogue, starts, lane, next, passengers(lane), batch, structures, outcomes)
     end do
   end subroutine board_all
 
   !> The lanes of a batch that has been flown: those that have stopped or are left, and the next starts.
-  pure subroutine attend_all(journey, catalogue, starts, next, passengers, lanes, outcomes)
+  pure subroutine attend_all(journey, catalogue, starts, next, passengers, batch, structures, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(inout) :: next
     type(passenger_t), intent(inout) :: passengers(:)
-    type(fleet_t), intent(inout) :: lanes
+    type(lane_batch_t), intent(inout) :: batch
+    type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcomes(:)
     integer :: lane
     do lane = 1, lane_count
-      if (passengers(lane)%start == 0 .or. lanes%batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
-      call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), lanes, &
+      if (passengers(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
+      call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, structures, &
                   outcomes(passengers(lane)%start))
       if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, passengers(lane), &
-                                                                  lanes, outcomes)
+                                                                  batch, structures, outcomes)
     end do
   end subroutine attend_all
 
@@ -195,14 +270,15 @@ contains
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
-  pure subroutine board(journey, catalogue, starts, lane, next, passenger, lanes, outcomes)
+  pure subroutine board(journey, catalogue, starts, lane, next, passenger, batch, structures, outcomes)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: lane
     integer, intent(inout) :: next
     type(passenger_t), intent(inout) :: passenger
-    type(fleet_t), intent(inout) :: lanes
+    type(lane_batch_t), intent(inout) :: batch
+    type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcomes(:)
     do while (next <= size(starts, 2))
       passenger%start = next
@@ -213,13 +289,13 @@ contains
         call go_on(journey, catalogue, start, passenger, outcome)
       end associate
       if (passenger%course%phase /= phase_over) then
-        call put_into_lane(journey%moving, journey%flow, lane, passenger%course, .true., lanes)
-        call send_on(journey, catalogue, passenger%course, outcomes(passenger%start), lane, lanes%batch)
+        call put_into_batch(journey%moving, journey%flow, lane, passenger%course, .true., batch, structures)
+        call send_on(journey, catalogue, passenger%course, outcomes(passenger%start), lane, batch)
         return
       end if
     end do
     passenger%start = 0
-    lanes%batch%status(lane) = lane_idle
+    batch%status(lane) = lane_idle
   end subroutine board
 
   !> Tells the lanes what they can be captured by: what moves, by a cycle.
@@ -258,21 +334,22 @@ contains
   end subroutine send_on
 
   !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
-  pure subroutine attend(journey, catalogue, start, lane, passenger, lanes, outcome)
+  pure subroutine attend(journey, catalogue, start, lane, passenger, batch, structures, outcome)
     type(journey_t), intent(in) :: journey
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: start(:)
     integer, intent(in) :: lane
     type(passenger_t), intent(inout) :: passenger
-    type(fleet_t), intent(inout) :: lanes
+    type(lane_batch_t), intent(inout) :: batch
+    type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped, left, taken
-    left = lanes%batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
-    associate (course => passenger%course, batch => lanes%batch)
+    left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
+    associate (course => passenger%course)
       course%elapsed = batch%elapsed(lane)
       course%captured = nint(batch%captor(lane))
       outcome%settle_time = batch%settled(lane)
-      call take_from_lane(journey%moving, lane, lanes, course%strobe_t, course%tally)
+      call take_from_batch(journey%moving, lane, batch, structures, course%strobe_t, course%tally)
       if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
@@ -289,7 +366,7 @@ contains
       end if
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
       batch%status(lane) = lane_flying
-      if (taken) call put_into_lane(journey%moving, journey%flow, lane, course, .false., lanes)
+      if (taken) call put_into_batch(journey%moving, journey%flow, lane, course, .false., batch, structures)
       call send_on(journey, catalogue, course, outcome, lane, batch)
     end associate
   end subroutine attend

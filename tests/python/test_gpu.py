@@ -51,6 +51,19 @@ def test_nor_does_it_for_other_machines_and_spans(separatrix, tmp_path, results,
     assert differences(tmp_path / "cpu.h5", tmp_path / "gpu.h5") == []
 
 
+@pytest.mark.parametrize("threads", ["2", "3"])
+def test_nor_do_threads(separatrix, tmp_path, results, on_host, monkeypatch, threads):
+    """Two have a part of a pool that is large enough each, and refill it."""
+    monkeypatch.setenv("SEPARATRIX_GPU_THREADS", threads)
+    monkeypatch.setenv("SEPARATRIX_GPU_BODIES", "3200")
+    monkeypatch.setenv("OMP_WAIT_POLICY", "passive")
+    many = ["--set", "axis[1].count=90", "--set", "axis[2].count=100", "--set", "grid.tile=[90, 100]"]
+    for device in ("cpu", "gpu"):
+        command = [*KINDS["map"], *many, "--device", device, "-o", tmp_path / f"{device}.h5"]
+        succeed(separatrix, *command, folder=results["map"].parent)
+    assert differences(tmp_path / "cpu.h5", tmp_path / "gpu.h5") == []
+
+
 def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_host):
     output = tmp_path / "gpu.h5"
     command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
@@ -266,10 +279,14 @@ def test_the_page_of_the_benchmark(source_dir, separatrix, tmp_path, on_host, mo
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
     import gpu
 
-    runs = gpu.Runs(separatrix, tmp_path, 1)
-    rows = gpu.measure(runs, (4, 8, 12), 1, ("coulomb", "cubic"))
-    assert len(rows) == 4
-    assert all(row.endswith("| the same |") for row in rows)
-    page = gpu.page(rows, gpu.largest_map(runs, 12), gpu.device_of(runs), runs)
-    assert "| computed by | GPU 0 (stand-in on the host, for tests); 1 ranks" in page
-    assert "12 x 12 starts" in page
+    runs, size = gpu.Runs(separatrix, tmp_path), gpu.Size(4, 12, 100.0, 1, 1, 12)
+    monkeypatch.setattr(gpu, "MACHINES", {"coulomb": "plain", "cubic": "in series"})
+    monkeypatch.setattr(gpu, "RANKS", (1,))
+    monkeypatch.setattr(gpu, "TILES", (8,))
+    gpu.write_page(runs, gpu.device_of(runs), size, list(gpu.PARTS), tmp_path / "page.md")
+    page = (tmp_path / "page.md").read_text()
+    assert page.count("| the same, 12 x 12 |") == 4
+    assert "| computed by | GPU 0 (stand-in on the host, for tests) |" in page
+    assert "| 1 | settled | " in page
+    assert "| 8 x 8 | " in page
+    assert "settled, 12 x 12 starts" in page
