@@ -12,8 +12,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from separatrix.discovery.fitting.curves import fits_machine, knots_over, member_of, table_of, with_table
-from separatrix.discovery.fitting.data import Data
-from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.data import Data, polished
+from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms, through
@@ -32,9 +32,12 @@ _BENT = 0.4
 # share of the segments that a step must follow
 _FOLLOWED = 0.98
 # how often the motion is linearised anew, how often a step is halved, steps of the starts after it
-_ROUNDS, _HALVINGS, _FOLLOW = 4, 3, 6
+_ROUNDS, _HALVINGS, _FOLLOW = 6, 3, 6
 # squares by which another step would change nothing that shows; squares a value by which the end may miss
 _SETTLED, _NEAR = 0.1, 1.0
+# degree of the smooth function that is begun from where a table is jagged; squares over those of the fit from
+# which on it is
+_EVENED, _CAUGHT = 3, 2.0
 # squares by which the function may follow the records worse than what it is drawn for
 _WORSE = 10.0
 # share of the promised change of the squares by which a step may miss it
@@ -140,6 +143,10 @@ def _settled(
         at = knots if last is None else _closer(member, last)
         again = _Curve.begun(data, base, fitted if curve is None else curve.fitted, member, at)
         found = None if again is None else again.settle()
+        if last is None and (found is None or again.far_from(fitted)):
+            # the way from a jagged table to a smooth function may lead through motions with other impacts
+            again = _Curve.begun(data, base, fitted, member, at, evened=True)
+            found = None if again is None else again.settle()
         if found is None:
             break
         parts, curve = found, again
@@ -191,13 +198,23 @@ class _Curve:
     penalty: np.ndarray
     # what the machine without it has of the function already
     beside: np.ndarray
+    # the fit that it began from
+    led: Fit
 
     @classmethod
     def begun(
-        cls, data: Data, base: Fitted, fitted: Fitted, member: Member, knots: np.ndarray
+        cls,
+        data: Data,
+        base: Fitted,
+        fitted: Fitted,
+        member: Member,
+        knots: np.ndarray,
+        evened: bool = False,
     ) -> "_Curve | None":
-        """The function as it was fitted, on these knots."""
+        """The function as it was fitted, on these knots; `evened`: the cubic nearest to it."""
         table = table_of(fitted, member)
+        if evened and table is not None:
+            table = [(at, np.polyval(np.polyfit(at, value, _EVENED), at)) for at, value in table]
         alike = len(member.values) > 1 and (table is None or len(table) == 1)
         if table is not None:
             begun = [_drawn(member, at, value, knots) for at, value in table]
@@ -224,7 +241,8 @@ class _Curve:
             # no such machine
             return None
         whole = Fitted((*base.names, member.effect), model, problem, fit, tuple(places))
-        found = cls(data, member, whole, knots, alike, np.array(places), penalty, np.zeros(len(places)))
+        none = np.zeros(len(places))
+        found = cls(data, member, whole, knots, alike, np.array(places), penalty, none, fitted.fit)
         if member.effect == "friction_curve":
             # the law of the machine is in the friction too
             signs = (1.0,) if alike else (1.0, -1.0)
@@ -273,6 +291,10 @@ class _Curve:
             return None
         return self._parts(*found, known, centre)
 
+    def far_from(self, fitted: Fitted) -> bool:
+        """Whether the records are followed so much worse than by a fitted machine that segments are caught."""
+        return self.fitted.fit.total > _CAUGHT * fitted.fit.total
+
     def gain(self, fitted: Fitted) -> float:
         """Squares over the misfit by which the function follows the records better than a fitted machine."""
         return 2 * float(gain_over(self.fitted, fitted)[0]) / max(1.0, fitted.fit.reduced_chi2)
@@ -317,6 +339,8 @@ class _Curve:
             values = np.clip(fit.values + 0.5**halving * step, *bounds)
             try:
                 tried = minimise(problem, values, fit.starts, most=_FOLLOW, fixed=fixed)
+                # a function that was far off leaves segments in wrong minima
+                tried = polished(self.data, problem, tried, self.data.last, _FOLLOW, fixed, rival=self.led)
             except SeparatrixError:
                 continue
             both = tried.good & fit.good
