@@ -292,7 +292,7 @@ class _Curve:
         return self._parts(*found, known, centre)
 
     def far_from(self, fitted: Fitted) -> bool:
-        """Whether the records are followed so much worse than by a fitted machine that segments are caught."""
+        """Whether records are followed so much worse than by a fitted machine that segments are caught."""
         return self.fitted.fit.total > _CAUGHT * fitted.fit.total
 
     def gain(self, fitted: Fitted) -> float:
