@@ -5,7 +5,7 @@
 module parallel
   use errors, only: error_t
   use launcher, only: with_component
-  use mpi_f08, only: MPI_Comm, MPI_COMM_WORLD, MPI_Init, MPI_Initialized
+  use mpi_f08, only: MPI_Comm, MPI_COMM_WORLD, MPI_Init_thread, MPI_Initialized, MPI_THREAD_FUNNELED
   use mpi_scheduler, only: mpi_scheduler_t, new_mpi_scheduler
   use mpi_team, only: mpi_team_t, new_mpi_team
   use scheduler, only: scheduler_options_t, scheduler_t
@@ -27,12 +27,14 @@ contains
     class(team_t), allocatable, intent(out) :: team
     type(mpi_team_t) :: ours
     logical :: running
+    integer :: provided
     call MPI_Initialized(running)
     if (.not. running) then
       ! The default layer of OpenMPI 4.1 can lose data on a full disk without an error.
       call default_environment('OMPI_MCA_io', 'romio321')
       call allow_shared_memory()
-      call MPI_Init()
+      ! Threads attend to the bodies of a GPU; the first of them alone calls MPI.
+      call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     end if
     call new_mpi_team(MPI_COMM_WORLD, ours, owns_mpi=.not. running)
     team = ours

@@ -119,7 +119,7 @@ def remembered(bench: Bench, decision: Decision) -> Decision:
     best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
     faults = evidence_of_faults(name.fitted, name.prediction)
     least = bench.options.needed * bench.options.separation
-    lead = best.evidence - name.evidence / max(1.0, name.fitted.fit.reduced_chi2) - faults
+    lead = best.evidence - name.own_evidence / max(1.0, name.fitted.fit.reduced_chi2) - faults
     if lead < least:
         return decision
     beside = _best(*_motions(bench, name.fitted, name.prediction), best.hypothesis)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.flexible import flexible_member
-from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates
+from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates, weigh_faults
 from separatrix.discovery.decision.judge import NOISE, Judged, admissible, equivalent, sizeable
 from separatrix.discovery.decision.misfit import CAUGHT, foretold_chi2, missed, misses
 from separatrix.discovery.decision.remains import closed_share
@@ -127,6 +127,9 @@ def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
     before = list(rounds[0].judged)
     *more, closed = with_more(bench, rounds, best)
     alone = None if closed else _led_alone(bench, rounds[0], before)
+    if shaped is not None:
+        # what it is held against has them
+        weigh_faults(bench, shaped[0])
     if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
         return conclude(bench, decision, *alone)
     if shaped is not None:
@@ -304,7 +307,9 @@ def renewed(bench: Bench, first: Round, settled: bool = False) -> Fitted | None:
 def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
     """The best candidate that converged, and those that it does not beat clearly."""
     able = [one for one in found.judged if admissible(one, found.base, bench.options)[0]]
-    return choice(bench, found.base, found.foretold, able or found.judged, foremost)
+    chosen = choice(bench, found.base, found.foretold, able or found.judged, foremost)
+    found.rank()
+    return chosen
 
 
 def conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:

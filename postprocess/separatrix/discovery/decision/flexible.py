@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 
+from separatrix.discovery.decision.gates import weigh_faults
 from separatrix.discovery.decision.judge import Judged, admissible, clear_of, margin
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.fitting.ceiling import Ceiling
@@ -35,6 +36,10 @@ def flexible_member(
     fitted = [one for member in members for one in best_table(bench, found, member)]
     if not fitted:
         return None
+    if any(one.faults is not None for one in found.judged):
+        # what they are held against has them
+        for one in fitted:
+            weigh_faults(bench, one)
     able = [one for one in fitted if admissible(one, found.base, bench.options)[0]]
     best = max(able or fitted, key=lambda one: one.evidence)
     family = effect_of(best.name).family

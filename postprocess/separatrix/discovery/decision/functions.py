@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from separatrix.discovery.decision.decide import Decision, conclude
 from separatrix.discovery.decision.flexible import best_table
-from separatrix.discovery.decision.gates import judge_ceiling, pass_gates
+from separatrix.discovery.decision.gates import judge_ceiling, pass_gates, weigh_faults
 from separatrix.discovery.decision.judge import clear_of
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
@@ -49,6 +49,8 @@ def _held_against_it(bench: Bench, decision: Decision) -> Decision:
     table = next(best_table(bench, found, function.member), None)
     if table is None:
         return replace(decision, outcome="ambiguous", reasons=[*decision.reasons, said])
+    if best.faults is not None:
+        weigh_faults(bench, table)
     pass_gates(bench, table, found.base, [], found.screened.tests)
     judge_ceiling(bench, table)
     if all(table.gates.values()) and clear_of(table, best, bench.options):

@@ -31,7 +31,7 @@ from separatrix.discovery.options import Options
 _SHARE = 0.2
 _WEIGHED = 8
 # share of what faults of a rig explain that is known no better, as they are taken as linear
-_LINEAR = 0.1
+_UNSURE = 0.1
 
 
 def choice(
@@ -48,18 +48,20 @@ def choice(
         if best.prediction is None and foretold is not None:
             place = next(i for i, one in enumerate(pool) if one is best)
             pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
-        elif best.faults is None and (rivals or not best.fitted.fit.like_noise(2)):
-            for one in _leading(pool, best, foretold is not None):
-                weigh_faults(bench, one)
-        else:
+            continue
+        leading = _leading(pool, best, foretold is not None)
+        asked = any(one.faults is not None for one in leading) or rivals
+        if all(one.faults is not None for one in leading) or not (asked or not best.fitted.fit.like_noise(2)):
             return best, rivals
+        for one in leading:
+            weigh_faults(bench, one)
 
 
 def weigh_faults(bench: Bench, one: Judged) -> None:
     """Give the rig of a candidate its faults, where that was not done.
 
     What faults have moved its parameters by in training they do not foretell with: held-out records are
-    foretold by the parameters beside them, where that is better.
+    foretold by the parameters beside them, where those foretell better by themselves too.
     """
     if one.faults is not None:
         return
@@ -67,10 +69,10 @@ def weigh_faults(bench: Bench, one: Judged) -> None:
     if one.prediction is None or one.faults[0] <= 0:
         return
     told = bench.foretell_beside_faults(one.fitted, one.prediction)
-    parts, faults = gained_together(told, one.foretold), weight_of_faults(one.fitted, told)
-    if parts.sum() + faults[1] > one.foretold_evidence:
+    parts = gained_together(told, one.foretold)
+    if parts.sum() > one.held_out:
         one.prediction, one.held_out_parts, one.held_out = told, parts, float(parts.sum())
-        one.faults = faults
+        one.faults = weight_of_faults(one.fitted, told)
 
 
 def _leading(pool: list[Judged], best: Judged, foretold: bool) -> list[Judged]:
@@ -117,7 +119,7 @@ def _within_faults(best: Judged) -> bool:
     """Whether what faults of a rig do not explain of a gain is within the errors of their being linear."""
     gained = best.training + best.held_out
     own = best.own * best.training + best.own_foretold * best.held_out
-    return own < _LINEAR * (gained - own)
+    return own < _UNSURE * (gained - own)
 
 
 def _of_some_size(best: Judged, options: Options) -> bool:

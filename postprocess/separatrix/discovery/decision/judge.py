@@ -70,8 +70,16 @@ class Judged:
 
     @property
     def evidence(self) -> float:
-        """Log-likelihood gained, less one per parameter (Akaike), plus the score on what was not fitted."""
+        """Log-likelihood gained, less one per parameter (Akaike), plus the score on what was not fitted.
+
+        Where they were weighed, with faults of a rig beside it.
+        """
         return self.fitted_evidence + self.foretold_evidence
+
+    @property
+    def own_evidence(self) -> float:
+        """The same without faults."""
+        return self.training - self.parameters + self.held_out
 
     @property
     def fitted_evidence(self) -> float:
@@ -282,9 +290,10 @@ def clear_of(best: Judged, other: Judged, options: Options) -> bool:
     least = margin(best, other, options)
     over = lead(best, other)
     fitted = best.fitted_evidence - other.fitted_evidence
-    if best.faults and other.faults:
+    if any(best.faults or ()) and any(other.faults or ()):
         # both have them already, as far as they are linear
-        return over >= least and min(fitted, over - fitted) > -max(least, _LINEAR * over)
+        unsure = _LINEAR * max(sum(best.faults), sum(other.faults))
+        return over >= least and min(fitted, over - fitted) > -max(least, unsure)
     if over < least or min(fitted, over - fitted) <= -least:
         return False
     return over * share_beside_faults(best.fitted, other.fitted) >= least

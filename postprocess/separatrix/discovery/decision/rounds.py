@@ -117,7 +117,9 @@ def run_round(
     options = bench.options
     stands = earlier is not None and earlier.base is base
     if stands:
-        found = replace(earlier, foretold=foretold, judged=list(earlier.judged))
+        # those of now are held against those of then as they are by themselves
+        known_alone = [replace(one, faults=None) for one in earlier.judged]
+        found = replace(earlier, foretold=foretold, judged=known_alone)
     else:
         found = _screened(bench, base, foretold, first)
     known = {one.name: one.fitted for one in earlier.judged} if earlier else {}

@@ -3,6 +3,7 @@
 """More than one effect: found one by one, fitted jointly, and each held against leaving it out."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,6 +41,7 @@ def with_more(bench: Bench, rounds: list[Round], best: Judged) -> tuple[Judged, 
         swapped = [*_swapped(bench, first, larger, grown)]
         if swapped:
             larger, close = choice(bench, first.base, first.foretold, [*grown, *swapped], foremost)
+        weigh_faults(bench, larger)
         pass_gates(bench, larger, first.base, close, rounds[-1].screened.tests)
         judge_ceiling(bench, larger)
         if larger.gates["adequate"]:
@@ -120,6 +122,8 @@ def _followed(bench: Bench, first: Round, whole: Judged, one: Judged) -> Judged:
     if better is one.fitted:
         return one
     found = judged(first.base, first.foretold, better, bench.foretell(better, whole.prediction))
+    if one.faults is not None:
+        weigh_faults(bench, found)
     return found if found.evidence > one.evidence else one
 
 
@@ -138,6 +142,8 @@ def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool
             # it cannot be fitted
             continue
         weigh_faults(bench, whole)
+        # the gates of a part are those of what it foretold so far
+        other = replace(other)
         weigh_faults(bench, other)
         if whole.evidence - other.evidence < least:
             return False

@@ -202,6 +202,8 @@ def _candidate(one: Judged) -> dict:
         "effect": one.name,
         "training": one.training,
         "held_out": one.held_out,
+        # of faults of a rig beside it, where they were weighed
+        "faults": None if one.faults is None else sum(one.faults),
         "evidence": one.evidence,
         "reduced_chi2": fit.sample_chi2,
         # what is worse than the base has not found its minimum, at which the effect does nothing

@@ -168,7 +168,11 @@ def _bent_sensor(problem: Problem, fit: Fit) -> np.ndarray:
     They bend where the speed jumps, as no force does, and would be memory of the noise.
     """
     x, inside = fit.evaluation.x, problem.segments.inside & fit.good[:, None]
-    u = np.where(inside, (x - x[inside].mean()) / max(float(np.std(x[inside])), 1e-300), 0.0)
+    u = np.zeros(x.shape)
+    for number in range(len(problem.prepared)):
+        here = inside & (problem.segments.record == number)[:, None]
+        if here.any():
+            u[here] = (x[here] - x[here].mean()) / max(float(np.std(x[here])), 1e-300)
     return u[:, :, None] ** np.array([2, 3])
 
 

@@ -145,8 +145,10 @@ def _settled(
         found = None if again is None else again.settle()
         if last is None and (found is None or again.far_from(fitted)):
             # the way from a jagged table to a smooth function may lead through motions with other impacts
-            again = _Curve.begun(data, base, fitted, member, at, evened=True)
-            found = None if again is None else again.settle()
+            evened = _Curve.begun(data, base, fitted, member, at, evened=True)
+            other = None if evened is None else evened.settle()
+            if other is not None:
+                again, found = evened, other
         if found is None:
             break
         parts, curve = found, again
@@ -211,9 +213,11 @@ class _Curve:
         knots: np.ndarray,
         evened: bool = False,
     ) -> "_Curve | None":
-        """The function as it was fitted, on these knots; `evened`: the cubic nearest to it."""
+        """The function as it was fitted, on these knots; `evened`: the cubic nearest to it, if there is."""
         table = table_of(fitted, member)
-        if evened and table is not None:
+        if evened:
+            if table is None or table[0][0].size < _EVENED + 2:
+                return None
             table = [(at, np.polyval(np.polyfit(at, value, _EVENED), at)) for at, value in table]
         alike = len(member.values) > 1 and (table is None or len(table) == 1)
         if table is not None:

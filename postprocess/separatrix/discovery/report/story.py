@@ -252,7 +252,8 @@ def _missing(verdict: dict) -> Section:
             ),
             "d' is the linearised size of the effect over its standard error; training and held out are "
             "log-likelihoods "
-            "gained over the base machine; the evidence counts their sum less one per parameter.",
+            "gained over the base machine; the evidence counts their sum less one per parameter, and what "
+            "faults of a rig beside the effect add, where those were weighed.",
         ]
     if verdict["not_tested"]:
         body += ["Not tested:", [f"{words(name)}: {why}." for name, why in verdict["not_tested"].items()]]
