@@ -67,7 +67,7 @@ def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, beside
 
     fit = SimpleNamespace(reduced_chi2=1.0, excess=300.0)
     fitted = SimpleNamespace(names=("friction_curve",), fit=fit)
-    name = SimpleNamespace(fitted=fitted, evidence=100.0, prediction=SimpleNamespace())
+    name = SimpleNamespace(fitted=fitted, own_evidence=100.0, prediction=SimpleNamespace())
     first = SimpleNamespace(base=SimpleNamespace(problem=None))
     decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
     monkeypatch.setattr(characterise, "_motions", lambda _, machine, told: (machine is fitted, None))

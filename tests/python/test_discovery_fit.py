@@ -10,6 +10,7 @@ from scipy.signal import savgol_filter
 from separatrix.discovery.decision import decide as decide_module
 from separatrix.discovery.decision import partial as partial_module
 from separatrix.discovery.decision import rounds
+from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
@@ -327,9 +328,7 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         return SimpleNamespace(names=one.names, fit=SimpleNamespace(converged=True), gain=1.0)
 
     def judge_one(base, foretold, one, prediction):
-        found = SimpleNamespace(name=one.names[-1], fitted=one, training=one.gain, evidence=one.gain)
-        found.prediction = prediction
-        return found
+        return Judged(one, prediction, one.gain, 0.0, np.zeros(0), 0)
 
     monkeypatch.setattr(
         rounds, "candidate_of", lambda model, free, names, name, _: SimpleNamespace(names=(*names, name))

@@ -167,7 +167,7 @@ def test_a_fit_worse_than_the_machine_that_it_contains_is_not_called_converged()
     fitted = SimpleNamespace(
         names=("viscous",), fit=fit, problem=SimpleNamespace(free=free), added=(0,), tries=1
     )
-    judged = SimpleNamespace(name="viscous", fitted=fitted, held_out=0.0, evidence=0.0)
+    judged = SimpleNamespace(name="viscous", fitted=fitted, held_out=0.0, evidence=0.0, faults=None)
     told = {gain: _candidate(SimpleNamespace(**vars(judged), training=gain)) for gain in (-0.5, -400.0)}
     assert told[-0.5]["converged"]
     assert not told[-400.0]["converged"]
