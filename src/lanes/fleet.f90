@@ -19,8 +19,7 @@ module fleet
   implicit none
   private
 
-  public :: prepare_flow, open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, put_into_batch, &
-    take_from_batch, fly_fleet
+  public :: prepare_flow, open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, fly_fleet
 
   !> Every lane is controlled by `batch`; the motion of several bodies is in `structures`.
   type, public :: fleet_t
@@ -84,19 +83,9 @@ contains
     end if
   end function flies_in_lane
 
-  !> Puts a motion into a lane, which will fly it to the section. `new`: without memory of flights before.
-  pure subroutine put_into_lane(moving, flow, lane, strobe, new, fleet)
-    type(motion_t), intent(in) :: moving
-    type(lane_flow_t), intent(in) :: flow
-    integer, intent(in) :: lane
-    class(strobe_t), intent(in) :: strobe
-    logical, intent(in) :: new
-    type(fleet_t), intent(inout) :: fleet
-    call put_into_batch(moving, flow, lane, strobe, new, fleet%batch, fleet%structures)
-  end subroutine put_into_lane
-
-  !> The same for a batch by itself; `structures` are asked for by several bodies alone.
-  pure subroutine put_into_batch(moving, flow, lane, strobe, new, batch, structures)
+  !> Puts a motion into a lane of a batch, which will fly it to the section. `new`: without memory of flights before. Several
+  !> bodies alone ask for `structures`.
+  pure subroutine put_into_lane(moving, flow, lane, strobe, new, batch, structures)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(in) :: flow
     integer, intent(in) :: lane
@@ -109,21 +98,11 @@ contains
     else
       call occupy_lane(flow, lane, strobe%state, new, batch)
     end if
-  end subroutine put_into_batch
+  end subroutine put_into_lane
 
   !> The motion in a lane, where it stopped or at the start of the flight that is left to the event loop; what the lane has
   !> counted goes to the tally. Not a function: the copy of its result, just written, would stall every stop.
-  pure subroutine take_from_lane(moving, lane, fleet, strobe, tally)
-    type(motion_t), intent(in) :: moving
-    integer, intent(in) :: lane
-    type(fleet_t), intent(inout) :: fleet
-    class(strobe_t), intent(inout) :: strobe
-    type(tally_t), intent(inout) :: tally
-    call take_from_batch(moving, lane, fleet%batch, fleet%structures, strobe, tally)
-  end subroutine take_from_lane
-
-  !> The same from a batch by itself.
-  pure subroutine take_from_batch(moving, lane, batch, structures, strobe, tally)
+  pure subroutine take_from_lane(moving, lane, batch, structures, strobe, tally)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
@@ -138,7 +117,7 @@ contains
       call lane_state(batch, lane, strobe%state)
     end if
     call take_counts(batch, lane, tally)
-  end subroutine take_from_batch
+  end subroutine take_from_lane
 
   !> Flies every occupied lane until it has stopped or is left to the event loop.
   pure subroutine fly_fleet(flow, fleet)

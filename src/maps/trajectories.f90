@@ -6,7 +6,7 @@
 module trajectories
   use attractors, only: attractor_t
   use errors, only: error_t
-  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_batch, take_from_batch
+  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_lane, take_from_lane
   use kinds, only: wp
   use lane_gpu, only: await_half, gpu_half_t, gpu_threads, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
@@ -289,7 +289,7 @@ contains
         call go_on(journey, catalogue, start, passenger, outcome)
       end associate
       if (passenger%course%phase /= phase_over) then
-        call put_into_batch(journey%moving, journey%flow, lane, passenger%course, .true., batch, structures)
+        call put_into_lane(journey%moving, journey%flow, lane, passenger%course, .true., batch, structures)
         call send_on(journey, catalogue, passenger%course, outcomes(passenger%start), lane, batch)
         return
       end if
@@ -349,7 +349,7 @@ contains
       course%elapsed = batch%elapsed(lane)
       course%captured = nint(batch%captor(lane))
       outcome%settle_time = batch%settled(lane)
-      call take_from_batch(journey%moving, lane, batch, structures, course%strobe_t, course%tally)
+      call take_from_lane(journey%moving, lane, batch, structures, course%strobe_t, course%tally)
       if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
       taken = .false.
       if (left .and. course%reason == 0) then
@@ -366,7 +366,7 @@ contains
       end if
       passenger%unseen = passenger%unseen .or. course%phase == phase_window
       batch%status(lane) = lane_flying
-      if (taken) call put_into_batch(journey%moving, journey%flow, lane, course, .false., batch, structures)
+      if (taken) call put_into_lane(journey%moving, journey%flow, lane, course, .false., batch, structures)
       call send_on(journey, catalogue, course, outcome, lane, batch)
     end associate
   end subroutine attend

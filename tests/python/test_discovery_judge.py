@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, flexible, gates, judge, several
-from separatrix.discovery.decision.gates import choice, foremost
+from separatrix.discovery.decision import decide, flexible, judge, several
+from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import (
     Judged,
     _together_clear,
@@ -361,80 +361,6 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
     assert [one.name for one in close] == rivals
 
 
-@pytest.mark.parametrize(("explained", "first"), [(15.0, "viscous"), (25.0, "stribeck")])
-def test_the_better_of_two_is_so_with_faults_of_a_rig_beside_both(monkeypatch, explained, first):
-    """Two effects that leave more than noise: faults of the rig explain more of it beside the second."""
-    pool = [contender("viscous", 50.0), contender("stribeck", 40.0)]
-    for one in pool:
-        one.fitted.fit.chi2 = np.full(COUNT, 60.0)
-    weights = {"viscous": 10.0, "stribeck": explained}
-    monkeypatch.setattr(gates, "weight_of_faults", lambda fitted, _: (weights[fitted.names[-1]], 0.0))
-    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
-    best, rivals = choice(SimpleNamespace(options=OPTIONS), None, None, pool, foremost)
-    assert best.name == first
-    assert rivals == []
-
-
-def test_one_that_joins_a_pool_late_is_weighed_as_the_others_are(monkeypatch):
-    """Else it would be held bare against those with faults."""
-    pool = [contender("viscous", 50.0), contender("stribeck", 45.0)]
-    pool[0].faults = (20.0, 0.0)
-    monkeypatch.setattr(gates, "weight_of_faults", lambda *_: (40.0, 0.0))
-    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
-    best, _ = choice(SimpleNamespace(options=OPTIONS), None, None, pool, foremost)
-    assert best.name == "stribeck"
-    assert best.faults == (40.0, 0.0)
-
-
-@pytest.mark.parametrize(("better", "faults"), [(True, 7.0), (False, 5.0)])
-def test_held_out_records_are_foretold_beside_faults_where_that_is_better(monkeypatch, better, faults):
-    one = contender("viscous", 50.0)
-    plain, beside = SimpleNamespace(), SimpleNamespace()
-    one.prediction, one.held_out, one.held_out_parts = plain, 3.0, np.full(3, 1.0)
-    monkeypatch.setattr(gates, "gained_together", lambda *_: np.full(3, 2.0 if better else 0.5))
-    monkeypatch.setattr(gates, "weight_of_faults", lambda _, told: (9.0, 7.0 if told is beside else 5.0))
-    bench = SimpleNamespace(foretell_beside_faults=lambda *_: beside)
-    gates.weigh_faults(bench, one)
-    assert one.prediction is (beside if better else plain)
-    assert one.held_out == (6.0 if better else 3.0)
-    assert one.faults == (9.0, faults)
-    assert one.evidence == pytest.approx(50.0 + one.held_out + 9.0 + faults)
-    assert one.own_evidence == pytest.approx(50.0 + one.held_out)
-
-
-@pytest.mark.parametrize(
-    ("weights", "clear"), [((0.0, 0.0), False), ((400.0, 0.0), False), ((2000.0, 0.0), True)]
-)
-def test_held_out_records_may_contradict_as_far_as_faults_are_linear(monkeypatch, weights, clear):
-    """A name that is 1150 ahead where it was fitted and 150 behind where it was foretold."""
-    monkeypatch.setattr(judge, "ahead", lambda one, other: -150.0)
-    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
-    best, other = contender("viscous", 1250.0), contender("stribeck", 100.0)
-    for one in (best, other):
-        one.prediction, one.faults = SimpleNamespace(), weights
-    assert judge.clear_of(best, other, OPTIONS) == clear
-
-
-def test_a_part_that_follows_a_set_is_weighed_where_the_part_was(monkeypatch):
-    """Faults imitate what a part in a wrong minimum misses: without its own the better one would go."""
-    one, led = contender("viscous", 100.0), contender("viscous", 200.0)
-    one.faults = (150.0, 0.0)
-    monkeypatch.setattr(several, "led_by", lambda *_: led.fitted)
-    monkeypatch.setattr(several, "judged", lambda *_: led)
-    monkeypatch.setattr(gates, "weight_of_faults", lambda *_: (80.0, 0.0))
-    bench = SimpleNamespace(training=None, foretell=lambda *_: None)
-    first = SimpleNamespace(base=None, foretold=None)
-    assert several._followed(bench, first, SimpleNamespace(fitted=None, prediction=None), one) is led
-
-
-@pytest.mark.parametrize(("own", "within"), [(0.05, True), (0.2, False)])
-def test_what_is_left_of_a_gain_beside_faults_is_more_than_their_errors(own, within):
-    """A fault is known as far as the motion is linear in it, to a tenth."""
-    one = contender("viscous", 200.0)
-    one.own = own
-    assert gates._within_faults(one) == within
-
-
 @pytest.mark.parametrize("better", [80.0, 20.0])
 def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better):
     """What a set is held against must not be caught in a minimum that the set left."""
@@ -474,10 +400,11 @@ def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_
 
     def weigh(bench, one):
         if one.faults is None:
-            one.faults = (0.0 if one is whole else faults, 0.0)
+            one.faults = (faults, 0.0)
 
     base = fitted("", np.full(COUNT, 100.0))
     whole = one("quadratic_drag", "restitution_slope", evidence=100.0)
+    whole.faults = (0.0, 0.0)
     parts = {name: one(name, evidence=20.0) for name in whole.fitted.names}
     over = {
         "restitution_slope": foretold(np.ones(12), np.ones(12)),

@@ -50,8 +50,9 @@ def choice(
             pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
             continue
         leading = _leading(pool, best, foretold is not None)
-        asked = any(one.faults is not None for one in leading) or rivals
-        if all(one.faults is not None for one in leading) or not (asked or not best.fitted.fit.like_noise(2)):
+        weighed = [one.faults is not None for one in leading]
+        matters = any(weighed) or rivals or not best.fitted.fit.like_noise(2)
+        if all(weighed) or not matters:
             return best, rivals
         for one in leading:
             weigh_faults(bench, one)

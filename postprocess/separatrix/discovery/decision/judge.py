@@ -28,6 +28,8 @@ _DOUBTLESS = 10.0
 _CHANCE = 0.05
 # share of what faults of a rig do that is not linear
 _LINEAR = 0.2
+# what faults add where they were not weighed
+_NO_FAULTS = (0.0, 0.0)
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
 _KINK_SHARE = 0.01
 
@@ -84,12 +86,12 @@ class Judged:
     @property
     def fitted_evidence(self) -> float:
         """Of the records that were fitted."""
-        return self.training - self.parameters + (self.faults[0] if self.faults else 0.0)
+        return self.training - self.parameters + (self.faults or _NO_FAULTS)[0]
 
     @property
     def foretold_evidence(self) -> float:
         """Of the records that were foretold."""
-        return self.held_out + (self.faults[1] if self.faults else 0.0)
+        return self.held_out + (self.faults or _NO_FAULTS)[1]
 
 
 def judged(
@@ -109,8 +111,8 @@ def lead(one: Judged, other: Judged) -> float:
     if one.prediction is None or other.prediction is None:
         return one.evidence - other.evidence
     fitted = one.fitted_evidence - other.fitted_evidence
-    more = (one.foretold_evidence - one.held_out) - (other.foretold_evidence - other.held_out)
-    return fitted + ahead(one.prediction, other.prediction) + more
+    of_faults = (one.faults or _NO_FAULTS)[1] - (other.faults or _NO_FAULTS)[1]
+    return fitted + ahead(one.prediction, other.prediction) + of_faults
 
 
 def detection(one: Judged, tested: float, inflation: float) -> float:
@@ -290,7 +292,7 @@ def clear_of(best: Judged, other: Judged, options: Options) -> bool:
     least = margin(best, other, options)
     over = lead(best, other)
     fitted = best.fitted_evidence - other.fitted_evidence
-    if any(best.faults or ()) and any(other.faults or ()):
+    if any(best.faults or _NO_FAULTS) and any(other.faults or _NO_FAULTS):
         # both have them already, as far as they are linear
         unsure = _LINEAR * max(sum(best.faults), sum(other.faults))
         return over >= least and min(fitted, over - fitted) > -max(least, unsure)

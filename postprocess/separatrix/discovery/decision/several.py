@@ -141,7 +141,6 @@ def _all_needed(bench: Bench, first: Round, whole: Judged, part: Judged) -> bool
         if other is None:
             # it cannot be fitted
             continue
-        weigh_faults(bench, whole)
         # the gates of a part are those of what it foretold so far
         other = replace(other)
         weigh_faults(bench, other)

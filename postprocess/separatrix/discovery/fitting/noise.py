@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.response import force_columns
+from separatrix.discovery.fitting.response import force_columns, in_swings
 from separatrix.discovery.measured.condense import Samples, expected_left
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
@@ -167,12 +167,8 @@ def _bent_sensor(problem: Problem, fit: Fit) -> np.ndarray:
 
     They bend where the speed jumps, as no force does, and would be memory of the noise.
     """
-    x, inside = fit.evaluation.x, problem.segments.inside & fit.good[:, None]
-    u = np.zeros(x.shape)
-    for number in range(len(problem.prepared)):
-        here = inside & (problem.segments.record == number)[:, None]
-        if here.any():
-            u[here] = (x[here] - x[here].mean()) / max(float(np.std(x[here])), 1e-300)
+    seen = problem.segments.inside & fit.good[:, None]
+    u = np.where(seen, in_swings(problem, fit.evaluation.x, seen)[0], 0.0)
     return u[:, :, None] ** np.array([2, 3])
 
 

@@ -84,6 +84,21 @@ def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarr
     return problem.whitened(columns)
 
 
+def in_swings(problem: Problem, signal: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A signal (segments, samples) about the mean of its record in units of its swing there, and the swings.
+
+    The swing is the standard deviation of what is `seen`; where there is none, the signal is 0.
+    """
+    found, swings = np.zeros(signal.shape), np.zeros(len(problem.prepared))
+    for number in range(swings.size):
+        rows = np.flatnonzero(problem.segments.record == number)
+        values = signal[rows][seen[rows]]
+        swings[number] = float(np.std(values)) if values.size else 0.0
+        if swings[number] > 0:
+            found[rows] = (signal[rows] - np.mean(values)) / swings[number]
+    return found, swings
+
+
 def sample_times(problem: Problem) -> np.ndarray:
     """Times of the samples since the start of their segment [s], (segments, length)."""
     times = np.zeros(problem.segments.inside.shape)

@@ -21,7 +21,7 @@ from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
-from separatrix.discovery.fitting.response import force_columns, sample_times
+from separatrix.discovery.fitting.response import force_columns, in_swings, sample_times
 
 _POWERS = (2, 3)
 _HARMONICS = 6
@@ -62,17 +62,12 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
     count, length = signal.shape
     records = len(problem.prepared)
     table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
-    good = problem.segments.inside & fit.good[:, None]
+    u, swings = in_swings(problem, signal, problem.segments.inside & fit.good[:, None])
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        seen = signal[rows][good[rows]]
-        swing = float(np.std(seen)) if seen.size else 0.0
-        if swing == 0:
-            continue
-        u = (signal[rows] - np.mean(seen)) / swing
         sigma = prepared.deviation(problem.segments.index[rows])
         for place, power in enumerate(_POWERS, start=number * len(_POWERS)):
-            table[rows, :length, place] = FAULT * swing * u**power / sigma
+            table[rows, :length, place] = FAULT * swings[number] * u[rows] ** power / sigma
     return problem.whitened(table)
 
 
