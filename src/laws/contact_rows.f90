@@ -17,11 +17,12 @@ module contact_rows
     'hunt_crossley_exact', 'hunt_crossley_1975', 'lankarani_nikravesh', 'herbert_mcwhannell', 'gonthier', 'flores', &
     'hu_guo']
 
-  !> Laws K p^n, soft barriers, and every law with a barrier.
+  !> Laws K p + D p', laws K p^n, soft barriers, and every law with a barrier.
+  character(len=law_length), parameter :: linear_laws(2) = [character(len=law_length) :: &
+    'kelvin_voigt', 'kelvin_voigt_restitution']
   character(len=law_length), parameter :: power_laws(8) = [character(len=law_length) :: &
     'hunt_crossley', restitution_formulas]
-  character(len=law_length), parameter :: soft_laws(10) = [character(len=law_length) :: &
-    'kelvin_voigt', 'kelvin_voigt_restitution', power_laws]
+  character(len=law_length), parameter :: soft_laws(10) = [character(len=law_length) :: linear_laws, power_laws]
   character(len=law_length), parameter :: barrier_laws(14) = [character(len=law_length) :: &
     'newton', 'newton_linear', 'newton_power', 'newton_viscoelastic', soft_laws]
 
@@ -65,7 +66,8 @@ module contact_rows
     parameter_row_t('contact', 'newton_viscoelastic', 'first', '1', not_negative, 'g1, for v in m/s'), &
     parameter_row_t('contact', 'newton_viscoelastic', 'second', '1', not_negative, &
                     'g2, for v in m/s; spheres have g2 = 0.6 g1^2', optional=.true.), &
-    (parameter_row_t('contact', soft_laws(i), 'stiffness', 'N/m^n', positive, 'K'), i=1, size(soft_laws)), &
+    (parameter_row_t('contact', linear_laws(i), 'stiffness', 'N/m', positive, 'K'), i=1, size(linear_laws)), &
+    (parameter_row_t('contact', power_laws(i), 'stiffness', 'N/m^n', positive, 'K'), i=1, size(power_laws)), &
     (parameter_row_t('contact', power_laws(i), 'exponent', '1', range_t(0.5_wp, 10.0_wp), &
                      'n: 1 for flat surfaces, 1.5 for spheres (Hertz)', optional=.true., default=1.5_wp), i=1, size(power_laws)), &
     parameter_row_t('contact', 'kelvin_voigt', 'damping', 'N s/m', not_negative, 'D'), &
@@ -78,8 +80,9 @@ module contact_rows
     (parameter_row_t('contact', restitution_formulas(i), 'speed', 'm/s', not_negative, &
                      'impact speed at which it is asked for: a = d/speed; 0 = that of each impact', optional=.true.), &
                      i=1, size(restitution_formulas)), &
-    (parameter_row_t('contact', soft_laws(i), 'tension', '1', zero_to_one, &
-                     '1: pulls until p = 0; 0: the force is cut off at zero', optional=.true., default=1.0_wp), i=1, 2), &
+    (parameter_row_t('contact', linear_laws(i), 'tension', '1', zero_to_one, &
+                     '1: pulls until p = 0; 0: the force is cut off at zero', optional=.true., default=1.0_wp), &
+                     i=1, size(linear_laws)), &
     (parameter_row_t('contact', barrier_laws(i), 'upper', 'm', any_value, &
                      'position of the barrier above the body; no barrier if absent', optional=.true., &
                      default=none_above), i=1, size(barrier_laws)), &

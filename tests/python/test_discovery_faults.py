@@ -35,7 +35,7 @@ def test_a_stray_sample_in_fast_motion_is_left_out(size):
     assert np.array_equal(record.t, np.delete(t, [400, 900]))
     for row in (401, 901):
         assert any(
-            text.startswith(f"record, row {row}: x is") and "left out" in text for text in record.warnings
+            text.startswith(f"record, row {row}: x is") and "left out" in text for text in record.notes
         )
 
 
@@ -48,7 +48,7 @@ def test_impacts_pulses_and_rest_are_no_faults():
     for motion in (x, shaken, resting, bouncing(sigma=0.0)[1]):
         record = of(t, motion)
         assert np.array_equal(record.t, t)
-        assert record.warnings == []
+        assert record.notes == []
 
 
 def test_rest_before_a_gap_is_no_held_value():
@@ -59,8 +59,8 @@ def test_rest_before_a_gap_is_no_held_value():
     kept = (t < 1.3) | later
     record = of(t[kept], x[kept])
     assert np.array_equal(record.t, t[kept])
-    assert len(record.warnings) == 1
-    assert "gap" in record.warnings[0]
+    assert len(record.notes) == 1
+    assert "gap" in record.notes[0]
 
 
 def test_held_values_are_left_out():
@@ -71,7 +71,7 @@ def test_held_values_are_left_out():
     assert record.pieces == [(0, 401), (401, 3981)]
     assert any(
         text.startswith("record, row 401: x stays at") and "for 20 samples" in text
-        for text in record.warnings
+        for text in record.notes
     )
 
 
@@ -99,7 +99,7 @@ def test_turning_points_on_a_grid_are_no_clipping():
     t = np.arange(4000) / RATE
     x = 1e-4 * np.round(0.3 * np.sin(4 * t) / 1e-4)
     assert (np.diff(x[np.flatnonzero(x == x.max())[:5]]) == 0).all()
-    assert of(t, x).warnings == []
+    assert of(t, x).notes == []
     with pytest.raises(SeparatrixError, match="clipped"):
         of(t, np.minimum(x, 0.2))
 
@@ -116,8 +116,8 @@ def test_stamps_that_scatter_are_evened(size):
     record = of(stamps, x)
     assert record.pieces == [(0, even.size)]
     assert np.abs(record.t - even).max() < 0.05 * size / RATE
-    assert len(record.warnings) == 1
-    assert "even times are taken" in record.warnings[0]
+    assert len(record.notes) == 1
+    assert "even times are taken" in record.notes[0]
 
 
 def test_a_lost_sample_is_found_among_stamps_that_scatter():
@@ -133,7 +133,7 @@ def test_uneven_samples_that_the_motion_follows_keep_their_times():
     x = np.interp(stamps, np.arange(80000) / 20000, 0.3 * np.sin(4 * np.arange(80000) / 20000))
     record = of(stamps, x + SIGMA * np.random.default_rng(2).standard_normal(stamps.size))
     assert np.array_equal(record.t, stamps)
-    assert any("x follows" in text for text in record.warnings)
+    assert any("x follows" in text for text in record.notes)
 
 
 @pytest.mark.parametrize("quiet", ["ring-down", "rest", "grid"])

@@ -181,7 +181,7 @@ def test_wrong_units_make_no_certain_name(column: str, factor: float) -> None:
         setattr(record, column, factor * getattr(record, column))
     verdict = discover(base(), records[:2], records[2:], Options(quick=True, compare="force"))
     assert verdict["outcome"] != "named"
-    told = [one for one in verdict["warnings"] if "other units" in one]
+    told = [one for one in verdict["notes"] if "other units" in one]
     assert told
     factors = [float(found[1]) for one in told if (found := re.search(r"is ([\d.e-]+) times that", one))]
     assert factors == pytest.approx([factor if column == "force" else 1 / factor] * 2, rel=0.2)
@@ -193,6 +193,12 @@ def test_a_clipped_force_is_refused() -> None:
     records[1].force = np.clip(records[1].force, -limit, limit)
     with pytest.raises(SeparatrixError, match="r1.*force stays at its largest value.*clipped"):
         discover(base(), records[:2], records[2:], Options(quick=True, compare="force"))
+
+
+@pytest.mark.parametrize(("sigma", "notes"), [(0.5, 0), (60.0, 1)])
+def test_a_force_below_its_noise_is_told(sigma: float, notes: int) -> None:
+    said = prepare_force(record_of("viscous", *MOTIONS[0], 0.0, 1, sigma), base()).notes
+    assert sum("the force is smaller than its noise" in one for one in said) == notes
 
 
 def test_a_force_without_noise_is_not_clipped() -> None:

@@ -89,4 +89,4 @@ def test_units_beside_the_names_of_columns(tmp_path):
     record = read_record(path)
     assert np.allclose(record.t, T)
     assert np.allclose(record.x, 1e-3 * COLUMNS["x"])
-    assert not any("units" in one for one in record.warnings)
+    assert not any("units" in one for one in record.notes)

@@ -70,8 +70,8 @@ def test_a_gap_is_told_once_where_the_end_of_a_record_is_held_out():
     t = np.arange(800) / 100
     t[200:] += 0.5
     training, held_out, _ = _split([driven(t)], [], Model.from_text(CASE))
-    assert sum("gap of" in text for text in training[0].warnings) == 1
-    assert held_out[0].warnings == []
+    assert sum("gap of" in text for text in training[0].notes) == 1
+    assert held_out[0].notes == []
 
 
 def test_a_record_at_rest_that_moves_is_refused_as_such():

@@ -99,7 +99,7 @@ def test_gaps_are_told_and_cut(tmp_path):
     t[200:] += 0.5
     record = read_record(write(tmp_path / "record.csv", t, x))
     assert record.pieces == [(0, 200), (200, 400)]
-    assert any("record.csv:207: gap" in warning for warning in record.warnings)
+    assert any("record.csv:207: gap" in note for note in record.notes)
 
 
 def test_units_and_hdf5(tmp_path):
@@ -175,7 +175,7 @@ def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys
         raise OSError(28, "No space left on device")
 
     verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
-    verdict |= {"reasons": [], "separating_experiment": "", "warnings": [], "asked_for": None}
+    verdict |= {"reasons": [], "separating_experiment": "", "notes": [], "asked_for": None}
     verdict |= {"remains": [], "families": [], "function": None, "character": []}
     verdict |= {"added": [], "not_added": "", "places": {}, "in_families": []}
     monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
@@ -231,8 +231,8 @@ def test_a_byte_order_mark_is_no_text(tmp_path):
     ],
 )
 def test_header_lines_that_look_wrong_are_told(tmp_path, line, words):
-    warnings = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD[:-1], line])).warnings
-    assert [words in text for text in warnings] == ([True] if words else [])
+    notes = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD[:-1], line])).notes
+    assert [words in text for text in notes] == ([True] if words else [])
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_a_header_key_stands_once_and_above_the_rows(tmp_path, above, below, wor
         with pytest.raises(SeparatrixError, match=words):
             read_record(path)
     else:
-        assert read_record(path).warnings == []
+        assert read_record(path).notes == []
 
 
 def test_rows_are_named_by_their_line_after_comments_and_empty_lines(tmp_path):
@@ -293,11 +293,11 @@ def test_columns_that_are_not_used_are_told(tmp_path):
     t, x = rows()
     columns = {"t": t, "x": x, "a": 0 * t + 7, "driver_x": x}
     said = "columns that are not used: a, driver_x"
-    assert said in make_record("record", columns).warnings
+    assert said in make_record("record", columns).notes
     with h5py.File(tmp_path / "record.h5", "w") as file:
         for name, column in columns.items():
             file[name] = column
-    assert said in read_record(tmp_path / "record.h5").warnings
+    assert said in read_record(tmp_path / "record.h5").notes
 
 
 def test_a_folder_is_no_record(tmp_path):
@@ -313,7 +313,7 @@ def test_a_sample_where_no_motion_leads_is_left_out_and_told(tmp_path, size):
     assert np.array_equal(record.t, np.delete(t, 150))
     assert record.pieces == [(0, 150), (150, 399)]
     assert any(
-        text.startswith(f"{tmp_path}/record.csv:157: ") and "left out" in text for text in record.warnings
+        text.startswith(f"{tmp_path}/record.csv:157: ") and "left out" in text for text in record.notes
     )
     x[10:200:19] += size
     with pytest.raises(SeparatrixError, match=r"record.csv:17: .* 11 such samples"):
@@ -388,7 +388,7 @@ def test_an_angle_is_told_in_rad():
     x[150] += 10
     (said,) = [
         note
-        for note in make_record("r", {"t": t, "x": x}, {"units": "s, deg"}).warnings
+        for note in make_record("r", {"t": t, "x": x}, {"units": "s, deg"}).notes
         if "left out" in note
     ]
     assert f"x is {np.radians(x[150]):.6g} rad between" in said
@@ -399,7 +399,7 @@ def test_columns_that_are_not_used_may_hold_anything(tmp_path):
     (tmp_path / "flags.csv").write_text(text)
     record = read_record(tmp_path / "flags.csv")
     assert record.x[:2] == pytest.approx([1.0, np.cos(1 / 9)])
-    assert record.warnings == ["columns that are not used: flag"]
+    assert record.notes == ["columns that are not used: flag"]
 
 
 def test_columns_are_read_and_not_changed():

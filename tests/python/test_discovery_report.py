@@ -165,7 +165,7 @@ def verdict(outcome: str) -> dict:
         ],
         "ceiling": {"speed": {"gain": 130.05, "rank": 7, "p": 6.1e-25}},
         "not_tested": {"static_excess": "it changes nothing"},
-        "warnings": ["f0: noise is stated"],
+        "notes": ["f0: noise is stated"],
         "records": [
             {
                 "name": name, "use": use, "samples": 600, "sigma": 1e-3, "memory": 0.0, "resolution": 0.0,
@@ -310,7 +310,7 @@ def test_the_words_fit_the_outcome(report: tuple) -> None:
     present = [outcome for outcome, text in said.items() if text in page.text]
     assert present == [told["outcome"]]
     assert ("measure the barrier" in page.text) == (told["outcome"] == "ambiguous")
-    for text in (*told["reasons"], *told["warnings"], told["where"][0]["text"]):
+    for text in (*told["reasons"], *told["notes"], told["where"][0]["text"]):
         assert text in page.text
 
 

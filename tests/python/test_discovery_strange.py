@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision.strange import other_drive, other_machine, strongest_line
+from separatrix.discovery.decision.strange import other_drive, other_machine, other_phase, strongest_line
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.options import Options
 
@@ -80,3 +80,21 @@ def test_a_motion_beside_the_drive_is_told_where_the_machine_misses_it(frequency
     said = other_drive(data(frequency, 11.3), base(chi2))
     assert len(said) == notes
     assert all("is drive_ratio right?" in note for note in said)
+
+
+def test_a_phase_that_the_header_does_not_have_is_told():
+    """One that was not stated was searched for, and whole turns are none."""
+    found = {"a": 2.3, "b": -2.3 + 2 * np.pi, "c": 0.05, "d": 2 * np.pi, "e": 2.3, "f": 2.3}
+    prepared = [
+        SimpleNamespace(
+            record=SimpleNamespace(name=name), phase_known=name == "e", phase_stated=name != "f"
+        )
+        for name in found
+    ]
+    free = [Free("nuisance:phase", 0.0, record=place) for place in range(len(found))]
+    fitted = SimpleNamespace(
+        problem=SimpleNamespace(free=free), fit=SimpleNamespace(values=np.array(list(found.values())))
+    )
+    first, second = other_phase(SimpleNamespace(prepared=prepared), fitted)
+    assert first.startswith("a: the drive is 2.3 rad ahead of the phase of the header")
+    assert second.startswith("b: the drive is 2.3 rad behind the phase of the header")

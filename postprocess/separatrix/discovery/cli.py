@@ -155,7 +155,7 @@ def summary(verdict: dict) -> list[str]:
     lines += [f"  {reason}" for reason in verdict["reasons"]]
     if verdict["separating_experiment"]:
         lines.append(f"  to separate them: {verdict['separating_experiment']}")
-    return lines + [f"  warning: {warning}" for warning in verdict["warnings"]]
+    return lines + [f"  note: {note}" for note in verdict["notes"]]
 
 
 def _parser() -> Parser:

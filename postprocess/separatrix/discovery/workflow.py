@@ -168,7 +168,7 @@ def _split(
     first.part = f", all but the last {share}, which are held out"
     end.part = f", the last {share}, which are held out"
     # they name file and row
-    end.warnings = []
+    end.notes = []
     return [first], [end], f"the last {share} of the only record"
 
 
@@ -202,7 +202,7 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         record.x[part],
         header=header,
         pieces=pieces,
-        warnings=list(record.warnings),
+        notes=list(record.notes),
         file=record.file,
         sensors=sensors,
         **channels,

@@ -8,6 +8,7 @@ from scipy.signal import get_window
 from separatrix.discovery.decision.misfit import record_chi2
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.forces import force_needed
+from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.options import Options
@@ -26,6 +27,8 @@ _LITTLE = 0.1
 _BARRIERS = ("contact.upper", "contact.lower")
 # reduced chi^2 of a record that a wrong drive would leave
 _MISSED = 10.0
+# distance of a fitted phase from the stated one that is no error of reading [rad]
+_ANOTHER_PHASE = 0.3
 # orders of harmonics and subharmonics of a drive that a motion may follow
 _ORDERS = (1, 2, 3)
 # share of the power of x that a clear line has
@@ -128,6 +131,23 @@ def other_drive(data: Data, base: Fitted) -> list[str]:
                 f"{one.record.name}: x moves mostly at {number(line, 4)} rad/s, the drive is taken to "
                 f"turn at {number(one.frequency, 4)} rad/s: is drive_ratio right?"
             )
+    return notes
+
+
+def other_phase(data: Data, fitted: Fitted | Prediction) -> list[str]:
+    """Records whose headers say another phase of the drive than the one that the machine takes."""
+    notes = []
+    for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
+        if one.path != "nuisance:phase":
+            continue
+        prepared = data.prepared[one.record]
+        beside = float(np.angle(np.exp(1j * value)))
+        if prepared.phase_known or not prepared.phase_stated or abs(beside) < _ANOTHER_PHASE:
+            continue
+        notes.append(
+            f"{prepared.record.name}: the drive is {number(abs(beside), 2)} rad "
+            f"{'ahead of' if beside > 0 else 'behind'} the phase of the header: another zero of the crank?"
+        )
     return notes
 
 

@@ -14,7 +14,7 @@ from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Bench, Round
-from separatrix.discovery.decision.strange import other_drive, other_machine, other_units
+from separatrix.discovery.decision.strange import other_drive, other_machine, other_phase, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
@@ -92,7 +92,7 @@ def verdict_of(findings: Findings) -> dict:
             for one in decision.base_ceiling.families
         },
         "not_tested": first.absent,
-        "warnings": _warnings(findings),
+        "notes": _notes(findings),
         "records": _records(findings),
         "held_out_chosen": findings.held_out_chosen,
         "seed": bench.options.seed,
@@ -216,7 +216,7 @@ def _candidate(one: Judged) -> dict:
     }
 
 
-def _warnings(findings: Findings) -> list[str]:
+def _notes(findings: Findings) -> list[str]:
     bench = findings.bench
     notes = [
         f"{one.record.name}: {note}"
@@ -226,6 +226,7 @@ def _warnings(findings: Findings) -> list[str]:
     ]
     fits = _final(findings)
     for _, data, fitted in fits:
+        notes += other_phase(data, fitted)
         if isinstance(fitted.problem, CoordinateProblem):
             continue
         notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)

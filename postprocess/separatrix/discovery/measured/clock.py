@@ -20,7 +20,7 @@ _LATE, _LOST = 1.25, 2.0
 
 
 def pieces_of(
-    t: np.ndarray, x: np.ndarray, fewest: int, where: Callable[[int], str], warnings: list[str]
+    t: np.ndarray, x: np.ndarray, fewest: int, where: Callable[[int], str], notes: list[str]
 ) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Times of the samples, and the stretches without gaps as (first, last + 1).
 
@@ -34,9 +34,9 @@ def pieces_of(
     gaps = _lost(t, steps, float(whole.mean())) if uneven else np.flatnonzero(steps > GAP * usual) + 1
     pieces = list(pairwise([0, *gaps.tolist(), t.size]))
     for row in gaps[:3]:
-        warnings.append(f"{where(row)}: gap of {t[row] - t[row - 1]:.4g} s; nothing is fitted across it")
+        notes.append(f"{where(row)}: gap of {t[row] - t[row - 1]:.4g} s; nothing is fitted across it")
     if gaps.size > 3:
-        warnings.append(f"{gaps.size - 3} more gaps")
+        notes.append(f"{gaps.size - 3} more gaps")
     long = sum(last - first for first, last in pieces if last - first >= FEWEST_IN_PIECE)
     if long < fewest:
         raise SeparatrixError(
@@ -44,7 +44,7 @@ def pieces_of(
             f"{FEWEST_IN_PIECE}, {fewest} are needed"
         )
     if uneven:
-        t = _evened(t, x, pieces, where, warnings)
+        t = _evened(t, x, pieces, where, notes)
     return t, pieces
 
 
@@ -63,7 +63,7 @@ def _lost(t: np.ndarray, steps: np.ndarray, usual: float) -> np.ndarray:
     return np.array(found, int)
 
 
-def _evened(t: np.ndarray, x: np.ndarray, pieces, where, warnings: list[str]) -> np.ndarray:
+def _evened(t: np.ndarray, x: np.ndarray, pieces, where, notes: list[str]) -> np.ndarray:
     """Even times within the pieces, where x says that the samples were taken at these."""
     index = np.arange(t.size)
     above = below = 0.0
@@ -80,10 +80,10 @@ def _evened(t: np.ndarray, x: np.ndarray, pieces, where, warnings: list[str]) ->
     row = int(np.argmax(np.abs(late)))
     said = f"{where(row)}: t is {abs(late[row]):.3g} s off even steps, {np.std(late):.3g} s is usual"
     if follows + 2 * error < 0.5:
-        warnings.append(f"{said}; x does not follow: even times are taken")
+        notes.append(f"{said}; x does not follow: even times are taken")
         return even
     follow = "and x follows" if follows - 2 * error > 0.5 else "and x does not tell whether it follows"
-    warnings.append(f"{said}, {follow}: noise and impacts are found less well")
+    notes.append(f"{said}, {follow}: noise and impacts are found less well")
     return t
 
 

@@ -217,7 +217,7 @@ def condense(
         unseen *= 4
         at_jumps *= 2
     if unseen > _UNSEEN:
-        record.warnings.append(
+        record.notes.append(
             f"{record.t.size} samples: stretches that are smooth within {np.sqrt(unseen / _UNSEEN):.0f} "
             "times the noise are condensed"
         )

@@ -32,12 +32,12 @@ _ABRUPT = (1.5, 0.05)
 _STEPS_OF_NOISE, _FEWEST_INSIDE = 0.5, 20
 
 
-def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
-    """Rows of samples that say nothing on the motion, told in `warnings`; too many are refused."""
+def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
+    """Rows of samples that say nothing on the motion, told in `notes`; too many are refused."""
     _check_rate(x, where)
-    held = _held(t, x, unit, where, warnings)
+    held = _held(t, x, unit, where, notes)
     rows = np.setdiff1d(np.arange(x.size), held)
-    stray = _stray(t[rows], x[rows], unit, lambda row: where(rows[row]), warnings)
+    stray = _stray(t[rows], x[rows], unit, lambda row: where(rows[row]), notes)
     return np.union1d(held, rows[stray])
 
 
@@ -56,7 +56,7 @@ def _check_rate(x: np.ndarray, where: Where) -> None:
         )
 
 
-def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
+def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
     """Single samples that lie where no motion leads: away from a smooth line through two on either side."""
     off = np.zeros(x.size)
     off[2:-2] = x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6
@@ -80,7 +80,7 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list
     ]
     if rows.size > _MOST_STRAY:
         raise SeparatrixError(f"{said[0]}; {rows.size} such samples: clean the record")
-    warnings += [f"{text}: left out" for text in said]
+    notes += [f"{text}: left out" for text in said]
     return rows
 
 
@@ -90,7 +90,7 @@ def _gaps(t: np.ndarray) -> np.ndarray:
     return steps > GAP * np.median(steps)
 
 
-def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> np.ndarray:
+def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
     """Samples that repeat one before them, until the motion goes on elsewhere."""
     least = max(_HELD[0] * white_noise(x), _HELD[1] * resolution_of(x))
     gaps = _gaps(t)
@@ -104,33 +104,33 @@ def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, warnings: list[
         if abs(x[last] - x[first]) > max(least, _HELD[2] * around):
             found.append((first, last))
     for first, last in found[:3]:
-        warnings.append(
+        notes.append(
             f"{where(first)}: x stays at {x[first]:.6g} {unit} for {last - first} samples, then jumps to "
             f"{x[last]:.6g} {unit}: left out"
         )
     if len(found) > 3:
-        warnings.append(f"{len(found) - 3} more stretches of held values: left out")
+        notes.append(f"{len(found) - 3} more stretches of held values: left out")
     return np.concatenate([np.arange(first + 1, last) for first, last in found] or [np.zeros(0, int)])
 
 
-def check_clipping(x: np.ndarray, unit: str, where: Where, warnings: list[str]) -> None:
+def check_clipping(x: np.ndarray, unit: str, where: Where, notes: list[str]) -> None:
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself at turning points."""
     steps = np.abs(np.diff(x))
     least = max(_ABRUPT[0] * resolution_of(x), _ABRUPT[1] * float(np.median(steps[steps > 0])))
-    _check_limits("x", x, unit, where, warnings, lambda first, last: _is_abrupt(x, first, last, least))
+    _check_limits("x", x, unit, where, notes, lambda first, last: _is_abrupt(x, first, last, least))
 
 
-def check_clipped_force(force: np.ndarray, unit: str, where: Where, warnings: list[str]) -> None:
+def check_clipped_force(force: np.ndarray, unit: str, where: Where, notes: list[str]) -> None:
     """The same of a force, which may jump to a constant value: but not without its noise."""
     inside = force[(force > force.min()) & (force < force.max())]
     if inside.size > _FEWEST_INSIDE and white_noise(inside) > max(
         _STEPS_OF_NOISE * resolution_of(force), QUIET * float(np.std(force))
     ):
-        _check_limits("force", force, unit, where, warnings, lambda first, last: True)
+        _check_limits("force", force, unit, where, notes, lambda first, last: True)
 
 
 def _check_limits(
-    name: str, x: np.ndarray, unit: str, where: Where, warnings: list[str], holds: Callable[[int, int], bool]
+    name: str, x: np.ndarray, unit: str, where: Where, notes: list[str], holds: Callable[[int, int], bool]
 ) -> None:
     """Refuse a signal that stays at one of its limits for long, in runs that are no motion's."""
     for end, extreme in (("largest", x.max()), ("smallest", x.min())):
@@ -145,8 +145,11 @@ def _check_limits(
         stays = f"{name} stays at its {end} value {extreme:.6g} {unit}"
         message = f"{where(long[0][0])}: {stays} for {len(long)} stretches"
         if len(long) >= 2 and share > _CLIPPED_SHARE:
-            raise SeparatrixError(f"{message}, {100 * share:.0f} % of the samples: clipped")
-        warnings.append(f"{message}: clipped?")
+            raise SeparatrixError(
+                f"{message}, {100 * share:.0f} % of the samples: clipped. The range of the sensor has to be "
+                f"that of the {'force' if name == 'force' else 'motion'}"
+            )
+        notes.append(f"{message}: clipped?")
 
 
 def _is_abrupt(x: np.ndarray, first: int, last: int, least: float) -> bool:

@@ -59,7 +59,7 @@ _NO_LESS_THAN_0 = (
 )
 
 
-def numbers_of(path: Path, header: dict[str, str], of_time: float, warnings: list[str]) -> dict[str, float]:
+def numbers_of(path: Path, header: dict[str, str], of_time: float, notes: list[str]) -> dict[str, float]:
     """Numbers of the header in the units of their keys; `phase_origin_s` is when the phase was what is said.
 
     `of_time`: unit of the column t [s].
@@ -85,8 +85,8 @@ def numbers_of(path: Path, header: dict[str, str], of_time: float, warnings: lis
         if key in numbers and numbers[key] < 0:
             raise SeparatrixError(f"{path}: '{key}' is {header[key]}, expected at least 0")
         if numbers.get(key) == 0 and key.startswith("sensor_noise"):
-            warnings.append(f"{key} is 0: measured instead")
-    _doubt(header, numbers, warnings)
+            notes.append(f"{key} is 0: measured instead")
+    _doubt(header, numbers, notes)
     return numbers
 
 
@@ -104,22 +104,22 @@ def _quantity(
     return float(found.group(1)) * (units[unit] if unit else usual)
 
 
-def _doubt(header: dict[str, str], numbers: dict[str, float], warnings: list[str]) -> None:
+def _doubt(header: dict[str, str], numbers: dict[str, float], notes: list[str]) -> None:
     """Warn of keys that look like misspelt ones, and of an angle that looks like degrees."""
     for key in header:
         near = [] if key in KEYS else get_close_matches(key, sorted(KEYS), 1, _NEAR)
         if near:
-            warnings.append(f"header key '{key}' is not used: '{near[0]}'?")
+            notes.append(f"header key '{key}' is not used: '{near[0]}'?")
     if abs(numbers.get("phase", 0.0)) > _TURN:
-        warnings.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
+        notes.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
 
 
 def to_si(
-    path: Path, header: dict[str, str], columns: dict[str, np.ndarray], warnings: list[str]
+    path: Path, header: dict[str, str], columns: dict[str, np.ndarray], notes: list[str]
 ) -> tuple[str, float]:
     """Turn the columns into SI; return the unit of x, m or rad, and the unit of time [s]."""
     if "units" not in header:
-        warnings.append("no 'units': read as s and m (rad of an angle)")
+        notes.append("no 'units': read as s and m (rad of an angle)")
         return "m", 1.0
     units = _units(path, header["units"], columns)
     for name in columns:

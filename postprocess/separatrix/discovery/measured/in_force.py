@@ -28,7 +28,7 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
             f'drive.law: allowed with --compare force "measured_force": the force that {record.file} has is '
             "all that drives the body; foot, crank and other drives are not known there"
         )
-    notes = list(record.warnings)
+    notes = list(record.notes)
     if record.v is not None:
         check_velocity(record, notes)
     unit = units_of(model.parameters).force
@@ -43,6 +43,12 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
     sigma = max(stated / np.sqrt(_together(record)) if stated else white_noise(record.force), least)
     if not stated:
         notes.append(f"noise of the force {sigma:.3g} {unit}, from fourth differences")
+    scatter = float(np.std(record.force))
+    if scatter**2 < 2 * sigma**2:
+        notes.append(
+            f"the force is smaller than its noise: it scatters by {scatter:.3g} {unit} at a noise of "
+            f"{sigma:.3g} {unit}"
+        )
     of_x = max(white_noise(record.x), resolution_of(record.x) / np.sqrt(12))
     of_sensor = (record.header.get("sensor_noise_sigma_m") or 0.0) / np.sqrt(_together(record))
     motion = max(of_sensor or of_x, QUIET * float(np.std(record.x)))

@@ -117,7 +117,7 @@ class Prepared:
 
 def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     """Measure what the header does not say, and refuse what cannot be a record of this machine."""
-    notes = list(record.warnings)
+    notes = list(record.notes)
     if record.v is not None:
         check_velocity(record, notes)
     record = _with_its_force(record, model, notes)

@@ -33,7 +33,7 @@ class Record:
     sensors: dict[str, np.ndarray] = field(default_factory=dict)
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     # as it was given
     file: str = ""
     # which of its rows, for messages
@@ -75,9 +75,9 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     def where(row: int) -> str:
         return f"{path}, row {kept[row] + 1}" if table.lines is None else f"{path}:{table.lines[kept[row]]}"
 
-    warnings: list[str] = []
-    unit, of_time = to_si(path, header, columns, warnings)
-    numbers = numbers_of(path, header, of_time, warnings)
+    notes: list[str] = []
+    unit, of_time = to_si(path, header, columns, notes)
+    numbers = numbers_of(path, header, of_time, notes)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -98,10 +98,10 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     if not at_rest:
         if np.ptp(x) == 0:
             raise SeparatrixError(f"{path}: 'x' is constant")
-        kept = np.delete(kept, left_out(t, x, unit, where, warnings))
+        kept = np.delete(kept, left_out(t, x, unit, where, notes))
         columns = {name: column[kept] for name, column in columns.items()}
         x = columns["x"]
-    t, pieces = pieces_of(columns["t"], x, _FEWEST_SAMPLES, where, warnings)
+    t, pieces = pieces_of(columns["t"], x, _FEWEST_SAMPLES, where, notes)
     usual = float(np.median(np.diff(t)))
     rate = numbers.get("sampling_rate_hz")
     if rate is not None and not 0.99 < rate * usual < 1.01:
@@ -110,12 +110,12 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         )
     if not at_rest:
         for place in [columns[name] for name in sensors if name[0] == "x"] or [x]:
-            check_clipping(place, unit, where, warnings)
+            check_clipping(place, unit, where, notes)
     if table.unused:
-        warnings.append(f"columns that are not used: {', '.join(table.unused)}")
+        notes.append(f"columns that are not used: {', '.join(table.unused)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
     of_bodies = {name: columns[name] for name in sensors}
-    told = {"header": numbers, "pieces": pieces, "warnings": warnings, "file": str(path)}
+    told = {"header": numbers, "pieces": pieces, "notes": notes, "file": str(path)}
     return Record(path.stem, t, sensors=of_bodies, **told, **channels)
 
 

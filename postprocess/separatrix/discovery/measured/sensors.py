@@ -72,7 +72,7 @@ class SensedPrepared(Prepared):
 def prepare_sensors(record: Record, model: Model, rest: Record | None = None) -> SensedPrepared:
     """Find what each column of a record is of, its noise, and the drive."""
     structure = structure_of(model)
-    notes = list(record.warnings)
+    notes = list(record.notes)
     if rest is not None:
         raise SeparatrixError(
             f"{rest.file}: found a record at rest, allowed for several bodies stated noise: "

@@ -119,8 +119,8 @@ def _summary(verdict: dict) -> Section:
     body: list = [lines[0], lines[1:]]
     if verdict["reasons"]:
         body += ["What kept the verdict from being firmer:", list(verdict["reasons"])]
-    if verdict["warnings"]:
-        body += ["Warnings:", list(verdict["warnings"])]
+    if verdict["notes"]:
+        body += ["Notes:", list(verdict["notes"])]
     return Section("verdict", "Verdict", body)
 
 
