@@ -2,10 +2,22 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
-# Builds Separatrix with and without MPI and runs all tests. The last line counts them; the exit
+# Builds Separatrix with and without MPI and runs the tests. The last line counts them; the exit
 # code is 0 only if none failed.
+#
+#   --all   also the long ones, which repeat a law for a further machine, size or page
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+chosen="not long"
+case "${1-}" in
+  "") ;;
+  --all) chosen="" ;;
+  *)
+    echo "test: found '$1', allowed --all or nothing" >&2
+    exit 64
+    ;;
+esac
 
 scripts/bootstrap.sh --browser --docs
 # shellcheck source=scripts/environment.sh
@@ -34,7 +46,7 @@ ctest --test-dir build-serial -L "^($(IFS='|' && echo "${serial_layers[*]}"))\$"
 
 echo "test: running the Python tests"
 export SEPARATRIX_BUILD=$PWD/build
-.venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile --durations=15 tests/python \
+.venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile --durations=15 -m "$chosen" tests/python \
   --junit-xml=build/pytest.xml || status=1
 
 # The objects of the serial build, without its tests; in an empty environment and in a bare root.

@@ -115,6 +115,7 @@ def test_stick_and_slip_on_a_shaken_platform_begin_where_the_closed_form_has_the
     assert onsets == pytest.approx([2 / math.sqrt(4 + math.pi**2), 1], abs=1e-9)
 
 
+@pytest.mark.long
 def test_boundary_of_backlash(separatrix: Path, source_dir: Path, tmp_path: Path):
     """Most of it is the stable sets of saddles, that of the symmetric orbit of one period among them."""
     case = source_dir / "examples" / "basin_pair_backlash.toml"

@@ -124,7 +124,7 @@ def follow(separatrix: Path, tmp_path: Path):
     return follow_it
 
 
-@pytest.mark.parametrize("searches", [1, 3])
+@pytest.mark.parametrize("searches", [1, pytest.param(3, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("text", "name"), [(CASE, "drive.ratio"), (STRUCTURE, "drive.d.frequency")])
 def test_a_slip_within_a_stick_begins_and_ends(follow, text: str, name: str, searches: int) -> None:
     """Where the second hump of the force only just reaches friction: from either side the branch goes on."""

@@ -52,7 +52,11 @@ def test_a_fold_beside_a_soft_graze_has_one_label(separatrix: Path, tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("damping", "tension", "expected"),
-    [(0.239, 1, ["GR", "SN", "SN"]), (1, 0, ["GR", "SN", "SN"]), (4, 0, ["GR-fold", "SN"])],
+    [
+        pytest.param(0.239, 1, ["GR", "SN", "SN"], marks=pytest.mark.long),
+        (1, 0, ["GR", "SN", "SN"]),
+        pytest.param(4, 0, ["GR-fold", "SN"], marks=pytest.mark.long),
+    ],
 )
 def test_a_branch_turns_in_a_soft_graze_only_where_it_does(
     separatrix: Path, tmp_path: Path, damping: float, tension: int, expected: list[str]

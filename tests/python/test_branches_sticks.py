@@ -121,6 +121,7 @@ def test_slips_within_sticks_end_no_branch(separatrix: Path, source_dir: Path, t
         assert abs(onsets - onset).min() < 1e-11
 
 
+@pytest.mark.long
 def test_equations_that_tell_little_end_no_branch(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
     """Where the capsule's cycle of two periods is told to 1e-9 only it goes on from its doubling."""
     case = source_dir / "examples" / "structure_capsule.toml"

@@ -104,7 +104,10 @@ def labelled(out: Path) -> list[tuple[int, str, float, float]]:
         return list(zip(result["branch"].values[named], labels[named], *values, strict=True))
 
 
-@pytest.mark.parametrize("restitution", [0.65, 0.7, 0.75])
+@pytest.mark.parametrize(
+    "restitution",
+    [pytest.param(0.65, marks=pytest.mark.long), 0.7, pytest.param(0.75, marks=pytest.mark.long)],
+)
 def test_no_branch_is_run_through_twice(follow, tmp_path: Path, restitution: float):
     """A branch that has turned back at a graze, or whose instants pass the section, was said to be closed."""
     case = tmp_path / "two.toml"
@@ -135,6 +138,7 @@ def test_no_branch_is_run_through_twice(follow, tmp_path: Path, restitution: flo
         assert near["GR-fold"] == pytest.approx(1.689527898042, abs=1e-10)
 
 
+@pytest.mark.long
 def test_mirror_images_have_the_same_labels(follow, tmp_path: Path):
     """Between two stops: what is not its own mirror image comes twice, with the same labels."""
     case = tmp_path / "two.toml"
@@ -392,6 +396,7 @@ def test_curves_of_grazes_and_folds_in_two_parameters(follow):
     assert frequency[gap.argmax()] == pytest.approx(fold, abs=1e-9)
 
 
+@pytest.mark.long
 def test_curves_of_doublings_of_a_machine_without_a_clock(follow):
     case, name = "structure_blocks_on_a_belt.toml", "friction.first.velocity"
     free = ("--free", "spring.coupling.stiffness", "--free-from", "1.2", "--free-to", "1.25")

@@ -7,7 +7,10 @@ import os
 import subprocess
 import sys
 
+import pytest
 
+
+@pytest.mark.long
 def test_a_few_hidden_effects_are_found(source_dir, build_dir, separatrix, tmp_path):
     library = build_dir / "lib" / "libseparatrix.so"
     environment = {

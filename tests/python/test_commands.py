@@ -372,6 +372,7 @@ ENDLESS = ["basin", "case.toml", "--set", "axis[1].count=3000", "--set", "axis[2
 ENDLESS += ["--set", 'run.stop="duration"']
 
 
+@pytest.mark.long
 def test_progress_in_a_log_is_sparse(separatrix, tmp_path):
     write_case(tmp_path)
     more = {"plain": [], "lines": ["--json"], "quiet": ["--quiet"]}
@@ -465,6 +466,7 @@ def boundary(separatrix, folder):
     return high
 
 
+@pytest.mark.long
 def test_verify_fails_where_labels_would_change(separatrix, tmp_path):
     """Starts on both sides of a basin boundary, nearer to it than rounding carries."""
     write_case(tmp_path)

@@ -243,6 +243,14 @@ CASES = {
     ),
 }  # fmt: skip
 
+REPEATED = {
+    "a stop",
+    "friction with a spring",
+    "one place and another speed",
+    "a chain with three kinds of sensors",
+}
+"""The longest, each of parts that the others have too."""
+
 
 def records(hidden: Hidden, folder: Path) -> tuple[Path, list[Path]]:
     base = folder / "base.toml"
@@ -257,7 +265,9 @@ def records(hidden: Hidden, folder: Path) -> tuple[Path, list[Path]]:
 
 
 @pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] if name in REPEATED else []) for name in CASES]
+)
 def test_a_hidden_effect_is_named_with_its_place(name: str, tmp_path: Path) -> None:
     hidden = CASES[name]
     base, made = records(hidden, tmp_path)
@@ -312,7 +322,7 @@ def test_a_gap_that_no_effect_asked_for_closes_gets_no_name(tmp_path: Path) -> N
 @pytest.mark.usefixtures("library")
 @pytest.mark.parametrize(("row", "size", "depends_on"), [
     # the machine of the case moves quite otherwise
-    ([0, -1, 1], 0.6, [["stretch at b-c"]]),
+    pytest.param([0, -1, 1], 0.6, [["stretch at b-c"]], marks=pytest.mark.long),
     # no joint, and so no place
     ([-1, 0, 1], 0.05, []),
 ])  # fmt: skip

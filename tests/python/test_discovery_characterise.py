@@ -89,7 +89,9 @@ def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, beside
     assert bool(found.accepted) == (outcome == "named")
 
 
-@pytest.mark.parametrize("number", CASES)
+@pytest.mark.parametrize(
+    "number", [pytest.param(one, marks=[pytest.mark.long] if one in (187, 229) else []) for one in CASES]
+)
 def test_what_a_force_without_a_name_depends_on_is_told(hide, number):
     name, depends_on, constant = CASES[number]
     case, truth = hide(number)

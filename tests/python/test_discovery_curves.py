@@ -200,6 +200,7 @@ def records_of(true: Model, seconds: float = 10.0, rate: float = 100.0) -> list:
     return records
 
 
+@pytest.mark.long
 def test_a_restitution_that_is_a_power_of_the_speed_is_found_as_a_function():
     records = records_of(Model.from_text(CASE.format(contact=POWER)))
     options = Options(quick=True, most_effects=1, candidates=("restitution_slope",))

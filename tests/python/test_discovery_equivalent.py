@@ -93,7 +93,7 @@ def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path
     assert "offset_force" in said(generator, case, tmp_path)
 
 
-@pytest.mark.parametrize("number", [557, 1023])
+@pytest.mark.parametrize("number", [557, pytest.param(1023, marks=pytest.mark.long)])
 def test_names_of_one_motion_are_not_lost_in_other_minima(generator, tmp_path, number):
     """One name had found the motion, another was caught elsewhere or had a law more: the truth was out."""
     from design import draw

@@ -147,6 +147,7 @@ def test_free_play_in_the_spring_is_named_and_no_cubic_spring():
     assert found["interval_95"][0] < 0.03 < found["interval_95"][1] or abs(found["value"] - 0.03) < 3e-5
 
 
+@pytest.mark.long
 def test_a_soft_wall_is_told_by_its_family():
     without = base(upper=0.55, amplitude=0.2)
     true = without.with_effect("kelvin_voigt_contact", {"stiffness": 3000.0, "damping": 12.0})

@@ -70,8 +70,7 @@ def test_held_values_are_left_out():
     assert np.array_equal(record.t, np.delete(t, slice(401, 420)))
     assert record.pieces == [(0, 401), (401, 3981)]
     assert any(
-        text.startswith("record, row 401: x stays at") and "for 20 samples" in text
-        for text in record.notes
+        text.startswith("record, row 401: x stays at") and "for 20 samples" in text for text in record.notes
     )
 
 

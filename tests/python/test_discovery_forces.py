@@ -132,7 +132,11 @@ NAMED = {
 
 
 # each at two of the three
-CASES = [(law, NOISES[(i + k) % 3]) for i, law in enumerate(NAMED) for k in (0, 1)]
+CASES = [
+    pytest.param(law, NOISES[(i + k) % 3], marks=[pytest.mark.long] * k)
+    for i, law in enumerate(NAMED)
+    for k in (0, 1)
+]
 
 
 @pytest.mark.parametrize(("law", "noise"), CASES)
@@ -147,6 +151,7 @@ def test_a_law_of_the_catalogue_is_named(law: str, noise: float) -> None:
         assert gap["after"] - 1 < max(0.2, 0.01 * (gap["before"] - 1))
 
 
+@pytest.mark.long
 def test_friction_with_a_spring_in_series_gets_no_name() -> None:
     """Known is on what it depends, and which joint of a structure has such a law."""
     verdict = ask("elastic", 0.005, candidates=("viscous", "quadratic_drag", "dahl"))
@@ -161,6 +166,7 @@ def test_a_force_of_the_place_is_not_taken_for_friction() -> None:
     assert verdict["effects"] == []
 
 
+@pytest.mark.long
 def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
     """Each record by itself, as it warms up: no function of the place."""
     records = records_of("nothing", 0.005)
@@ -173,7 +179,14 @@ def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
     assert "asked for" in verdict["not_tested"]["cubic_damping"]
 
 
-@pytest.mark.parametrize(("column", "factor"), (("force", 1e-3), ("force", 9.81), ("x", 1e3)))
+@pytest.mark.parametrize(
+    ("column", "factor"),
+    [
+        ("force", 1e-3),
+        pytest.param("force", 9.81, marks=pytest.mark.long),
+        pytest.param("x", 1e3, marks=pytest.mark.long),
+    ],
+)
 def test_wrong_units_make_no_certain_name(column: str, factor: float) -> None:
     """Newtons that are kilonewtons or kilograms, metres that are millimetres."""
     records = records_of("stribeck", 0.005)
@@ -226,6 +239,7 @@ def test_what_to_measure_next_makes_an_ambiguous_name_a_certain_one() -> None:
     assert (verdict["outcome"], verdict["effects"]) == ("named", ["viscous"])
 
 
+@pytest.mark.long
 def test_friction_of_no_closed_form_is_found_as_a_function() -> None:
     """A bump of the friction at 0.15 m/s: the family is named, and the function has the bump."""
     verdict = ask("bump", 0.005, candidates=("stribeck", "quadratic_drag", "viscous"))

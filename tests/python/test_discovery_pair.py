@@ -52,6 +52,7 @@ def test_what_has_no_joints_is_refused_before_any_record_is_read(
 
 
 @pytest.mark.usefixtures("library")
+@pytest.mark.long
 def test_the_friction_of_the_interface_is_found(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
     first, second, held_out = (
         record(separatrix, source_dir, tmp_path, frequency, speed)

@@ -387,9 +387,7 @@ def test_an_angle_is_told_in_rad():
     x = 20 * np.cos(3 * t)
     x[150] += 10
     (said,) = [
-        note
-        for note in make_record("r", {"t": t, "x": x}, {"units": "s, deg"}).notes
-        if "left out" in note
+        note for note in make_record("r", {"t": t, "x": x}, {"units": "s, deg"}).notes if "left out" in note
     ]
     assert f"x is {np.radians(x[150]):.6g} rad between" in said
 

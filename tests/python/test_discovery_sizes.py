@@ -39,7 +39,9 @@ def record_of(model: Model, rate: float, number: int, seconds: float = 8.0, phi_
 
 
 @pytest.mark.usefixtures("library")
-@pytest.mark.parametrize("effect", [{"quadratic_drag": {"coefficient": 0.1}}, {}])
+@pytest.mark.parametrize(
+    "effect", [pytest.param({"quadratic_drag": {"coefficient": 0.1}}, marks=pytest.mark.long), {}]
+)
 def test_one_motion_has_one_verdict_at_every_rate_of_sampling(effect):
     base = Model.from_text(CASE)
     true = base

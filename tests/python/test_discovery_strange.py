@@ -86,9 +86,7 @@ def test_a_phase_that_the_header_does_not_have_is_told():
     """One that was not stated was searched for, and whole turns are none."""
     found = {"a": 2.3, "b": -2.3 + 2 * np.pi, "c": 0.05, "d": 2 * np.pi, "e": 2.3, "f": 2.3}
     prepared = [
-        SimpleNamespace(
-            record=SimpleNamespace(name=name), phase_known=name == "e", phase_stated=name != "f"
-        )
+        SimpleNamespace(record=SimpleNamespace(name=name), phase_known=name == "e", phase_stated=name != "f")
         for name in found
     ]
     free = [Free("nuisance:phase", 0.0, record=place) for place in range(len(found))]

@@ -118,6 +118,7 @@ def test_effects_that_are_one_motion_are_reported_together(separatrix, tmp_path)
     assert verdict["separating_experiment"]
 
 
+@pytest.mark.long
 def test_a_part_is_named_where_more_is_missing(separatrix, tmp_path):
     """Drag is among the effects that are asked for, the ripple of the drive is not."""
     hidden = "[effect.viscous]\ndamping = 0.4\n[effect.drive_ripple]\nsine = 0.03\n"

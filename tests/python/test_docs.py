@@ -20,9 +20,12 @@ TEACHING = [
     *sorted((DOCS / "machines").glob("*.md")),
     *sorted((DOCS / "howto").glob("*.md")),
 ]
+HEAVY = {"belt", "compare", "duffing", "figures", "measures", "oscillator", "parameters", "reasons", "sweep"}
+"""Pages that take longest."""
+RUN = [pytest.param(page, marks=[pytest.mark.long] if page.stem in HEAVY else []) for page in TEACHING]
 
 
-@pytest.mark.parametrize("page", TEACHING, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
 def test_the_code_of_a_page_runs(
     page: Path, separatrix: Path, library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -77,8 +80,9 @@ def test_every_picture_of_the_gallery_is_there() -> None:
     assert scripts == {path.stem for path in (DOCS / "gallery").glob("*.txt")}
 
 
+@pytest.mark.parametrize("options", [["--no-fortran"], pytest.param([], marks=pytest.mark.long)])
 def test_the_site_builds_without_a_warning(
-    build_dir: Path, separatrix: Path, library: Path, tmp_path: Path
+    options: list[str], build_dir: Path, separatrix: Path, library: Path, tmp_path: Path
 ) -> None:
     """All pages, the interfaces of Python and Fortran, and every link among them."""
     pytest.importorskip("myst_parser", reason="scripts/bootstrap.sh --docs installs what the site needs")
@@ -89,6 +93,7 @@ def test_the_site_builds_without_a_warning(
         tmp_path / "site",
         "--build",
         build_dir,
+        *options,
     ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

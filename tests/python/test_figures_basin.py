@@ -17,8 +17,8 @@ from separatrix.figures import basin
 from separatrix.labels import share_texts
 
 
-@pytest.mark.parametrize("order", [("x0", "v0"), ("v0", "x0")])
-@pytest.mark.parametrize("descending", [False, True])
+@pytest.mark.parametrize("order", [("x0", "v0"), pytest.param(("v0", "x0"), marks=pytest.mark.long)])
+@pytest.mark.parametrize("descending", [pytest.param(False, marks=pytest.mark.long), True])
 def test_each_point_has_its_colour_at_its_place(tmp_path: Path, order: tuple, descending: bool) -> None:
     axes = {"x0": X0[::-1] if descending else X0, "v0": V0}
     attractor = np.random.default_rng(3).integers(1, 4, (7, 4))

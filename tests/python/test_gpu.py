@@ -184,6 +184,7 @@ def test_a_gpu_that_fails_leaves_a_file_to_go_on_with(
     assert differences(results["map"], output) == []
 
 
+@pytest.mark.long
 def test_a_gpu_that_fails_in_a_second_look_leaves_a_file_to_go_on_with(
     separatrix, tmp_path, on_host, monkeypatch
 ):
@@ -275,6 +276,7 @@ def test_the_benchmark_measures_nothing_without_a_gpu(source_dir, separatrix, bu
     assert not (tmp_path / "page.md").exists()
 
 
+@pytest.mark.long
 def test_the_page_of_the_benchmark(source_dir, separatrix, tmp_path, on_host, monkeypatch):
     monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
     import gpu

@@ -56,6 +56,7 @@ def test_the_nearest_foreign_start_is_one(crank) -> None:
     assert regimes == ["impact", "non_impact"]
 
 
+@pytest.mark.long
 def test_results_do_not_depend_on_threads(crank) -> None:
     names = ["global_integrity", "basin_stability", "basin_entropy", "convergence_time"]
     one, other = (sx.measures(crank, names, threads=threads, starts=500) for threads in (1, 3))
@@ -83,6 +84,7 @@ def test_measures_over_phases(crank) -> None:
     assert len(blow.details["up"]) == 4
 
 
+@pytest.mark.long
 def test_the_safe_basin_lies_in_the_basin(case) -> None:
     coarse = sx.basin(case, x0=16, v0=16)
     found = sx.measures(coarse, ["safe_basin", "global_integrity"], attractors=2, phases=4, starts=400)

@@ -95,6 +95,7 @@ def test_soft_backlash_has_loops(separatrix, source_dir, tmp_path):
         assert len(trajectory.figures(result, "b")["contact"].axes[0].lines) > 5
 
 
+@pytest.mark.long
 def test_contacts_beside_one_another(separatrix, source_dir, tmp_path):
     files = [
         file_of(separatrix, source_dir, tmp_path, f"contact_{law}")

@@ -81,7 +81,9 @@ def two_forms(name: str, stop: str) -> tuple[str, str]:
     return pair, run + BODIES.format(**numbers) + parts + joint
 
 
-@pytest.mark.parametrize("stop", STOPS)
+@pytest.mark.parametrize(
+    "stop", [pytest.param(stop, marks=[] if stop == "rigid" else [pytest.mark.long]) for stop in STOPS]
+)
 @pytest.mark.parametrize("name", CASES)
 def test_labels_of_both_forms_are_the_same(separatrix: Path, tmp_path: Path, name, stop):
     maps = []

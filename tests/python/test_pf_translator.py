@@ -232,6 +232,7 @@ def test_too_few_ranks_fail(parallel):
     assert "needs more ranks" in result.stdout
 
 
+@pytest.mark.long
 def test_ranks_left_waiting_by_a_failure_do_not_hang(parallel):
     body = [
         "integer :: error",

@@ -304,6 +304,7 @@ def test_the_accessor_knows_the_result(results: dict[str, Path], case: sx.Case) 
         xr.Dataset().separatrix.plot()
 
 
+@pytest.mark.long
 def test_results_draw_the_figures_of_the_command(
     results: dict[str, Path], case: sx.Case, tmp_path: Path
 ) -> None:

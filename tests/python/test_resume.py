@@ -74,7 +74,7 @@ def finish(program: Path, folder: Path, reference: Path, ranks: int, least: int 
     assert not (folder / "map.h5.part").exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGUSR2])
+@pytest.mark.parametrize("number", [signal.SIGUSR1, pytest.param(signal.SIGUSR2, marks=pytest.mark.long)])
 def test_a_signal_to_mpirun_stops_all_ranks(mpi_separatrix, tmp_path, reference, number):
     write_case(tmp_path)
     process = start(mpi_separatrix, tmp_path, 2)
@@ -137,7 +137,7 @@ def test_a_run_can_be_stopped_again_and_again(separatrix, tmp_path, reference, s
     assert differences(reference, tmp_path / "map.h5") == []
 
 
-@pytest.mark.parametrize("kind", ["sweep", "points"])
+@pytest.mark.parametrize("kind", ["sweep", pytest.param("points", marks=pytest.mark.long)])
 def test_sweeps_and_lists_go_on_as_well(mpi_separatrix, tmp_path, kind):
     write_case(tmp_path)
     starts = [f"{i / 600},{i % 7 - 3}" for i in range(600)]

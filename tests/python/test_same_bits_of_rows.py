@@ -17,7 +17,10 @@ SMALL = ("axis[1].count=9", "axis[2].count=11", "run.duration=12", "run.window=3
 STOPPED = 75
 
 
-@pytest.mark.parametrize("row", rows.ROWS, ids=lambda row: row.key)
+ROWS = [pytest.param(row, marks=[pytest.mark.long] * (place % 2)) for place, row in enumerate(rows.ROWS)]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.key)
 def test_nothing_but_the_case_matters(separatrix, mpi_separatrix, tmp_path, monkeypatch, row):
     command = ["basin", row.write(tmp_path).name, *(f"--set={word}" for word in SMALL)]
     succeed(separatrix, *command, "-o", "one.h5", folder=tmp_path)

@@ -25,6 +25,7 @@ def program(rows, library, separatrix, build_dir, tmp_path):
     return rows.Program(build_dir, tmp_path)
 
 
+@pytest.mark.long
 def test_orbits_of_budd_and_dux_are_theirs_and_stand_in_the_page(rows, numbers, program, source_dir):
     page = (source_dir / "docs" / "validation.md").read_text()
     found = [*rows.budd_dux(program), *rows.family(program)]

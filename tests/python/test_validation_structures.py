@@ -35,7 +35,14 @@ def test_benchmarks_agree(rows, separatrix, build_dir, tmp_path, name, count):
     assert [number for number in found if number.verdict != "agrees"] == []
 
 
-@pytest.mark.parametrize(("name", "count"), [("cantilever", 18), ("capture", 5), ("chatter", 8)])
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        pytest.param("cantilever", 18, marks=pytest.mark.long),
+        pytest.param("capture", 5, marks=pytest.mark.long),
+        ("chatter", 8),
+    ],
+)
 def test_impact_by_impact(rows, separatrix, build_dir, tmp_path, name, count):
     benchmarks = {compute.__name__: compute for compute in rows.IMPACTS}
     found = benchmarks[name](rows.Program(build_dir, tmp_path))
