@@ -41,6 +41,9 @@ IMITATORS = {
     "sensor_delay": ("sensor_delay",),
 }
 """Effects that have a derivative where they are absent, and their parameters."""
+AT_ALL = {"lower": -NOWHERE, "static_excess": 0.0}
+"""Parameters whose effect is what they change at all, and their values where they are absent. How much longer
+a stick lasts goes with the square of what holds it, or jumps: the derivative says little of it."""
 
 
 @dataclass
@@ -115,7 +118,7 @@ class Segments:
         return white - np.einsum("nik,nk->ni", self.basis, np.einsum("nik,ni->nk", self.basis, white))
 
     def column(self, name: str, largest: float) -> np.ndarray:
-        """Derivative with respect to a parameter."""
+        """Derivative with respect to a parameter, or what it changes at all over its size."""
         if name in ("sensor_bias", "sensor_gain", "sensor_delay"):
             change = np.zeros_like(self.base)
             gain = 1 + self.experiment.sensor.get("sensor_gain", 0.0)
@@ -127,14 +130,19 @@ class Segments:
             change[:, :, X] = unit[name]
             return self.without_starts(change)
         value = getattr(self.driven, name)
+        if name == "lower" or value != AT_ALL.get(name, value):
+            return self.without_starts(self._at_all(name))
         step = STEPS.get(name, RELATIVE * max(abs(value), 0 if value else 1e-2 * largest))
         both = [(self.driven.copy(**{name: value + sign * step}), self.starts) for sign in (1, -1)]
         return self.without_starts(self._difference(*both) / (2 * step))
 
-    def effect_of_barrier(self) -> np.ndarray:
-        """What the second barrier changes at all."""
-        free, _ = self._fly(self.driven.copy(lower=-NOWHERE), self.starts)
-        return self.without_starts(self.base - free)
+    def _at_all(self, name: str) -> np.ndarray:
+        """What a parameter changes at all, over its size; the second barrier has none."""
+        free, counts = self._fly(self.driven.copy(**{name: AT_ALL[name]}), self.starts)
+        if name == "lower":
+            return self.base - free
+        self.steady &= counts == self.counts
+        return (self.base - free) / getattr(self.driven, name)
 
 
 class Information:
@@ -147,11 +155,8 @@ class Information:
 
     def _columns(self, name: str) -> list[np.ndarray]:
         if name not in self.columns:
-            if name == "lower":
-                self.columns[name] = [part.effect_of_barrier() for part in self.parts]
-            else:
-                largest = max((max(e.sizes) for e in CATALOGUE.values() if e.field == name), default=1.0)
-                self.columns[name] = [part.column(name, largest) for part in self.parts]
+            largest = max((max(e.sizes) for e in CATALOGUE.values() if e.field == name), default=1.0)
+            self.columns[name] = [part.column(name, largest) for part in self.parts]
         return self.columns[name]
 
     def _matrix(self, shared: list[str], separate: list[str]) -> np.ndarray:
