@@ -102,6 +102,31 @@ def test_an_unknown_parameter_counts_once_however_many_segments_it_moves():
     assert 0 < ahead(exact, one) < 10
 
 
+def test_a_record_that_tells_nothing_does_not_pay_for_one_that_tells_much():
+    """Segments of one record that say the same count once, in that record: the other one keeps its own."""
+    random, spread = np.random.default_rng(6), 0.3
+    # the parameter moves the second record alone
+    columns = random.standard_normal((2 * SEGMENTS, 50)) * (np.arange(2 * SEGMENTS) >= SEGMENTS)[:, None]
+    residual = columns * spread + random.standard_normal(columns.shape)
+    one = prediction((residual**2).sum(axis=1), np.zeros(len(columns)), 1.0)
+    one.record = (np.arange(len(columns)) >= SEGMENTS).astype(int)
+    exact = prediction(((residual - columns * spread) ** 2).sum(axis=1), np.full(len(columns), 1e-9), 1.0)
+    exact.record = one.record
+    one.covariance = np.array([[spread**2]])
+    one.fit.reduced = SimpleNamespace(
+        matrix=(columns**2).sum(axis=1)[:, None, None], gradient=(columns * residual).sum(axis=1)[:, None]
+    )
+    exact.fit.reduced = SimpleNamespace(
+        matrix=np.zeros((len(columns), 0, 0)), gradient=np.zeros((len(columns), 0))
+    )
+    parts = gained_together(exact, one)
+    assert parts.sum() == pytest.approx(ahead(exact, one))
+    first, second = (parts[one.record == number].sum() for number in (0, 1))
+    assert first == pytest.approx(0.0, abs=1e-6)
+    assert second == pytest.approx(ahead(exact, one))
+    assert second > 1
+
+
 def test_wrong_machines_are_held_against_each_other_by_their_errors():
     worse, better = prediction([900.0], [-10.0], 500.0), prediction([400.0], [-30.0], 1.0)
     assert ahead(better, worse) == pytest.approx(250.0)

@@ -7,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from program import CASE
+from separatrix.discovery.decision.decide import decide
+from separatrix.discovery.decision.rig import decide_beside_faults
+from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import ceiling
@@ -21,11 +24,13 @@ from separatrix.discovery.fitting.rig import (
     cleaned,
     cleaned_prediction,
     evidence_of_faults,
+    faults_of,
     share_beside_faults,
     shares_beside_faults,
 )
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
+from separatrix.discovery.options import Options
 from separatrix.library import Model
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -178,3 +183,51 @@ def test_the_evidence_of_faults_of_a_rig_is_that_of_all_records(curved):
     told = predict(gather(prepared[2:], 1.0, None), base, fitted.problem.free, known)
     evidence = evidence_of_faults(fitted, told)
     assert evidence > 100 if curved else evidence < 3
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.6])
+def test_whitened_columns_come_back_in_their_units(memory):
+    base, _ = fitted_base(drag=0.0, curved=0.0)
+    problem = base.problem
+    problem.prepared[0].memory = memory
+    inside = problem.segments.inside
+    table = np.random.default_rng(7).standard_normal((*inside.shape, 3)) * inside[:, :, None]
+    found = problem.in_units(problem.whitened(table / NOISE))
+    assert found[:, 0] == pytest.approx(table, abs=1e-12)
+    assert not found[:, 1].any()
+
+
+def test_faults_that_are_fitted_are_what_they_are_where_they_are_linear():
+    """The curve of a sensor about the middle of its record, over its swing, in halves of a thousandth."""
+    base, _ = fitted_base(drag=0.0, curved=1e-3)
+    tables = faults_of(base.problem, base.fit)
+    square = tables["nuisance:fault_of_rig:curve_2", 0][:, 0]
+    x = base.problem.prepared[0].record.x
+    rows = base.problem.segments.index, base.problem.segments.inside & base.fit.good[:, None]
+    u = (base.fit.evaluation.x - x.mean()) / x.std()
+    assert square[rows[1]] == pytest.approx((5e-4 * x.std() * u**2)[rows[1]], rel=1e-9)
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.008])
+def test_an_effect_that_faults_hide_is_named_beside_them(drag):
+    """They explain many times as much as it does; without it they are all there is."""
+    base, prepared = three_records((1.2e-3, -1.2e-3, 1.2e-3), drag)
+    training, held_out = gather(prepared[:2], 1.0, None), gather(prepared[2:], 1.0, None)
+    options = Options(candidates=("quadratic_drag", "cubic_spring", "offset_force"), most_effects=1)
+    bench = Bench(training, held_out, scales_of(training, base), options)
+    fitted = fit_base(training, base, 1.0)
+    assert decide(bench, fitted).outcome != "named"
+    beside, decision = decide_beside_faults(bench, fitted)
+    assert (beside is bench) == (not drag)
+    assert decision.outcome == ("named" if drag else "none")
+    if drag:
+        (one,) = decision.accepted
+        assert one.name == "quadratic_drag"
+        place = one.fitted.added[0]
+        error = np.sqrt(one.fitted.covariance[place, place])
+        assert abs(one.fitted.fit.values[place] - drag) < 4 * error
+        sizes = {
+            free.path: value
+            for free, value in zip(one.fitted.problem.free, one.fitted.fit.values, strict=True)
+        }
+        assert abs(sizes["nuisance:fault_of_rig:curve_2"]) == pytest.approx(2.4, abs=0.6)

@@ -10,9 +10,9 @@ import numpy as np
 
 from separatrix.discovery.decision.added import with_law
 from separatrix.discovery.decision.characterise import characterised, remembered
-from separatrix.discovery.decision.decide import decide
 from separatrix.discovery.decision.functions import with_function
 from separatrix.discovery.decision.partial import decide_in_part, nearest
+from separatrix.discovery.decision.rig import decide_beside_faults
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.decision.verdict import Findings, verdict_of
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
@@ -81,7 +81,8 @@ def investigate(
     if options.partial:
         decision = decide_in_part(bench, fitted)
     else:
-        decision = remembered(bench, decide(bench, fitted))
+        bench, decision = decide_beside_faults(bench, fitted)
+        decision = remembered(bench, decision)
         decision.reasons += nearest(bench, decision)
         options.progress("asking what the rest of the gap depends on", 0.9)
         decision = with_law(bench, characterised(bench, decision))

@@ -304,7 +304,7 @@ def _parameters(fitted: Fitted) -> dict:
     for one, value, error, held in zip(
         fitted.problem.free, fitted.fit.values, errors, fitted.fit.at_bound, strict=True
     ):
-        if one.is_nuisance and one.record is not None:
+        if one.is_fault or (one.is_nuisance and one.record is not None):
             continue
         parameter = fitted.model.parameters.get(one.path)
         known = error > 0 and not held

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records ready to be fitted: smoothed, and cut into short, middle and long segments."""
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -47,6 +48,8 @@ class Data:
     stages: list[Segments]
     # starts of the longest segments by the base machine, tried where another machine is caught
     base_starts: np.ndarray | None = None
+    # what faults of the rig add to the longest segments where they are fitted, as in a `Problem`
+    faults: dict[tuple[str, int | None], np.ndarray] | None = None
 
     @property
     def last(self) -> int:
@@ -55,7 +58,12 @@ class Data:
 
     def problem(self, model, stage: int, free: list[Free]) -> Problem:
         """The fit of a model to the segments of a stage."""
-        return Problem(model, self.prepared, self.stages[stage], free)
+        faults = self.faults if stage == self.last else None
+        return Problem(model, self.prepared, self.stages[stage], free, faults)
+
+    def with_faults(self, faults: dict[tuple[str, int | None], np.ndarray]) -> "Data":
+        """The same records with faults of the rig, whose noise may be measured anew."""
+        return replace(self, prepared=[copy(one) for one in self.prepared], faults=faults)
 
     def smoothed_starts(self, stage: int) -> np.ndarray:
         """Starts (segments, 2) of a stage from the smoother."""

@@ -106,7 +106,8 @@ def predict(
 def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
     """What `one` foretells better by segment, so that the sum is that of all segments together.
 
-    What a common error of the parameters costs or gains in every segment is shared out among them.
+    What a common error of the parameters costs or gains in every segment of a record is shared out among
+    them; what several records say alike counts once, and is taken from each by what it says.
     """
     parts = gained(one, other)
     seen = parts != 0
@@ -114,8 +115,15 @@ def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
     if not other.fit.converged:
         # it might foretell so much better
         whole -= min(max(0.0, whole), 0.5 * other.fit.decrement)
-    common = whole - parts.sum()
-    return parts + seen * common / max(1, np.count_nonzero(seen))
+    numbers = np.unique(one.record)
+    alone = np.array([ahead(one, other, other.misfit, one.record == number) for number in numbers])
+    sizes = np.abs(alone)
+    shares = sizes / sizes.sum() if sizes.any() else np.full(sizes.size, 1 / sizes.size)
+    alone += shares * (whole - alone.sum())
+    for number, its in zip(numbers, alone, strict=True):
+        here = seen & (one.record == number)
+        parts[here] += (its - parts[here].sum()) / max(1, np.count_nonzero(here))
+    return parts
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
@@ -131,14 +139,18 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
     return np.where(one.good & other.good, parts, 0.0)
 
 
-def ahead(one: Prediction, other: Prediction, misfit: float | None = None) -> float:
-    """What `one` foretells better than `other` in all, in units of log density.
+def ahead(
+    one: Prediction, other: Prediction, misfit: float | None = None, rows: np.ndarray | None = None
+) -> float:
+    """What `one` foretells better than `other` in all segments, or in some rows, in units of log density.
 
     Where both leave only noise, the density is that of all segments together: a parameter that is hardly
     known errs in all of them alike, which counts once. The larger misfit of both chooses the measure, or one
     that is given.
     """
     both = one.good & other.good
+    if rows is not None:
+        both &= rows
     if (max(one.misfit, other.misfit) if misfit is None else misfit) > _MISFIT:
         return float(0.5 * (other.fit.chi2 - one.fit.chi2)[both].sum())
     return _density(one, both) - _density(other, both)
@@ -162,6 +174,8 @@ def _fit_own(
     settled = _with(model, known)
     if settled is None:
         settled, own = model, np.ones(values.size, bool)
+    # what the machine has no parameter for
+    own |= np.array([one.is_fault for one in free], bool)
     kept = [one for one, mine in zip(free, own, strict=True) if mine]
     fit = None
     if guess is not None:

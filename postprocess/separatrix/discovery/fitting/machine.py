@@ -19,6 +19,7 @@ _FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding")
 _KNOTS = ("speed[", "place[", "stretch[", "penetration[")
 SENSOR_BIAS = "effect.sensor_bias.bias"
 SENSOR_ZERO = "nuisance:sensor_zero"
+FAULT_OF_RIG = "nuisance:fault_of_rig:"
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
@@ -81,6 +82,11 @@ class Free:
     def is_nuisance(self) -> bool:
         """Whether this is no parameter of the case file."""
         return self.path.startswith("nuisance:")
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether this is the size of a small fault of the rig, which adds to what is measured."""
+        return self.path.startswith(FAULT_OF_RIG)
 
 
 def base_parameters(model, measured_force: bool, in_force: bool = False) -> list[Free]:
@@ -179,13 +185,18 @@ def sensor_zeros(free: list[Free], count: int) -> list[Free]:
 
 def on_other_records(free: list[Free], prepared: list) -> list[Free]:
     """What is free on other records: what `free` has for all of them, and what each record has of its own."""
-    own = [one for one in free if one.record is None]
+    # what was learned of a fault that all records share is not to be learned again
+    own = [replace(one, error=None) for one in free if one.record is None]
     if prepared[0].frequency:
         own += record_nuisances(prepared)
     for i, one in enumerate(prepared):
         # a part of a record that was fitted has its zero
         if not one.record.part:
             own += [Free(SENSOR_ZERO, 0.0, size=bias.size, record=i) for bias in free if bias.varies]
+        faults = dict.fromkeys(
+            replace(one, record=i, value=0.0) for one in free if one.is_fault and one.record is not None
+        )
+        own += list(faults)
     return own
 
 

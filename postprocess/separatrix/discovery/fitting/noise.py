@@ -168,7 +168,7 @@ def _bent_sensor(problem: Problem, fit: Fit) -> np.ndarray:
     They bend where the speed jumps, as no force does, and would be memory of the noise.
     """
     seen = problem.segments.inside & fit.good[:, None]
-    u = np.where(seen, in_swings(problem, fit.evaluation.x, seen)[0], 0.0)
+    u = np.where(seen, in_swings(problem, fit.evaluation.x)[0], 0.0)
     return u[:, :, None] ** np.array([2, 3])
 
 

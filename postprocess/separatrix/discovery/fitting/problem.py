@@ -38,9 +38,21 @@ class Problem:
     # what a start is: x and v
     starts = 2
 
-    def __init__(self, model, prepared: list[Prepared], segments: Segments, free: list[Free]) -> None:
-        """Collect what every evaluation needs."""
+    def __init__(
+        self,
+        model,
+        prepared: list[Prepared],
+        segments: Segments,
+        free: list[Free],
+        faults: dict[tuple[str, int | None], np.ndarray] | None = None,
+    ) -> None:
+        """Collect what every evaluation needs.
+
+        `faults`: what each fault of the rig of size 1, by path and record, adds to x and v
+        (segments, 2, length) [m, m/s].
+        """
         self.model = model
+        self.faults = faults or {}
         self.prepared = prepared
         self.segments = segments
         self.free = free
@@ -51,11 +63,16 @@ class Problem:
     def of_segments(self, rows: np.ndarray) -> "Problem":
         """The same problem with these segments only; a segment may come several times."""
         old = self.segments
-        return self.like(self.model, self.free, padded(old.record[rows], old.first[rows], old.last[rows]))
+        found = self.like(self.model, self.free, padded(old.record[rows], old.first[rows], old.last[rows]))
+        length = found.segments.inside.shape[1]
+        found.faults = {key: table[rows][:, :, :length] for key, table in self.faults.items()}
+        return found
 
     def like(self, model, free: list[Free], segments: Segments | None = None) -> "Problem":
-        """The same records with another model, or other segments."""
-        return type(self)(model, self.prepared, self.segments if segments is None else segments, free)
+        """The same records with another model, or other segments without faults of the rig."""
+        if segments is not None:
+            return type(self)(model, self.prepared, segments, free)
+        return type(self)(model, self.prepared, self.segments, free, self.faults)
 
     def left_over(self) -> tuple[np.ndarray, np.ndarray]:
         """What condensed stretches of each segment leave over, and its degrees of freedom.
@@ -101,8 +118,12 @@ class Problem:
         return [
             (place, one.error, rows)
             for place, one in enumerate(self.free)
-            if one.error is not None and (rows := np.flatnonzero(self.segments.record == one.record)).size
+            if one.error is not None and (rows := self._rows_of(one.record)).size
         ]
+
+    def _rows_of(self, record: int | None) -> np.ndarray:
+        """Segments of a record, or of all."""
+        return np.flatnonzero((self.segments.record == record) | (record is None))
 
     @property
     def values(self) -> np.ndarray:
@@ -179,6 +200,7 @@ class Problem:
             out.used[rows, column] = 1 / rows.size
             if derivatives:
                 out.by_parameter[rows, column, place] = 1 / error
+        self._add_faults(values, out)
         # what was not flown to its end says nothing
         for table in (out.residual, out.by_start, out.by_parameter):
             if table is not None:
@@ -209,6 +231,52 @@ class Problem:
                 table[rows, first : first + length] = part
         table[:, : self.compared.shape[1]][~self.compared] = 0
         return table
+
+    def _add_faults(self, values: np.ndarray, out: Evaluation) -> None:
+        """What faults of the rig add to residuals and derivatives."""
+        if not self.faults:
+            return
+        deviations, length = self._deviations(), self.segments.inside.shape[1]
+        for place, one in enumerate(self.free):
+            table = self.faults.get((one.path, one.record))
+            if table is None:
+                continue
+            for channel in range(self.channels):
+                columns = slice(channel * length, (channel + 1) * length)
+                added = np.nan_to_num(table[:, channel] / deviations[:, channel])
+                out.residual[:, columns] -= values[place] * added
+                if out.by_parameter is not None:
+                    out.by_parameter[:, columns, place] += added
+
+    def _deviations(self) -> np.ndarray:
+        """Of the noise of x and v at the samples (segments, 2, length), infinite where there is none."""
+        count, length = self.segments.inside.shape
+        found = np.full((count, 2, length), np.inf)
+        for number, prepared in enumerate(self.prepared):
+            rows = np.flatnonzero(self.segments.record == number)
+            spread = prepared.samples.spread(prepared.memory)[self.segments.index[rows]]
+            for channel, sigma in enumerate((prepared.sigma, prepared.velocity_sigma)):
+                if sigma:
+                    found[rows, channel] = np.where(self.segments.inside[rows], sigma * spread, np.inf)
+        return found
+
+    def in_units(self, table: np.ndarray) -> np.ndarray:
+        """Whitened columns (segments, channels*length, q) of x and v in units (segments, 2, length, q)."""
+        count, length = self.segments.inside.shape
+        found, deviations = np.zeros((count, 2, length, table.shape[2])), self._deviations()
+        for number, prepared in enumerate(self.prepared):
+            rows = np.flatnonzero(self.segments.record == number)
+            links = prepared.samples.links(prepared.memory)[self.segments.index[rows]][:, 1:]
+            for channel in range(self.channels):
+                columns = slice(channel * length, (channel + 1) * length)
+                known, part = self.compared[rows, columns], table[rows, columns].copy()
+                link = (links * (known[:, 1:] & known[:, :-1]) if prepared.memory else 0 * links)[:, :, None]
+                for i in range(1, length):
+                    before = link[:, i - 1]
+                    part[:, i] = np.sqrt(1 - before**2) * part[:, i] + before * part[:, i - 1]
+                sigma = np.where(known, deviations[rows, channel], 0.0)
+                found[rows, channel] = part * sigma[:, :, None]
+        return found
 
     def _evaluate_record(
         self,

@@ -84,18 +84,18 @@ def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarr
     return problem.whitened(columns)
 
 
-def in_swings(problem: Problem, signal: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def in_swings(problem: Problem, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A signal (segments, samples) about the mean of its record in units of its swing there, and the swings.
 
-    The swing is the standard deviation of what is `seen`; where there is none, the signal is 0.
+    Those of the record as it was measured, which is sampled evenly: what is fitted is denser near impacts.
     """
     found, swings = np.zeros(signal.shape), np.zeros(len(problem.prepared))
-    for number in range(swings.size):
+    for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        values = signal[rows][seen[rows]]
-        swings[number] = float(np.std(values)) if values.size else 0.0
+        measured = prepared.record.force if problem.in_force else prepared.record.x
+        swings[number] = float(np.std(measured))
         if swings[number] > 0:
-            found[rows] = (signal[rows] - np.mean(values)) / swings[number]
+            found[rows] = (signal[rows] - np.mean(measured)) / swings[number]
     return found, swings
 
 

@@ -17,6 +17,7 @@ from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_forces import FAULT, fault_columns_of
+from separatrix.discovery.fitting.machine import FAULT_OF_RIG, Free
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
@@ -35,7 +36,16 @@ _SHOWN = 1e-11
 
 
 def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
-    """Columns (segments, width, q) of faults of one standard deviation, along the fitted motion."""
+    """Columns (segments, width, q) of faults of one standard deviation, along the fitted motion.
+
+    None where they are fitted already.
+    """
+    if problem.faults:
+        return np.zeros((*fit.evaluation.residual.shape, 0))
+    return _columns_of_faults(problem, fit)
+
+
+def _columns_of_faults(problem: Problem, fit: Fit) -> np.ndarray:
     if isinstance(problem, CoordinateProblem):
         return fault_columns_of(problem, fit)
     state = scaled_motion(problem, fit)
@@ -62,12 +72,13 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
     count, length = signal.shape
     records = len(problem.prepared)
     table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
-    u, swings = in_swings(problem, signal, problem.segments.inside & fit.good[:, None])
+    u, swings = in_swings(problem, signal)
+    inside = problem.segments.inside & fit.good[:, None]
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
         sigma = prepared.deviation(problem.segments.index[rows])
         for place, power in enumerate(_POWERS, start=number * len(_POWERS)):
-            table[rows, :length, place] = FAULT * swings[number] * u[rows] ** power / sigma
+            table[rows, :length, place] = inside[rows] * FAULT * swings[number] * u[rows] ** power / sigma
     return problem.whitened(table)
 
 
@@ -103,18 +114,43 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
     The first parameters of a held-out record were fitted to others: they are `known` from there.
     """
     evaluation = fit.evaluation
+    columns, sizes = _explained(problem, fit, known)
+    residual = evaluation.residual - columns @ sizes
+    weights = evaluation.used * fit.good[:, None]
+    chi2 = np.where(fit.good, fit.chi2 - _change(evaluation, residual, weights), fit.chi2)
+    return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
+
+
+def faults_of(problem: Problem, fit: Fit) -> dict[tuple[str, int | None], np.ndarray]:
+    """What each fault of one standard deviation adds to x and v along a fitted motion, as in a `Problem`.
+
+    Sensors are curved in each record by themselves; the drive has its harmonics in all of them.
+    """
+    columns = np.nan_to_num(problem.in_units(_columns_of_faults(problem, fit)))
+    columns *= fit.good[:, None, None, None]
+    records = range(len(problem.prepared))
+    keys = [(f"{FAULT_OF_RIG}curve_{power}", number) for number in records for power in _POWERS]
+    orders = range(1, _HARMONICS + 1)
+    keys += [(f"{FAULT_OF_RIG}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
+    return dict(zip(keys, np.moveaxis(columns, 3, 0), strict=False))
+
+
+def as_nuisances(faults: dict[tuple[str, int | None], np.ndarray]) -> list[Free]:
+    """The sizes of faults as unknowns, in standard deviations."""
+    return [Free(path, 0.0, -_LARGEST, _LARGEST, record=record, error=1.0) for path, record in faults]
+
+
+def _explained(problem: Problem, fit: Fit, known: Beside | None) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of parameters and faults, and their steps and sizes that explain most of a residual."""
     columns, matrix, gradient, open_ = _equations(problem, fit)
-    p = evaluation.by_parameter.shape[2]
+    p = fit.evaluation.by_parameter.shape[2]
     without = solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     if known is not None:
         known.add_to(matrix, gradient, open_)
     sizes = solve_scaled(_bounded(matrix, gradient, p, open_)[0], gradient, open_)
     # a step that the fit has without faults is none of theirs
     sizes[:p] -= without
-    residual = evaluation.residual - columns @ sizes
-    weights = evaluation.used * fit.good[:, None]
-    chi2 = np.where(fit.good, fit.chi2 - _change(evaluation, residual, weights), fit.chi2)
-    return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
+    return columns, sizes
 
 
 def cleaned_prediction(fitted: Fitted, told: Prediction) -> Fit:
