@@ -288,7 +288,8 @@ def _same_motion(bench: Bench, found: Round) -> None:
 def choose(base: Fitted, screened: Screened, options: Options, everything: bool = False) -> list[str]:
     """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
     order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
-    if everything or (base.fit.reduced_chi2 > _BAD and not options.quick):
+    bad = base.fit.reduced_chi2 > _BAD and not options.quick
+    if everything or (bad and cleaned(base.problem, base.fit).reduced_chi2 > _BAD):
         return order
     return [
         name

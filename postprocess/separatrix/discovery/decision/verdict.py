@@ -13,6 +13,7 @@ from separatrix.discovery.decision.judge import LARGER_NOISE, Judged
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
 from separatrix.discovery.decision.remains import Remains, remains_of
+from separatrix.discovery.decision.rig import in_words
 from separatrix.discovery.decision.rounds import Bench, Round
 from separatrix.discovery.decision.strange import other_drive, other_machine, other_phase, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
@@ -124,12 +125,8 @@ def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     others = rivals[:_RIVALS] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
     found = [one for one in experiments(final, others) if one.d_prime > 1][:_EXPERIMENTS]
-    # what was fitted is in no doubt, but no other record bears it out
-    use = (
-        "held out"
-        if not rivals and not findings.decision.accepted[0].gates.get("hold-out", True)
-        else "training"
-    )
+    # a name that no other record bears out needs one that does, also where it has rivals
+    use = "training" if findings.decision.accepted[0].gates.get("hold-out", True) else "held out"
     texts = [f"{one.text(name, names)}{'; hold it out' if use == 'held out' else ''}" for one in found]
     said = [one for one in (advice(final, rivals), *texts[:1]) if one]
     return {
@@ -225,6 +222,7 @@ def _notes(findings: Findings) -> list[str]:
         for note in one.notes
     ]
     fits = _final(findings)
+    notes += in_words(fits[0][2])
     for _, data, fitted in fits:
         notes += other_phase(data, fitted)
         if isinstance(fitted.problem, CoordinateProblem):

@@ -3,8 +3,8 @@
 """How well a fitted machine foretells records that the fit never saw.
 
 Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its
-clock. The score of a segment is the logarithm of its predictive density, with the uncertainty of the fitted
-parameters.
+clock, the curve of its sensor where faults of the rig are fitted. The score of a segment is the logarithm of
+its predictive density, with the uncertainty of the fitted parameters.
 
 Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
 forgiven more; what is held against such a machine is compared by squared errors alone.

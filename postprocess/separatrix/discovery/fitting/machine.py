@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is free in a fit: parameters of the machine, drive scale; phase, clock and zero of each record."""
+"""What is free in a fit: parameters of the machine, drive scale; phase, clock and zero of each record; small
+faults of the rig."""
 
 from dataclasses import dataclass, replace
 
@@ -45,7 +46,7 @@ class Free:
     positive: bool = False
     # each record has its own beside it
     varies: bool = False
-    # standard error of a nuisance about 0 that a measurement of its own leaves
+    # standard error of a nuisance about 0 that a measurement of its own leaves, or that such faults have
     error: float | None = None
     # another path of the machine that has the same value, or minus that
     also: str | None = None
@@ -193,10 +194,9 @@ def on_other_records(free: list[Free], prepared: list) -> list[Free]:
         # a part of a record that was fitted has its zero
         if not one.record.part:
             own += [Free(SENSOR_ZERO, 0.0, size=bias.size, record=i) for bias in free if bias.varies]
-        faults = dict.fromkeys(
-            replace(one, record=i, value=0.0) for one in free if one.is_fault and one.record is not None
-        )
-        own += list(faults)
+        # its curve, about its own middle, also of a part: what one range shows is another one there
+        curves = (one for one in free if one.is_fault and one.record is not None)
+        own += dict.fromkeys(replace(one, record=i, value=0.0) for one in curves)
     return own
 
 

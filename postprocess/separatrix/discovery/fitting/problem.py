@@ -49,7 +49,7 @@ class Problem:
         """Collect what every evaluation needs.
 
         `faults`: what each fault of the rig of size 1, by path and record, adds to x and v
-        (segments, 2, length) [m, m/s].
+        (segments, channels, length) [m, m/s].
         """
         self.model = model
         self.faults = faults or {}
@@ -110,7 +110,7 @@ class Problem:
         return 2 if not self.in_force and any(part["v"] is not None for part in self._parts) else 1
 
     def _known_nuisances(self) -> list[tuple[int, float, np.ndarray]]:
-        """Places and errors of nuisances that were measured, and the segments that share what this says.
+        """Places and errors of nuisances of known size, and the segments that share what this says.
 
         Each is one more residual of its record, of which every segment has its part, so that sums and
         resampled sums over the segments hold it.
@@ -241,29 +241,30 @@ class Problem:
             table = self.faults.get((one.path, one.record))
             if table is None:
                 continue
+            rows = self._rows_of(one.record)
             for channel in range(self.channels):
                 columns = slice(channel * length, (channel + 1) * length)
-                added = np.nan_to_num(table[:, channel] / deviations[:, channel])
-                out.residual[:, columns] -= values[place] * added
+                added = table[rows, channel] / deviations[rows, channel]
+                out.residual[rows, columns] -= values[place] * added
                 if out.by_parameter is not None:
-                    out.by_parameter[:, columns, place] += added
+                    out.by_parameter[rows, columns, place] += added
 
     def _deviations(self) -> np.ndarray:
-        """Of the noise of x and v at the samples (segments, 2, length), infinite where there is none."""
+        """Of the noise of x and v at the samples (segments, channels, length), infinite beside these."""
         count, length = self.segments.inside.shape
-        found = np.full((count, 2, length), np.inf)
+        found = np.full((count, self.channels, length), np.inf)
         for number, prepared in enumerate(self.prepared):
             rows = np.flatnonzero(self.segments.record == number)
             spread = prepared.samples.spread(prepared.memory)[self.segments.index[rows]]
-            for channel, sigma in enumerate((prepared.sigma, prepared.velocity_sigma)):
+            for channel, sigma in enumerate((prepared.sigma, prepared.velocity_sigma)[: self.channels]):
                 if sigma:
                     found[rows, channel] = np.where(self.segments.inside[rows], sigma * spread, np.inf)
         return found
 
     def in_units(self, table: np.ndarray) -> np.ndarray:
-        """Whitened columns (segments, channels*length, q) of x and v in units (segments, 2, length, q)."""
+        """Whitened columns of x and v (segments, channels*length, q) in units (..., channels, length, q)."""
         count, length = self.segments.inside.shape
-        found, deviations = np.zeros((count, 2, length, table.shape[2])), self._deviations()
+        found, deviations = np.zeros((count, self.channels, length, table.shape[2])), self._deviations()
         for number, prepared in enumerate(self.prepared):
             rows = np.flatnonzero(self.segments.record == number)
             links = prepared.samples.links(prepared.memory)[self.segments.index[rows]][:, 1:]
@@ -274,7 +275,8 @@ class Problem:
                 for i in range(1, length):
                     before = link[:, i - 1]
                     part[:, i] = np.sqrt(1 - before**2) * part[:, i] + before * part[:, i - 1]
-                sigma = np.where(known, deviations[rows, channel], 0.0)
+                sigma = deviations[rows, channel]
+                sigma = np.where(known & np.isfinite(sigma), sigma, 0.0)
                 found[rows, channel] = part * sigma[:, :, None]
         return found
 

@@ -45,22 +45,26 @@ def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
     return _columns_of_faults(problem, fit)
 
 
-def _columns_of_faults(problem: Problem, fit: Fit) -> np.ndarray:
+def _columns_of_faults(problem: Problem, fit: Fit, usual: float | None = None) -> np.ndarray:
     if isinstance(problem, CoordinateProblem):
         return fault_columns_of(problem, fit)
     state = scaled_motion(problem, fit)
     inside = problem.segments.inside
     columns = [_sensor(problem, fit)]
     if state["phase"] is not None:
-        steps = np.diff(sample_times(problem), axis=1)
-        usable = inside[:, 1:] & fit.good[:, None] & (steps > 0)
-        rates = np.diff(fit.evaluation.v, axis=1)[usable] / steps[usable]
-        # of the flights; impacts are far above
-        usual = float(np.median(np.abs(rates))) / 0.6745 if rates.size else 0.0
+        usual = usual_acceleration(problem, fit) if usual is None else usual
         waves = [f(n * state["phase"]) for n in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
         accelerations = FAULT * usual * np.stack(waves, axis=2) * inside[:, :, None]
         columns.append(force_columns(problem, fit, accelerations, 1.0))
     return np.concatenate(columns, axis=2)
+
+
+def usual_acceleration(problem: Problem, fit: Fit) -> float:
+    """Of the flights of a fitted motion [m/s^2], by the median; impacts are far above. 0 if nothing flies."""
+    steps = np.diff(sample_times(problem), axis=1)
+    usable = problem.segments.inside[:, 1:] & fit.good[:, None] & (steps > 0)
+    rates = np.diff(fit.evaluation.v, axis=1)[usable] / steps[usable]
+    return float(np.median(np.abs(rates))) / 0.6745 if rates.size else 0.0
 
 
 def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
@@ -73,7 +77,8 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
     records = len(problem.prepared)
     table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
     u, swings = in_swings(problem, signal)
-    inside = problem.segments.inside & fit.good[:, None]
+    # also of segments that only another machine follows well
+    inside = problem.segments.inside & ~fit.evaluation.failed[:, None]
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
         sigma = prepared.deviation(problem.segments.index[rows])
@@ -121,18 +126,21 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
     return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
 
 
-def faults_of(problem: Problem, fit: Fit) -> dict[tuple[str, int | None], np.ndarray]:
+def faults_of(problem: Problem, fit: Fit, usual: float) -> dict[tuple[str, int | None], np.ndarray]:
     """What each fault of one standard deviation adds to x and v along a fitted motion, as in a `Problem`.
 
-    Sensors are curved in each record by themselves; the drive has its harmonics in all of them.
+    Sensors are curved in each record by themselves; the drive has its harmonics in all of them, of one size
+    over the `usual` acceleration [m/s^2].
     """
-    columns = np.nan_to_num(problem.in_units(_columns_of_faults(problem, fit)))
-    columns *= fit.good[:, None, None, None]
     records = range(len(problem.prepared))
     keys = [(f"{FAULT_OF_RIG}curve_{power}", number) for number in records for power in _POWERS]
-    orders = range(1, _HARMONICS + 1)
-    keys += [(f"{FAULT_OF_RIG}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
-    return dict(zip(keys, np.moveaxis(columns, 3, 0), strict=False))
+    curves = len(keys)
+    columns = np.nan_to_num(problem.in_units(_columns_of_faults(problem, fit, usual)))
+    columns[:, :, :, curves:] *= fit.good[:, None, None, None]
+    if columns.shape[3] > curves:
+        orders = range(1, _HARMONICS + 1)
+        keys += [(f"{FAULT_OF_RIG}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
+    return dict(zip(keys, np.moveaxis(columns, 3, 0), strict=True))
 
 
 def as_nuisances(faults: dict[tuple[str, int | None], np.ndarray]) -> list[Free]:
