@@ -93,11 +93,16 @@ def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path
     assert "offset_force" in said(generator, case, tmp_path)
 
 
-@pytest.mark.parametrize("number", [557, pytest.param(1023, marks=pytest.mark.long)])
-def test_names_of_one_motion_are_not_lost_in_other_minima(generator, tmp_path, number):
+@pytest.mark.parametrize(("seed", "number", "hidden"), [
+    (3017, 557, "asymmetric_friction"),
+    pytest.param(3017, 1023, "asymmetric_friction", marks=pytest.mark.long),
+    # only what its own machine has to be for the motion of the other name leads there
+    (51239, 48, "sensor_bias"),
+])  # fmt: skip
+def test_names_of_one_motion_are_not_lost_in_other_minima(generator, tmp_path, seed, number, hidden):
     """One name had found the motion, another was caught elsewhere or had a law more: the truth was out."""
     from design import draw
 
-    case = draw(3017, number)
-    assert [one.name for one in case.hidden] == ["asymmetric_friction"]
-    assert {"offset_force", "asymmetric_friction", "sensor_bias"} <= said(generator, case, tmp_path)
+    case = draw(seed, number)
+    assert [one.name for one in case.hidden] == [hidden]
+    assert {"offset_force", hidden, "sensor_bias"} <= said(generator, case, tmp_path)

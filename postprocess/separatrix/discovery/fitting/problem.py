@@ -74,6 +74,15 @@ class Problem:
             return type(self)(model, self.prepared, segments, free)
         return type(self)(model, self.prepared, self.segments, free, self.faults)
 
+    def imitating(self, motion: Evaluation) -> "Problem":
+        """The same problem with a computed motion in place of x and v as they were measured."""
+        found = self.like(self.model, self.free)
+        for part in found._parts:
+            part["x"] = motion.x[part["rows"]][part["inside"]]
+            if part["v"] is not None:
+                part["v"] = motion.v[part["rows"]][part["inside"]]
+        return found
+
     def left_over(self) -> tuple[np.ndarray, np.ndarray]:
         """What condensed stretches of each segment leave over, and its degrees of freedom.
 

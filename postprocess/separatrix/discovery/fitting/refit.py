@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from separatrix.discovery.fitting.catalogue import Candidate
+from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.data import Data, fit_stages, polished
 from separatrix.discovery.fitting.fit import Fit, blocking, minimise
 from separatrix.discovery.fitting.machine import Free
@@ -24,6 +25,9 @@ _BEATEN = 15.0
 _SPARED = 3
 # share of segments that one fit may follow more than another without being better
 _FEW = 0.1
+# log-likelihood by which a name is too far behind another one of the same motion to be at its minimum; share
+# of the size of that one from which its own follows
+_FAR_BEHIND, _FIRST_SHARE = 6.0, 0.1
 # log-likelihood by which a machine that contains the base may be worse than it
 WORSE = 1.0
 # share of chi^2 by which two fits of one minimum may differ
@@ -281,14 +285,40 @@ def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fit
 def in_place_of(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
     """A fit tried again in the place of another name of its motion; the better of both.
 
-    It begins at the machine of that name, without a size and with the size that its own leads to there.
+    It begins at the machine of that name, without a size and with the size that its own leads to there; where
+    both end far from it, at the machine of its own that has its motion.
     """
     own = _base_values(other, candidate)
     found = _from(data, one, _absent(own, candidate), other)
     own[list(candidate.added)] = one.fit.values[list(one.added)]
     others = ~np.isin(np.arange(own.size), candidate.added)
     sized = minimise(one.problem, own, other.fit.starts, most=8, fixed=others, rough=True)
-    return _from(data, found, sized.values, other)
+    found = _from(data, found, sized.values, other)
+    if gain_over(other, found)[0] < _FAR_BEHIND or isinstance(one.problem, CoordinateProblem):
+        return found
+    return _imitated(data, found, other, candidate)
+
+
+def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
+    """A fit begun at the machine of its own that has the motion of another name; the better of both.
+
+    Without a size both are the same machine. What its own has to be to follow the first share of that size is
+    carried on in proportion, as the names of one motion are.
+    """
+    known = _absent(_base_values(other, candidate), candidate)
+    theirs = other.fit.values.copy()
+    theirs[list(other.added)] *= _FIRST_SHARE
+    motion = other.problem.evaluate(theirs, other.fit.starts, derivatives=False)
+    fit = minimise(one.problem.imitating(motion), known, other.fit.starts, most=8)
+    values, starts = (
+        begun + (reached - begun) / _FIRST_SHARE
+        for begun, reached in ((known, fit.values), (other.fit.starts, fit.starts))
+    )
+    lower, upper = (
+        np.array([getattr(free, side) for free in one.problem.free]) for side in ("lower", "upper")
+    )
+    led = replace(other, fit=replace(other.fit, starts=starts))
+    return _from(data, one, np.clip(values, lower, upper), led)
 
 
 def led_by(data: Data, one: Fitted, other: Fitted) -> Fitted:
