@@ -68,7 +68,7 @@ def test_branches_end_at_an_interrupt(grazing: sx.Case, tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt, match="branches was stopped; nothing of it is kept") as caught:
         sx.branches(
-            grazing, "drive.amplitude", 0.05, 1.2, searches=500, progress=stop, output=tmp_path / "out.h5"
+            grazing, "drive.amplitude", 0.05, 1.2, searches=5000, progress=stop, output=tmp_path / "out.h5"
         )
     assert not isinstance(caught.value, sx.Interrupted)
     assert list(tmp_path.iterdir()) == []
