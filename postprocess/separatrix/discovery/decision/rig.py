@@ -17,7 +17,6 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_forces import FAULT
-from separatrix.discovery.fitting.machine import FAULT_OF_RIG
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import as_nuisances, faults_of, usual_acceleration, weight_of_faults
@@ -80,8 +79,10 @@ def _may_hide(bench: Bench, decision: Decision) -> bool:
 def _with_faults(bench: Bench, base: Fitted, told: Prediction | None) -> tuple[Bench, Fitted] | None:
     """Records with faults of their rig, and the machine fitted to them beside those; None if it is lost."""
     machine, values, followed = base.problem.free, base.fit.values, base.fit.good.sum()
-    known, progress = bench.options, bench.options.progress
-    options = replace(known, progress=lambda text, at: progress(text, _BEGUN + (_ENDED - _BEGUN) * at))
+    progress = bench.options.progress
+    options = replace(
+        bench.options, progress=lambda text, at: progress(text, _BEGUN + (_ENDED - _BEGUN) * at)
+    )
     for turn in range(_TIMES):
         usual = usual_acceleration(base.problem, base.fit)
         tables = faults_of(base.problem, base.fit, usual)
@@ -95,15 +96,15 @@ def _with_faults(bench: Bench, base: Fitted, told: Prediction | None) -> tuple[B
         if fit.good.sum() < followed:
             return None
         training.base_starts = fit.starts
-        bench = replace(bench, training=training, held_out=held_out, options=options)
+        bench = replace(bench, training=training, held_out=held_out)
         base, values = replace(base, problem=problem, fit=fit), fit.values
-    return bench, base
+    return replace(bench, options=options), base
 
 
 def in_words(fitted: Fitted) -> list[str]:
     """How large the faults are that were fitted beside a machine, in a sentence; none if none were."""
     sizes = {
-        (one.path.removeprefix(FAULT_OF_RIG), one.record): FAULT * abs(value)
+        (one.path, one.record): FAULT * abs(value)
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
         if one.is_fault
     }

@@ -21,15 +21,8 @@ _STEP = 1e-6
 class CoordinateProblem(Problem):
     """Records of several sensors cut into segments, a structure, and what is free."""
 
-    def __init__(
-        self,
-        model,
-        prepared: list[SensedPrepared],
-        segments: Segments,
-        free: list[Free],
-        faults: dict | None = None,
-    ) -> None:
-        """Collect what every evaluation needs; faults of the rig are not fitted to several sensors."""
+    def __init__(self, model, prepared: list[SensedPrepared], segments: Segments, free: list[Free]) -> None:
+        """Collect what every evaluation needs."""
         self.structure = structure_of(model)
         self.starts = 2 * self.structure.n
         self.columns = list(dict.fromkeys(one.name for record in prepared for one in record.sensors))

@@ -64,15 +64,16 @@ class Problem:
         """The same problem with these segments only; a segment may come several times."""
         old = self.segments
         found = self.like(self.model, self.free, padded(old.record[rows], old.first[rows], old.last[rows]))
+        # short segments are a narrower table
         length = found.segments.inside.shape[1]
         found.faults = {key: table[rows][:, :, :length] for key, table in self.faults.items()}
         return found
 
     def like(self, model, free: list[Free], segments: Segments | None = None) -> "Problem":
         """The same records with another model, or other segments without faults of the rig."""
-        if segments is not None:
-            return type(self)(model, self.prepared, segments, free)
-        return type(self)(model, self.prepared, self.segments, free, self.faults)
+        found = type(self)(model, self.prepared, self.segments if segments is None else segments, free)
+        found.faults = self.faults if segments is None else {}
+        return found
 
     def imitating(self, motion: Evaluation) -> "Problem":
         """The same problem with a computed motion in place of x and v as they were measured."""
