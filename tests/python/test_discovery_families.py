@@ -163,16 +163,30 @@ def test_a_soft_wall_is_told_by_its_family():
 def test_the_force_of_a_soft_wall_is_drawn_as_a_function_and_is_that_of_hertz():
     without = base(upper=0.55, amplitude=0.2)
     true = without.with_effect("compliant_contact", {"stiffness": 20000.0, "damping": 0.3})
-    verdict, _ = ask(true, without, ("compliant_contact", "kelvin_voigt_contact", "restitution_slope"))
+    part = _force_of_hertz(true, without, 0.0)
+    # what a processor rounds otherwise changes next to nothing of it
+    other = _force_of_hertz(true, without, 1e-11)
+    half = np.diff(part["band_95"], axis=0)[0] / 2
+    assert np.all(np.abs(np.interp(part["at"], other["at"], other["value"]) - part["value"]) < 0.2 * half)
+
+
+def _force_of_hertz(true: Model, without: Model, rounding: float) -> dict:
+    """The part of the function of records that are moved by as much [m], held against the law of Hertz."""
+    records = records_of(true)
+    for number, record in enumerate(records):
+        record.x += rounding * np.random.default_rng(number).standard_normal(record.x.size)
+    names = ("compliant_contact", "kelvin_voigt_contact", "restitution_slope")
+    verdict, _ = investigate(without, records[:2], records[2:], Options(quick=True, candidates=names))
     assert verdict["effects"] == ["compliant_contact"]
     found = verdict["function"]
     assert found["effect"] == "contact_curve"
     part = found["parts"][0]
     right, (low, high) = 20000 * part["at"] ** 1.5, part["band_95"]
     assert np.mean((low <= right) & (right <= high)) >= 0.8
-    assert np.all((high - low)[7:] < 0.3 * right[7:])
+    assert np.all((high - low)[7:] < 0.1 * right[7:])
     fitting = {name: one["fits"] for name, one in found["closed_forms"].items()}
     assert fitting == {"linear": False, "hertz": True, "power": True}
+    return part
 
 
 def test_a_function_that_cannot_do_what_an_effect_does_is_not_drawn_for_it():

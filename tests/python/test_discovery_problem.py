@@ -113,7 +113,7 @@ def test_derivatives_by_a_table_of_contact_forces_are_no_noise(library):
             for step in (1e-3 * value, -1e-3 * value)
         ]
         right = (ends[0] - ends[1]) / (2e-3 * value)
-        assert np.linalg.norm(found[:, place] - right) < 0.1 * np.linalg.norm(right)
+        assert np.linalg.norm(found[:, place] - right) < 0.01 * np.linalg.norm(right)
 
 
 def test_derivatives_are_central_differences(flown):

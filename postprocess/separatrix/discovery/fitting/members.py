@@ -51,6 +51,8 @@ class Member:
     least: float = -np.inf
     # parameter beside the table, and what to start it from
     beside: tuple[str, Callable[[Fitted], float]] | None = None
+    # parameters of the machine that the variable counts from: moved with the function they change nothing
+    origin: tuple[str, ...] = ()
 
     @property
     def family(self) -> str:
@@ -267,7 +269,7 @@ MEMBERS = (
     Member(
         "contact_curve", "penetration", ("force",), "penetration", "m", "contact force (N)",
         None, False, None, "time since impact", _penetrations, _known_contact, ("time since impact",),
-        least=0.0, beside=("damping", _contact_damping),
+        least=0.0, beside=("damping", _contact_damping), origin=("contact.lower", "contact.upper"),
     ),
     Member(
         "drive_harmonics", "", ("cosine", "sine"), "drive phase", "rad", "motion of the foot (m)",

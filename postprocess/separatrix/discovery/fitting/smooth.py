@@ -276,6 +276,8 @@ class _Curve:
         """The function by direction, the motion linearised about it; None where it is not reached."""
         for _ in range(_ROUNDS):
             known = self._known()
+            # a closed form may begin elsewhere
+            freed = self._known(origin=True) if self.member.origin else known
             centre = self.values + self.beside
             found = (
                 None if known is None else smoothed(known.information, known.gradient, centre, self.penalty)
@@ -293,7 +295,7 @@ class _Curve:
         left = found[0] - self.values - self.beside
         if left @ known.information @ left > _NEAR * left.size:
             return None
-        return self._parts(*found, known, centre)
+        return self._parts(*found, freed, centre)
 
     def far_from(self, fitted: Fitted) -> bool:
         """Whether records are followed so much worse than by a fitted machine that segments are caught."""
@@ -303,8 +305,8 @@ class _Curve:
         """Squares over the misfit by which the function follows the records better than a fitted machine."""
         return 2 * float(gain_over(self.fitted, fitted)[0]) / max(1.0, fitted.fit.reduced_chi2)
 
-    def _known(self) -> "_Known | None":
-        """What the records know of the values, all else free."""
+    def _known(self, origin: bool = False) -> "_Known | None":
+        """What records know of the values, all else free, the `origin` of their variable only if asked."""
         fit = self.fitted.fit
         scale = max(1.0, fit.reduced_chi2)
         matrix, gradient = (
@@ -313,6 +315,8 @@ class _Curve:
         )
         inside = np.zeros(gradient.size, bool)
         inside[self.places] = True
+        if not origin:
+            inside |= [one.path in self.member.origin for one in self.fitted.problem.free]
         open_ = np.flatnonzero(~inside & ~fit.at_bound & (np.diag(matrix) > 0))
         size = np.sqrt(np.diag(matrix)[open_])
         units = np.outer(size, size)
