@@ -51,7 +51,7 @@ FAMILIES = {
         "friction_curve",
     },
     "friction over place": {"position_dependent_friction", "friction_place_curve"},
-    "spring over stretch": {"cubic_spring", "spring_curve"},
+    "spring over stretch": {"cubic_spring", "backlash", "spring_curve"},
     "restitution over impact speed": {"restitution_slope", "restitution_curve"},
     "contact over penetration": {"compliant_contact", "kelvin_voigt_contact", "contact_curve"},
     "drive over phase": {"drive_ripple", "drive_harmonics"},

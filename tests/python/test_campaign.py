@@ -16,6 +16,7 @@ import tomllib
 from types import SimpleNamespace
 
 import pytest
+from separatrix.library import effects
 
 CASES = 3
 SEED = 3
@@ -65,6 +66,12 @@ def test_the_baselines_name_what_is_large(campaign, tmp_path, name, size):
     found = baselines.verdicts(tmp_path / records.BASE, training, 1)
     assert set(found) == {"STLSQ", "ensemble SINDy"}
     assert set(found.values()) == {name}
+
+
+def test_the_families_are_those_of_the_library(campaign, library):
+    """A verdict of one family is scored as one."""
+    for family, members in campaign.scoring.FAMILIES.items():
+        assert members == {name for name, one in effects().items() if one.family == family}
 
 
 @pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--many", 64), ("--cases", 64)])

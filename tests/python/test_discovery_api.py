@@ -72,7 +72,9 @@ def test_what_makes_no_sense_is_refused(machine: Path, tmp_path: Path) -> None:
     for wrong, said in (
         ({"records": tmp_path / "none.csv"}, r"none\.csv"),
         ({"records": record, "hold_out": record}, r"first\.csv"),
-        ({"records": record, "effects": ["viscos"]}, "^effects: found 'viscos', allowed"),
+        ({"records": record, "effects": ["viscos"]}, "^effects: found viscos, allowed"),
+        ({"records": record, "effects": ["coulomb", "viscos"]}, "^effects: found viscos, allowed"),
+        ({"records": record, "compare": "forces"}, "^compare: found 'forces', allowed motion and force"),
         ({"records": []}, "record"),
     ):
         with pytest.raises(sx.SeparatrixError, match=said):

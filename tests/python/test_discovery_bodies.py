@@ -245,6 +245,7 @@ CASES = {
 
 REPEATED = {
     "a stop",
+    "a pair",
     "friction with a spring",
     "one place and another speed",
     "a chain with three kinds of sensors",

@@ -2,15 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Effects that are functions: laws of another shape than the built-in ones are found as tables."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.base import _follows_better, fit_base
-from separatrix.discovery.fitting.curves import fit_member, knots_at
+from separatrix.discovery.fitting.curves import begun_at, fit_member, knots_at, with_table
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.members import MEMBERS
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.shapes import closed_forms, through
 from separatrix.discovery.fitting.smooth import function_of, roughness, smoothed
 from separatrix.discovery.measured.preflight import prepare
@@ -238,6 +240,19 @@ def test_friction_of_a_shape_that_no_effect_has_is_fitted_as_a_function():
     assert np.all(np.abs(off[part.at < 1.4]) < 0.05)
     # both directions have one value, which the case has twice
     assert all(known.problem.free[i].also for i in known.added)
+
+
+def test_a_table_on_more_knots_begins_from_the_one_on_fewer():
+    base = Model.from_text(CASE.format(contact=NEWTON))
+    data = gather([prepare(records_of(base)[0], base)], 1.0, None)
+    first = fit_base(data, base, scales_of(data, base).mass)
+    for effect in ("force_curve", "spring_curve"):
+        member = next(one for one in MEMBERS if one.effect == effect)
+        few, many = (knots_at(member, member.seen(first), count) for count in (3, 5))
+        values = np.array([1.0, -2.0, 3.0])
+        model, problem, begun = with_table(data, first, member, first, few, [values], alike=False)
+        known = Fitted((effect,), model, problem, replace(first.fit, values=begun), ())
+        assert begun_at(member, known, first, many)[0] == pytest.approx(through(few, values)(many))
 
 
 def test_a_closed_form_that_the_function_refutes_is_not_named():

@@ -94,7 +94,7 @@ def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path
 
 
 @pytest.mark.parametrize(("seed", "number", "hidden"), [
-    (3017, 557, "asymmetric_friction"),
+    pytest.param(3017, 557, "asymmetric_friction", marks=pytest.mark.long),
     pytest.param(3017, 1023, "asymmetric_friction", marks=pytest.mark.long),
     # only what its own machine has to be for the motion of the other name leads there
     (51239, 48, "sensor_bias"),

@@ -180,19 +180,21 @@ def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("column", "factor"),
+    ("column", "factor", "partial"),
     [
-        ("force", 1e-3),
-        pytest.param("force", 9.81, marks=pytest.mark.long),
-        pytest.param("x", 1e3, marks=pytest.mark.long),
+        ("force", 1e-3, False),
+        ("force", 1e-3, True),
+        pytest.param("force", 9.81, False, marks=pytest.mark.long),
+        pytest.param("x", 1e3, False, marks=pytest.mark.long),
     ],
 )
-def test_wrong_units_make_no_certain_name(column: str, factor: float) -> None:
+def test_wrong_units_make_no_certain_name(column: str, factor: float, partial: bool) -> None:
     """Newtons that are kilonewtons or kilograms, metres that are millimetres."""
     records = records_of("stribeck", 0.005)
     for record in records:
         setattr(record, column, factor * getattr(record, column))
-    verdict = discover(base(), records[:2], records[2:], Options(quick=True, compare="force"))
+    options = Options(quick=True, compare="force", partial=partial)
+    verdict = discover(base(), records[:2], records[2:], options)
     assert verdict["outcome"] != "named"
     told = [one for one in verdict["notes"] if "other units" in one]
     assert told

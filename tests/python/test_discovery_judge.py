@@ -196,7 +196,7 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
     found = SimpleNamespace(base=base)
     bench = SimpleNamespace(training=None, held_out=None, options=OPTIONS)
     monkeypatch.setattr(decide, "missed", lambda data, fit, options: misses)
-    gap = SimpleNamespace(closable=closable, p=p, best=SimpleNamespace(name="velocity"), fit=base.fit)
+    gap = SimpleNamespace(closable=closable, p=p, mostly="velocity", fit=base.fit)
     effect = SimpleNamespace(training=gain / 2)
     given = decide._give_up(bench, decide.Decision("none", [], [], [], [found], gap, None), effect)
     assert given.outcome == outcome

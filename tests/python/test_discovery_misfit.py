@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 from separatrix.discovery.decision import decide, misfit
 from separatrix.discovery.decision.decide import Decision, _without_name
-from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet
+from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet, unused
 from separatrix.discovery.fitting.base import limit_noise
 from separatrix.discovery.fitting.noise import Noise, white_share
 from separatrix.discovery.measured.signals import white_noise
@@ -50,12 +50,24 @@ def fit(first: float, second: float) -> SimpleNamespace:
         reduced_chi2=0.5 * (first + second),
         sample_chi2=0.5 * (first + second),
         condensed=lambda rows: (0.0, 0.0),
+        evaluation=SimpleNamespace(failed=np.zeros(2 * SEGMENTS, bool)),
     )
 
 
 def test_the_records_that_are_missed_are_named():
     assert missed(data(1, 1), fit(1.05, 1.0), Options()) == []
     assert missed(data(1, 1), fit(1.0, 1.4), Options()) == ["second (reduced chi^2 1.4)"]
+
+
+def test_a_record_that_cannot_be_flown_along_is_missed_and_told():
+    found = fit(1.05, 1.0)
+    found.evaluation.failed[SEGMENTS:] = True
+    found.good[SEGMENTS:] = found.good[0] = False
+    assert missed(data(1, 1), found, Options()) == ["second (no segment of it can be flown)"]
+    assert unused(data(1, 1), found) == [
+        f"first: 1 of {SEGMENTS} segments are not used: the impacts of 1 are not steady",
+        f"second: {SEGMENTS} of {SEGMENTS} segments are not used: {SEGMENTS} cannot be flown",
+    ]
 
 
 @pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])

@@ -6,7 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision.strange import other_drive, other_machine, other_phase, strongest_line
+from separatrix.discovery.decision.other_machine import (
+    other_drive,
+    other_machine,
+    other_phase,
+    strongest_line,
+)
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.options import Options
 

@@ -121,6 +121,7 @@ def verdict(outcome: str) -> dict:
         }  # fmt: skip
     return {
         "outcome": outcome,
+        "compared": "motion",
         "complete": True,
         "effects": effects,
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
@@ -151,7 +152,9 @@ def verdict(outcome: str) -> dict:
         },
         "confusability": {"names": NAMES, "matrix": [[1.0, 0.31, 0.2], [0.31, 1.0, 0.98], [0.2, 0.98, 1.0]]},
         "separating_experiment": "measure the barrier" if outcome == "ambiguous" else "",
-        "experiments": [{"drive_ratio": 1.2, "scale": 1.6, "d_prime": 14.2, "text": "a record"}]
+        "experiments": [
+            {"drive_ratio": 1.2, "scale": 1.6, "rate": None, "d_prime": 14.2, "text": "a record"}
+        ]
         if outcome == "ambiguous"
         else [],
         "d_prime": {"cubic_spring": 11.879, "offset_force": 8.2804, "sensor_bias": 0.0},
@@ -194,6 +197,7 @@ def write_details(path: Path, stages: tuple[str, ...]) -> None:
     hits = np.arange(0.0, 6.0, 0.5)
     speed = 1 + 0.5 * np.sin(hits)
     with h5py.File(path, "w") as file:
+        file.attrs["compared"] = "motion"
         file.attrs["position_unit"], file.attrs["velocity_unit"] = "m", "m/s"
         for name, unit, count in (
             ("time in f0", "s", 12),

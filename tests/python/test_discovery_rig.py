@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from program import CASE
+from separatrix.discovery.decision.beside_faults import decide_beside_faults, in_words
 from separatrix.discovery.decision.decide import decide
-from separatrix.discovery.decision.rig import decide_beside_faults, in_words
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.catalogue import candidate

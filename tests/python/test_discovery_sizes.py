@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from program import CASE
 from scipy.signal import lfilter
+from scipy.stats import chi2
 from separatrix.discovery import Options, discover
 from separatrix.discovery.decision.judge import Judged, adequate, sizeable
 from separatrix.discovery.decision.remains import Remains, share_text
+from separatrix.discovery.fitting.ceiling import Ceiling, Family
 from separatrix.discovery.fitting.machine import drive_nuisances
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.measured.preflight import prepare
@@ -123,6 +125,17 @@ def test_what_is_far_below_the_noise_of_a_sample_is_no_gap():
     assert sizeable(3000, fit, options)
     # with as few samples as were always enough
     assert sizeable(7, SimpleNamespace(samples=2400), options)
+
+
+@pytest.mark.parametrize(
+    ("speed", "place", "pieces", "mostly"),
+    # p of gains as large is 0 for all of them
+    [(2e3, 1.5e5, 1.6e5, "place"), (2e3, 1.5e3, 1.6e5, ""), (90, 30, 60, "speed")],
+)
+def test_what_a_force_depends_on_is_what_explains_most(speed, place, pieces, mostly):
+    gains = {"speed": speed, "place": place, "pieces": pieces}
+    families = [Family(name, gain, 5, float(chi2.sf(gain, 5))) for name, gain in gains.items()]
+    assert Ceiling(families, None).mostly == mostly
 
 
 def test_what_remains_is_told_in_words():

@@ -9,13 +9,10 @@ from pathlib import Path
 
 from separatrix.cases import Case, as_case
 from separatrix.discovery.cli import summary
-from separatrix.discovery.fitting.catalogue import STARTS
-from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, extended_case, replacing, require_writable, write_results
 from separatrix.discovery.workflow import investigate
-from separatrix.errors import USAGE, SeparatrixError
 from separatrix.progress import Progress, Report
 
 
@@ -68,7 +65,8 @@ def discover(
     case
         The machine as it is believed to be.
     records, hold_out, rest
-        Files of records to fit (CSV or HDF5), of those that no fit sees, and of one at rest, for the noise.
+        Files of records to fit (CSV, HDF5, .mat, .npz, UFF 58 or TDMS), of those that no fit sees, and of one
+        at rest, for the noise.
     out
         Folder of the results: verdict, extended case, details, report. Without one nothing is written.
     effects
@@ -86,14 +84,10 @@ def discover(
     """
     case = as_case(case)
     effects = [effects] if isinstance(effects, str) else effects
-    for name in effects or ():
-        known = dict.fromkeys([*STARTS, *JOINT_EFFECTS])
-        if name not in known:
-            raise SeparatrixError(f"effects: found '{name}', allowed {', '.join(known)}", USAGE)
     with Progress(progress) as told:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,
-            compare=_compared(compare),
+            compare=compare,
             progress=lambda stage, done: told("steps", round(1000 * done), 1000),
         )  # fmt: skip
         if out is not None:
@@ -113,12 +107,6 @@ def _write(out: Path, case: Case, verdict: dict, findings: object, options: Opti
         write_results(draft, verdict, findings)
         write_report(draft, base, options)
     return {name: out / name for name in FILES if (out / name).exists()}
-
-
-def _compared(what: str) -> str:
-    if what not in ("motion", "force"):
-        raise SeparatrixError(f"compare: found '{what}', allowed 'motion' and 'force'", USAGE)
-    return what
 
 
 def _paths(given: str | Path | Sequence[str | Path]) -> list[Path]:

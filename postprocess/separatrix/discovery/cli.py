@@ -17,7 +17,7 @@ import numpy as np
 from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.fitting.catalogue import STARTS
 from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
-from separatrix.discovery.options import Options
+from separatrix.discovery.options import COMPARED, Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
 from separatrix.discovery.wording import of_effects, searched, with_error
@@ -191,7 +191,7 @@ def _parser() -> Parser:
     )
     parser.add_argument(
         "--compare",
-        choices=("motion", "force"),
+        choices=COMPARED,
         default="motion",
         help="compare the motion, or the force that drives a joint along its known motion [motion]",
     )

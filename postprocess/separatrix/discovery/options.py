@@ -5,6 +5,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from separatrix.errors import USAGE, SeparatrixError
+
+COMPARED = ("motion", "force")
+"""What of the records can be compared."""
+
 
 def _silent(stage: str, done: float) -> None:
     """Report nothing."""
@@ -66,3 +71,8 @@ class Options:
     visible: float = 5.0
     bootstraps: int = 400
     progress: Callable[[str, float], None] = field(default=_silent, compare=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be compared."""
+        if self.compare not in COMPARED:
+            raise SeparatrixError(f"compare: found '{self.compare}', allowed {' and '.join(COMPARED)}", USAGE)

@@ -18,7 +18,6 @@ from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.catalogue import within_barriers
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.response import sample_times
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.wording import units_of, with_error
@@ -221,7 +220,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
         if fitted is None:
             continue
         problem, fit = fitted.problem, fitted.fit
-        times = sample_times(problem)
+        times = problem.sample_times()
         for number, prepared in enumerate(problem.prepared):
             rows = np.flatnonzero(problem.segments.record == number)
             inside = problem.segments.inside[rows]

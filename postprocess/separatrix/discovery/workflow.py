@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.discovery.decision.added import with_law
+from separatrix.discovery.decision.beside_faults import decide_beside_faults
 from separatrix.discovery.decision.characterise import characterised, remembered
 from separatrix.discovery.decision.functions import with_function
 from separatrix.discovery.decision.partial import decide_in_part, nearest
-from separatrix.discovery.decision.rig import decide_beside_faults
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.decision.verdict import Findings, verdict_of
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise

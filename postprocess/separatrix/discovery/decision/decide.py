@@ -10,10 +10,10 @@ from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates, weigh_faults
 from separatrix.discovery.decision.judge import NOISE, Judged, admissible, equivalent, sizeable
 from separatrix.discovery.decision.misfit import CAUGHT, foretold_chi2, missed, misses
+from separatrix.discovery.decision.other_machine import other_units
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Bench, Round, run_round
 from separatrix.discovery.decision.several import with_more
-from separatrix.discovery.decision.strange import other_units
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
@@ -346,10 +346,10 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
         decision.reasons.append(_no_gap(bench, decision))
     if wide:
         decision.outcome = "not-in-catalogue"
-        name = decision.base_ceiling.best.name
         # of several bodies forces at several places explain a large gap
         several = isinstance(decision.rounds[0].base.problem, CoordinateProblem)
-        what = "free forces" if several else f"forces that depend on {name}"
+        name = "" if several else decision.base_ceiling.mostly
+        what = f"forces that depend on {name}" if name else "free forces"
         decision.reasons.append(f"{what} would explain more, no effect does")
     return decision
 

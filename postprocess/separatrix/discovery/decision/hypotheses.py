@@ -19,6 +19,7 @@ from separatrix.discovery.fitting.motions import (
     after_impacts,
     impacts_at,
     knots_of,
+    products,
     scaled_motion,
     splines,
     stretches,
@@ -146,7 +147,7 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
 
         yield _function(("stretch",), stretched)
     yield _function(
-        ("speed", "place"), lambda m: _products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
+        ("speed", "place"), lambda m: products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
     )
     if training.phase is not None:
         middle, size = x.mean(), x.std()
@@ -288,10 +289,6 @@ def _wave(m: Motion, w: float, factors: np.ndarray) -> np.ndarray:
 
 def _harmonics(m: Motion, count: int) -> np.ndarray:
     return np.stack([f(n * m.phase) for n in range(1, count + 1) for f in (np.sin, np.cos)], axis=2)
-
-
-def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
 
 
 def _in_records(m: Motion, columns: np.ndarray) -> np.ndarray:

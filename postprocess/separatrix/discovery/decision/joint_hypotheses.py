@@ -9,9 +9,9 @@ import numpy as np
 
 from separatrix.discovery.decision.hypotheses import Hypothesis, Motion
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import POWERS, clock_of, kicks_of
+from separatrix.discovery.fitting.joint_forces import POWERS, kicks_of
 from separatrix.discovery.fitting.joint_response import columns_of
-from separatrix.discovery.fitting.motions import knots_of, splines
+from separatrix.discovery.fitting.motions import clock_of, knots_of, products, splines
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.sensed import SensedData
 
@@ -62,7 +62,7 @@ def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
             one, other = (
                 splines(f(m, row), k, m.good) for f, k in zip((_speed, _stretch), knots, strict=True)
             )
-            forces = (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
+            forces = products(one, other)
             return _pushed(m, forces, row), None
 
         def drifting(m: Motion, _: float, row=row) -> tuple:

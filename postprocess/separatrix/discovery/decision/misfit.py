@@ -46,14 +46,36 @@ def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
 
 
 def missed(data: Data, fit: Fit, options: Options) -> list[str]:
-    """Return the records whose reduced chi^2 is that of no adequate model and no chance, in words."""
+    """Return the records whose reduced chi^2 is that of no adequate model and no chance, in words.
+
+    And those that the machine cannot be flown along at all.
+    """
+    record = data.stages[data.last].record
     found = record_chi2(data, fit)
-    return [
+    lost = [number for number in np.unique(record) if fit.evaluation.failed[record == number].all()]
+    return [f"{data.prepared[number].record.name} (no segment of it can be flown)" for number in lost] + [
         f"{data.prepared[number].record.name} (reduced chi^2 {size:.4g})"
         for number, (size, freedom) in found.items()
         if size > _limit(data.prepared[number], options)
         and chi2.sf(size * freedom, freedom) < options.detection_level / len(found)
     ]
+
+
+def unused(data: Data, fit: Fit) -> list[str]:
+    """Return in words how many segments of each record a machine is not judged by."""
+    record, evaluation = data.stages[data.last].record, fit.evaluation
+    notes = []
+    for number, one in enumerate(data.prepared):
+        here = record == number
+        lost = here & ~fit.good
+        failed = int((lost & evaluation.failed).sum())
+        unsteady = int(lost.sum()) - failed
+        why = [f"{failed} cannot be flown"] if failed else []
+        why += [f"the impacts of {unsteady} are not steady"] if unsteady else []
+        if why:
+            said = " and ".join(why)
+            notes.append(f"{one.record.name}: {lost.sum()} of {here.sum()} segments are not used: {said}")
+    return notes
 
 
 def misses(told: Prediction, fitted: Fit, options: Options) -> bool:

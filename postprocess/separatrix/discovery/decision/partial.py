@@ -26,6 +26,7 @@ from separatrix.discovery.decision.judge import (
     lead,
     margin,
 )
+from separatrix.discovery.decision.other_machine import other_units
 from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.decision.several import fit_set, over_base, without
 from separatrix.discovery.fitting.ceiling import ceiling
@@ -34,8 +35,6 @@ from separatrix.discovery.options import Options
 
 _PAIRS = 12
 _LEADERS = 2
-# share of what free forces close that a force of one thing must close to be most of it
-_MOST = 0.5
 # share of the gap on held-out records that an effect must close to be worth a name
 _LEAST = 0.1
 
@@ -65,15 +64,16 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
     whole.leaves = adequate(whole, bench.options)
     complete = bool(whole.leaves)
     whole.gates["adequate"] = complete
+    odd = other_units(bench.training, base.model)
     return replace(
         decision,
-        outcome="named",
+        outcome="ambiguous" if odd else "named",
         complete=complete,
         accepted=[whole],
         alternatives=[],
         rivals=[],
         rounds=rounds,
-        reasons=[] if complete else remaining(bench, whole),
+        reasons=[*([] if complete else remaining(bench, whole)), *odd],
     )
 
 
@@ -84,13 +84,11 @@ def remaining(bench: Bench, whole: Judged) -> list[str]:
     if whole.prediction is not None:
         fits.append(("held-out", bench.held_out, whole.prediction, whole.prediction.reduced_chi2))
     for use, data, found, left in fits:
-        families = ceiling(found.problem, found.fit, bench.scales.mass).families
-        free = next(one for one in families if one.name == "pieces")
-        best = max((one for one in families if one is not free), key=lambda one: one.gain)
+        depends_on = ceiling(found.problem, found.fit, bench.scales.mass).mostly
         names = ", ".join(one.record.name for one in data.prepared)
         what = (
-            f"forces that depend on {best.name} would close most of it"
-            if best.gain > _MOST * free.gain
+            f"forces that depend on {depends_on} would close most of it"
+            if depends_on
             else "no force that depends on speed, place and time alone closes most of it, "
             "as where the body or its drive is flexible"
         )

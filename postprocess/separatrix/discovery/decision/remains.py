@@ -20,8 +20,6 @@ from separatrix.discovery.fitting.refit import Fitted
 
 # size over the noise of a sample from which on it is worth to say what the remaining gap depends on
 _WORTH_WORDS = 0.2
-# share of what free forces close from which on a force of one thing closes most of it
-_MOST = 0.5
 
 
 @dataclass
@@ -78,10 +76,7 @@ def _remains(
     if size < _WORTH_WORDS or isinstance(after.problem, CoordinateProblem):
         # of several bodies forces at several places explain what remains
         return Remains(use, closed, size, "")
-    families = (known or ceiling(after.problem, after.fit, mass)).families
-    free = max(one.gain for one in families)
-    best = max((one for one in families if one.name != "pieces"), key=lambda one: one.gain)
-    return Remains(use, closed, size, best.name if best.gain > _MOST * free else "")
+    return Remains(use, closed, size, (known or ceiling(after.problem, after.fit, mass)).mostly)
 
 
 def _fit_of(one: Fitted | Prediction) -> Fit | Prediction:

@@ -6,16 +6,16 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from separatrix.discovery.decision.beside_faults import in_words
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.decoys import decoys
 from separatrix.discovery.decision.experiments import experiments
 from separatrix.discovery.decision.judge import LARGER_NOISE, Judged
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
-from separatrix.discovery.decision.misfit import doubted_noise, too_quiet
+from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
+from separatrix.discovery.decision.other_machine import other_drive, other_machine, other_phase, other_units
 from separatrix.discovery.decision.remains import Remains, remains_of
-from separatrix.discovery.decision.rig import in_words
 from separatrix.discovery.decision.rounds import Bench, Round
-from separatrix.discovery.decision.strange import other_drive, other_machine, other_phase, other_units
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
@@ -246,10 +246,12 @@ def _notes(findings: Findings) -> list[str]:
     added = findings.decision.added
     if added is not None and not added.fitted.fit.converged:
         notes.append(f"the fit of effect.{added.name} did not converge")
-    lost = int((~fit.good).sum())
-    if lost:
+    for _, data, fitted in fits:
+        notes += unused(data, fitted.fit)
+    if best and best[0].prediction is not None and best[0].prediction.beside_faults:
         notes.append(
-            f"{lost} of {lost + int(fit.good.sum())} segments are not used: their impacts are not steady"
+            "held-out records are foretold, and their gap is told, by the parameters as they are beside "
+            "small faults of the rig; those of the verdict and of extended.toml are as fitted"
         )
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     if contact and not any(one.impacts.size for one in bench.training.smoothed):

@@ -87,7 +87,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
-    if any(one.record.v is not None for one in data.prepared):
+    if not problem.in_force and any(one.record.v is not None for one in data.prepared):
         # the products of velocities in stretches are not kept
         memory = found.memory if found.of_samples else None
         speeds = noise_of(problem, fit, 1, mass, memory).factors

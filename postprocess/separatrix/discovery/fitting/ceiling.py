@@ -16,7 +16,14 @@ from scipy.stats import chi2
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.joint_forces import families_of
-from separatrix.discovery.fitting.motions import after_impacts, impacts_at, knots_of, scaled_motion, splines
+from separatrix.discovery.fitting.motions import (
+    after_impacts,
+    impacts_at,
+    knots_of,
+    products,
+    scaled_motion,
+    splines,
+)
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns, kick_columns
@@ -25,6 +32,8 @@ from separatrix.discovery.fitting.screen import project
 
 _PIECES = 5
 _USABLE = 1e-6
+# share of what free forces close from which on a force of one thing closes most of it
+_MOST = 0.5
 
 
 @dataclass
@@ -56,9 +65,11 @@ class Ceiling:
         return max(0.0, *(one.gain - one.rank for one in self.families))
 
     @property
-    def best(self) -> Family:
-        """The family that explains most."""
-        return min(self.families, key=lambda one: one.p)
+    def mostly(self) -> str:
+        """What a force depends on that explains most of what any force does; '' if no one thing does."""
+        free = max(one.gain for one in self.families)
+        of_one = [one for one in self.families if one.name != "pieces" and one.gain > _MOST * free]
+        return max(of_one, key=lambda one: one.gain).name if of_one else ""
 
 
 def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
@@ -120,7 +131,7 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     forces = {
         "speed": splines(v, knots_of(v[good], 7), good),
         "place": splines(x, knots_of(x[good], 7), good),
-        "speed and place": _products(
+        "speed and place": products(
             splines(v, knots_of(v[good], 4), good), splines(x, knots_of(x[good], 4), good)
         ),
         "time": np.stack(
@@ -154,7 +165,3 @@ def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
     return scale * np.stack(
         [at * speed**n for n in range(4)] + [at * state["time"], at * state["time"] ** 2], axis=2
     )
-
-
-def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)

@@ -15,6 +15,7 @@ from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, beaten, values_of
+from separatrix.discovery.fitting.shapes import through
 from separatrix.discovery.measured.bodies import is_structure
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
@@ -76,7 +77,7 @@ def fit_member(
     Where the table has values of both directions and they are `alike`, they are fitted as one. What cannot
     come near a machine `ahead` any more is not fitted to its end.
     """
-    begun = member.known(known, base, knots)
+    begun = begun_at(member, known, base, knots)
     made = None if begun is None else with_table(data, base, member, known, knots, begun, alike)
     if made is None:
         return None
@@ -88,6 +89,31 @@ def fit_member(
     if ahead is not None and beaten(found, ahead):
         return found
     return replace(found, fit=polished(data, problem, fit, data.last, 40, rival=base.fit))
+
+
+def begun_at(
+    member: Member,
+    known: Fitted,
+    base: Fitted,
+    knots: np.ndarray,
+    table: list[tuple[np.ndarray, np.ndarray]] | None = None,
+) -> list[np.ndarray] | None:
+    """The function at the knots, for each of its values: of a `table`, of that of a machine, or of its law.
+
+    None where that is no law of the family.
+    """
+    table = table_of(known, member) if table is None else table
+    if table is None:
+        return member.known(known, base, knots)
+    begun = [drawn(member, at, value, knots) for at, value in table]
+    return begun * len(member.values) if len(begun) == 1 else begun
+
+
+def drawn(member: Member, at: np.ndarray, value: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """The curve of a table at other knots."""
+    if member.beside:
+        at, value = np.append(0.0, at), np.append(0.0, value)
+    return through(at, value)(np.clip(knots, at[0], at[-1]))
 
 
 def with_table(

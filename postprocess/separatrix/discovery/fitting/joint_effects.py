@@ -57,8 +57,6 @@ class JointEffect:
     moved: tuple[str, ...] = ()
     # a key and the one that is minus it
     mirrored: tuple[str, str] = ("", "")
-    # names that can be the same motion there, and when
-    confused: tuple[tuple[str, str], ...] = ()
 
 
 def _new(family: str, **law: object) -> Callable[[dict, Place, Joint | None, PlaceScales], str]:
@@ -215,10 +213,8 @@ def effect_of(name: str) -> Effect:
     """What is known of an effect of one body, or of one at a place of several."""
     if AT not in name:
         return effects()[name]
-    kind, _, place = name.partition(AT)
-    row = JOINT_EFFECTS[kind]
-    confused = {f"{other}{AT}{place}": reason for other, reason in row.confused}
-    return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", confused)
+    row = JOINT_EFFECTS[name.partition(AT)[0]]
+    return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", {})
 
 
 def place_of(name: str) -> str:
@@ -229,9 +225,10 @@ def place_of(name: str) -> str:
 def names_for(model, asked: tuple[str, ...] | None) -> list[str]:
     """Names of all effects that a machine may lack, of those that were asked for."""
     known = JOINT_EFFECTS if is_structure(model) else STARTS
-    if asked and not any(name in known for name in asked):
+    unknown = [name for name in asked or () if name not in known]
+    if unknown:
         raise SeparatrixError(
-            f"effects: found {', '.join(asked)}, allowed for this machine {', '.join(known)}", USAGE
+            f"effects: found {', '.join(unknown)}, allowed for this machine {', '.join(known)}", USAGE
         )
     if not is_structure(model):
         return [name for name in STARTS if not asked or name in asked]

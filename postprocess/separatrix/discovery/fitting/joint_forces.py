@@ -10,8 +10,8 @@ import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.joint_response import columns_of, sample_times_of, sigmas_of
-from separatrix.discovery.fitting.motions import knots_of, splines
+from separatrix.discovery.fitting.joint_response import columns_of, sigmas_of
+from separatrix.discovery.fitting.motions import clock_of, knots_of, splines
 
 _KNOTS, _HARMONICS = 6, 3
 _ALL_HARMONICS = 6
@@ -52,25 +52,10 @@ def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     return found
 
 
-def clock_of(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.ndarray | None]:
-    """Time of the samples, -1 to 1 over a record, and crank angle; None without a drive."""
-    shape = problem.segments.inside.shape
-    time, phase = np.zeros(shape), None
-    for number, prepared in enumerate(problem.prepared):
-        rows = np.flatnonzero(problem.segments.record == number)
-        t = prepared.record.t
-        stamps = t[problem.segments.index[rows]]
-        time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
-        if prepared.frequency is not None:
-            phase = np.zeros(shape) if phase is None else phase
-            phase[rows] = problem.crank_angle(number, fit.values, stamps)
-    return time, phase
-
-
 def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     """Kicks at the impacts of each contact by its path: a cubic of the speed before."""
     structure = problem.structure
-    times = sample_times_of(problem)
+    times = problem.sample_times()
     tables: dict[int, np.ndarray] = {}
     for number, hits in enumerate(fit.evaluation.impacts):
         rows = np.flatnonzero(problem.segments.record == number)
@@ -118,7 +103,7 @@ def fault_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
         if body not in problem.structure.names:
             continue
         place = problem.structure.names.index(body)
-        steps = np.diff(sample_times_of(problem), axis=1)
+        steps = np.diff(problem.sample_times(), axis=1)
         usable = good[:, 1:] & (steps > 0)
         speeds = fit.evaluation.motion[:, :, n + place]
         rates = np.diff(speeds, axis=1)[usable] / steps[usable]

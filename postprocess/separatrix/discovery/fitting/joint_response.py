@@ -35,7 +35,7 @@ def columns_of(
     if kick:
         started = np.cumsum(carried, axis=1)
     else:
-        steps = np.diff(sample_times_of(problem), axis=1)[:, :, None, None]
+        steps = np.diff(problem.sample_times(), axis=1)[:, :, None, None]
         areas = 0.5 * steps * (carried[:, 1:] + carried[:, :-1])
         started = np.concatenate([np.zeros_like(carried[:, :1]), np.cumsum(areas, axis=1)], axis=1)
     started[~alive] = 0
@@ -55,16 +55,6 @@ def sigmas_of(problem: CoordinateProblem, name: str) -> np.ndarray:
     """Noise of a sensor by segment, infinite where a record lacks it."""
     known = [one.sensor(name) for one in problem.prepared]
     return np.array([np.inf if one is None else one.sigma for one in known])[problem.segments.record]
-
-
-def sample_times_of(problem: CoordinateProblem) -> np.ndarray:
-    """Times of the samples since the start of their segment [s], (segments, length)."""
-    times = np.zeros(problem.segments.inside.shape)
-    for number, prepared in enumerate(problem.prepared):
-        rows = np.flatnonzero(problem.segments.record == number)
-        t = prepared.record.t[problem.segments.index[rows]]
-        times[rows] = t - t[:, :1]
-    return times
 
 
 def back_to_start(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:

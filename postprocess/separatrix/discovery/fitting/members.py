@@ -150,15 +150,7 @@ def _known_contact(known: Fitted, base: Fitted, at: np.ndarray) -> list[np.ndarr
         if stiffness is not None:
             exponent = known.model.parameters.get(f"effect.{name}.exponent")
             return [stiffness * at ** (default if exponent is None else exponent.value)]
-    # a table that was fitted on fewer knots
-    count = sum(path.startswith("effect.contact_curve.force[") for path in _values(known))
-    if not count:
-        return None
-    table = [
-        [known.model.parameters[f"effect.contact_curve.penetration[{i}]"].value for i in range(1, count + 1)],
-        [_values(known)[f"effect.contact_curve.force[{i}]"] for i in range(1, count + 1)],
-    ]
-    return [np.interp(at, [0, *table[0]], [0, *table[1]])]
+    return None
 
 
 def _contact_damping(known: Fitted) -> float:

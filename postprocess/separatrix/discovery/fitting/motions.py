@@ -7,7 +7,6 @@ from scipy.interpolate import BSpline, CubicSpline
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.response import sample_times
 from separatrix.library import effects
 
 # angles of the crank at which the foot of the spring is asked for
@@ -28,16 +27,28 @@ def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
     if good.any():
         middle, size = np.mean(x[good]), np.std(x[good])
         speed = np.sqrt(np.mean(v[good] ** 2))
-    time, phase = np.zeros(inside.shape), None
+    time, phase = clock_of(problem, fit)
+    return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
+
+
+def clock_of(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray | None]:
+    """Time of the samples, -1 to 1 over a record, and crank angle; None without a drive."""
+    shape = problem.segments.inside.shape
+    time, phase = np.zeros(shape), None
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
         t = prepared.samples.t
         stamps = t[problem.segments.index[rows]]
         time[rows] = 2 * (stamps - t[0]) / (t[-1] - t[0]) - 1
         if prepared.frequency is not None:
-            phase = np.zeros(inside.shape) if phase is None else phase
+            phase = np.zeros(shape) if phase is None else phase
             phase[rows] = problem.crank_angle(number, fit.values, stamps)
-    return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
+    return time, phase
+
+
+def products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Each column of one times each of the other, at the samples."""
+    return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
 
 
 def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
@@ -111,7 +122,7 @@ def impacts_at(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
 def after_impacts(problem: Problem, fit: Fit) -> np.ndarray:
     """Time since the last impact of the segment at each sample [s], not a number before the first."""
     _, at = impacts_at(problem, fit)
-    times = sample_times(problem)
+    times = problem.sample_times()
     last = np.maximum.accumulate(np.where(at != 0, times, -np.inf), axis=1)
     return np.where(np.isfinite(last), times - last, np.nan)
 

@@ -420,6 +420,15 @@ class Problem:
                 return float(value)
         return absent
 
+    def sample_times(self) -> np.ndarray:
+        """Times of the samples since the start of their segment [s], (segments, length)."""
+        times = np.zeros(self.segments.inside.shape)
+        for number, prepared in enumerate(self.prepared):
+            rows = np.flatnonzero(self.segments.record == number)
+            t = prepared.samples.t[self.segments.index[rows]]
+            times[rows] = t - t[:, :1]
+        return times
+
     def crank_angle(self, number: int, values: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Angle of the crank at times `t` of a record [rad]; 0 without a crank."""
         prepared = self.prepared[number]

@@ -309,11 +309,12 @@ def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     theirs = other.fit.values.copy()
     theirs[list(other.added)] *= _FIRST_SHARE
     motion = other.problem.evaluate(theirs, other.fit.starts, derivatives=False)
-    fit = minimise(one.problem.imitating(motion), known, other.fit.starts, most=8)
-    values, starts = (
-        begun + (reached - begun) / _FIRST_SHARE
-        for begun, reached in ((known, fit.values), (other.fit.starts, fit.starts))
-    )
+    # which is that of the machine, without what faults of the rig add to it
+    faults = np.array([free.is_fault for free in one.problem.free])
+    begun = np.where(faults, 0.0, known)
+    fit = minimise(one.problem.imitating(motion), begun, other.fit.starts, most=8, fixed=faults)
+    starts = other.fit.starts + (fit.starts - other.fit.starts) / _FIRST_SHARE
+    values = known + (fit.values - begun) / _FIRST_SHARE
     lower, upper = (
         np.array([getattr(free, side) for free in one.problem.free]) for side in ("lower", "upper")
     )

@@ -28,7 +28,7 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
         return columns_of(problem, fit, forces)
     back, alive = _back(problem, fit)
     carried = back[:, :, :, None] * forces[:, :, None, :] / mass
-    steps = np.diff(sample_times(problem), axis=1)[:, :, None, None]
+    steps = np.diff(problem.sample_times(), axis=1)[:, :, None, None]
     areas = 0.5 * steps * (carried[:, 1:] + carried[:, :-1])
     moved = np.concatenate([np.zeros_like(carried[:, :1]), np.cumsum(areas, axis=1)], axis=1)
     return _as_columns(problem, fit, moved, alive)
@@ -97,13 +97,3 @@ def in_swings(problem: Problem, signal: np.ndarray) -> tuple[np.ndarray, np.ndar
         if swings[number] > 0:
             found[rows] = (signal[rows] - np.mean(measured)) / swings[number]
     return found, swings
-
-
-def sample_times(problem: Problem) -> np.ndarray:
-    """Times of the samples since the start of their segment [s], (segments, length)."""
-    times = np.zeros(problem.segments.inside.shape)
-    for number, prepared in enumerate(problem.prepared):
-        rows = np.flatnonzero(problem.segments.record == number)
-        t = prepared.samples.t[problem.segments.index[rows]]
-        times[rows] = t - t[:, :1]
-    return times

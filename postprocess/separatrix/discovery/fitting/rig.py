@@ -22,7 +22,7 @@ from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
-from separatrix.discovery.fitting.response import force_columns, in_swings, sample_times
+from separatrix.discovery.fitting.response import force_columns, in_swings
 
 _POWERS = (2, 3)
 _HARMONICS = 6
@@ -61,7 +61,7 @@ def _columns_of_faults(problem: Problem, fit: Fit, usual: float | None = None) -
 
 def usual_acceleration(problem: Problem, fit: Fit) -> float:
     """Of the flights of a fitted motion [m/s^2], by the median; impacts are far above. 0 if nothing flies."""
-    steps = np.diff(sample_times(problem), axis=1)
+    steps = np.diff(problem.sample_times(), axis=1)
     usable = problem.segments.inside[:, 1:] & fit.good[:, None] & (steps > 0)
     rates = np.diff(fit.evaluation.v, axis=1)[usable] / steps[usable]
     return float(np.median(np.abs(rates))) / 0.6745 if rates.size else 0.0

@@ -11,12 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.fitting.curves import fits_machine, knots_over, member_of, table_of, with_table
+from separatrix.discovery.fitting.curves import (
+    begun_at,
+    drawn,
+    fits_machine,
+    knots_over,
+    member_of,
+    table_of,
+    with_table,
+)
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.refit import Fitted, gain_over
-from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms, through
+from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms
 from separatrix.discovery.fitting.spline import roughness, smoothed
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
@@ -153,7 +161,7 @@ def _settled(
             break
         parts, curve = found, again
         changed = [] if last is None else [
-            (_drawn(member, coarse.at, coarse.value, one.at) - one.value) ** 2
+            (drawn(member, coarse.at, coarse.value, one.at) - one.value) ** 2
             for one, coarse in zip(parts, last, strict=True)
         ]  # fmt: skip
         if changed and all(np.all(one < part.error**2) for one, part in zip(changed, parts, strict=True)):
@@ -220,11 +228,7 @@ class _Curve:
                 return None
             table = [(at, np.polyval(np.polyfit(at, value, _EVENED), at)) for at, value in table]
         alike = len(member.values) > 1 and (table is None or len(table) == 1)
-        if table is not None:
-            begun = [_drawn(member, at, value, knots) for at, value in table]
-            begun = begun * len(member.values) if alike else begun
-        else:
-            begun = member.known(fitted, base, knots)
+        begun = begun_at(member, fitted, base, knots, table)
         made = None if begun is None else with_table(data, base, member, fitted, knots, begun, alike)
         if made is None:
             return None
@@ -403,13 +407,6 @@ class _Known:
     def promised(self, moved: np.ndarray) -> float:
         """Change of the squares where the function moves by so much."""
         return float(moved @ self.information @ moved - 2 * moved @ self.gradient) - self.alone
-
-
-def _drawn(member: Member, at: np.ndarray, value: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """The curve of a table at other knots."""
-    if member.beside:
-        at, value = np.append(0.0, at), np.append(0.0, value)
-    return through(at, value)(np.clip(knots, at[0], at[-1]))
 
 
 def _alone(part: Part) -> tuple[np.ndarray, np.ndarray]:

@@ -76,7 +76,8 @@ class Prepared:
     @property
     def noise(self) -> tuple:
         """Memory of the noise, and its size in each column that is compared."""
-        return (self.memory, self.sigma, *(() if self.record.v is None else (self.velocity_sigma,)))
+        velocity = self.record.v is not None and not self.in_force
+        return (self.memory, self.sigma, *((self.velocity_sigma,) if velocity else ()))
 
     @noise.setter
     def noise(self, known: tuple) -> None:

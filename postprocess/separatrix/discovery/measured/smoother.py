@@ -18,6 +18,8 @@ from separatrix.discovery.measured.signals import runs
 _TUNED_SAMPLES = 600
 _JUMP_SIGMAS = 6.0
 _JUMP_MEDIANS = 4.0
+# samples that a stick has at least
+_FEWEST_STILL = 4
 
 
 @dataclass
@@ -121,15 +123,15 @@ def impact_table(smoothed: Smoothed) -> np.ndarray:
     return np.array(rows).reshape(-1, 6)
 
 
-def stick_intervals(smoothed: Smoothed, fewest: int = 4) -> list[tuple[float, float]]:
-    """Stretches of `fewest` samples or more with velocity and acceleration zero within three errors."""
+def stick_intervals(smoothed: Smoothed) -> list[tuple[float, float]]:
+    """Stretches of some samples or more with velocity and acceleration zero within three errors."""
     error = np.sqrt(np.stack([smoothed.covariance[:, i, i] for i in (1, 2)], axis=1))
     still = np.all(np.abs(smoothed.state[:, 1:]) < 3 * error, axis=1)
     still &= np.abs(smoothed.v) < 0.05 * np.sqrt(np.mean(smoothed.v**2))
     return [
         (float(smoothed.t[first]), float(smoothed.t[last - 1]))
         for first, last in runs(still)
-        if last - first >= fewest
+        if last - first >= _FEWEST_STILL
     ]
 
 

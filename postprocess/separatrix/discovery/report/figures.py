@@ -311,7 +311,7 @@ def held_out(details: h5py.File) -> Figure | None:
     window = np.abs(segment - worst) <= 1
     times = before["t"][:][window]
     record = details["records"][name]
-    compared = "force" if details.attrs.get("compared", "") == "force" else "x"
+    compared = "force" if details.attrs["compared"] == "force" else "x"
     t, x = record["t"][:], record[compared][:]
     inside = (t >= times.min()) & (t <= times.max())
     figure = style.new_figure(style.DOUBLE_COLUMN, 88.0)

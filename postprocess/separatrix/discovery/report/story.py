@@ -150,7 +150,7 @@ def _compared(verdict: dict) -> Section:
         ]
         for one in verdict["records"]
     ]
-    unit = verdict["units"]["force" if verdict.get("compared", "motion") == "force" else "position"]
+    unit = verdict["units"]["force" if verdict["compared"] == "force" else "position"]
     table = Table(
         [
             "record",
@@ -167,7 +167,7 @@ def _compared(verdict: dict) -> Section:
         "compared",
         "What was compared",
         [
-            _HOW[verdict.get("compared", "motion")],
+            _HOW[verdict["compared"]],
             table,
             f"Held out: {verdict['held_out_chosen']}. Random choices follow from seed {verdict['seed']}; "
             f"separatrix {verdict['version']}, {number(verdict['runtime_s'], 3)} s.",
@@ -199,7 +199,7 @@ def _gap(verdict: dict) -> Section:
             "What a free force that depends on one thing would gain over the base machine; a small p says "
             "that there is "
             "something to be gained there, by whatever law:",
-            Table(["a force that depends on", "log-likelihood", "free numbers", "p"], explained),
+            Table(["a force that depends on", "chi^2", "free numbers", "p"], explained),
         ],
     )
 
@@ -354,19 +354,28 @@ def _detectable(verdict: dict) -> Section:
 
 def _experiment(verdict: dict) -> Section:
     if verdict["separating_experiment"]:
+        faster = any(one["rate"] is not None for one in verdict["experiments"])
+        key = "rate" if faster else "drive_ratio"
         rows = [
             [
-                number(one["drive_ratio"], 3) if one["drive_ratio"] is not None else "-",
+                "-" if one[key] is None else number(one[key], 3),
                 number(one["scale"], 3),
                 number(one["d_prime"], 3),
             ]
             for one in verdict["experiments"]
         ]
         said = f"To tell apart what remains: {verdict['separating_experiment']}."
-        header = ["drive ratio", "drive (or start) over that of the first record", "standard errors apart"]
+        header = (
+            ["times as fast", "amplitude over that of the first record", "standard errors apart"]
+            if faster
+            else ["drive ratio", "drive (or start) over that of the first record", "standard errors apart"]
+        )
         return Section("next", "What to measure next", [said, *([Table(header, rows)] if rows else [])])
     elif verdict["outcome"] == "ambiguous":
-        said = "No experiment with this machine was found that would tell the candidates apart."
+        said = (
+            "No experiment was found that would tell the candidates apart. Experiments are worked out for "
+            "one body, driven or free, without a force that must be measured."
+        )
     elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
         said = "The maps above show where to look for a law that the catalogue lacks."
     else:
