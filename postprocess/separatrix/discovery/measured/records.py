@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.discovery.measured.clock import pieces_of
-from separatrix.discovery.measured.faults import check_clipping, left_out
 from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
+from separatrix.discovery.measured.sensor_faults import check_clipping, left_out
 from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_sensor
 from separatrix.errors import SeparatrixError
 
