@@ -14,6 +14,7 @@ from separatrix.discovery import cli
 from separatrix.discovery.cli import main
 from separatrix.discovery.measured.records import make_record, read_record, unique_names
 from separatrix.discovery.results import FILES, replacing
+from separatrix.discovery.workflow import _all_different
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -337,6 +338,21 @@ def test_the_same_record_is_not_taken_twice(tmp_path, library, capsys):
         assert main([str(word) for word in arguments]) == 64
         assert f"{words[-1]}: the same record as {first}" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_runs_along_one_commanded_motion_are_two_records():
+    """Their force tells them apart; a copy that lacks a column is a copy."""
+    t, x = rows()
+    force = np.cos(5 * t)
+    one, other = (make_record(f"run{k}", {"t": t, "x": x, "force": k * force}) for k in (1, 2))
+    _all_different([one, other])
+    for copy in ({"t": t, "x": x, "force": force}, {"t": t, "x": x}, {"t": t, "x": x, "v": force}):
+        with pytest.raises(SeparatrixError, match="copy: the same record as run1"):
+            _all_different([one, make_record("copy", copy)])
+    bodies = [make_record(f"b{k}", {"t": t, "x.first": x, "x.second": k * force}) for k in (1, 2)]
+    _all_different(bodies)
+    with pytest.raises(SeparatrixError, match="b2: the same record as b2"):
+        _all_different([*bodies, bodies[1]])
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, capsys):
