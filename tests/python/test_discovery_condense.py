@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from separatrix.discovery.fitting import noise
+from separatrix.discovery.fitting.data import gather
 from separatrix.discovery.measured import tables
 from separatrix.discovery.measured.condense import (
     NODES,
@@ -16,6 +17,7 @@ from separatrix.discovery.measured.condense import (
     expected_left,
     stride,
 )
+from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.records import make_record, read_record
 from separatrix.errors import SeparatrixError
 
@@ -159,6 +161,22 @@ def test_records_that_cannot_be_condensed_are_refused_with_words(monkeypatch):
     monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", 1000)
     with pytest.raises(SeparatrixError, match="keep every 10th row"):
         condensed(record, kept=np.ones(record.t.size, bool))
+
+
+@pytest.mark.parametrize(("most", "factor"), [(200_000, 1), (1500, 4)])
+def test_condensing_that_gave_way_is_told(monkeypatch, most, factor):
+    """Where too many rows would stay, stretches need not be smooth within the noise any more."""
+    monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", most)
+    prepared = Prepared(moving(), SIGMA, np.inf, 0.0)
+    gather([prepared], 1.0, None)
+    count = prepared.samples.t.size
+    assert count <= most
+    assert prepared.samples.factor == factor
+    (said,) = (note for note in prepared.notes if "condensed" in note)
+    if factor == 1:
+        assert said.endswith(f"in which it is smooth are condensed to {count} values that say as much")
+    else:
+        assert said.endswith(f"smooth within {factor} times the noise are condensed to {count} values")
 
 
 def test_the_expected_noise_is_that_of_dense_projections():
