@@ -38,8 +38,8 @@ _SENSOR = re.compile(r"[xvaF]\.[A-Za-z_][\w.]*")
 _NOISE = "noise."
 MOST_SAMPLES = 10_000_000
 """Samples of a record that are read."""
-# lines of a header; bytes of a row with two numbers
-_MOST_HEADER, _FEWEST_BYTES = 1000, 8
+# lines of a header; bytes that are looked at together
+_MOST_HEADER, _CHUNK = 1000, 1_000_000
 KEYS = NUMBERS | {"units"}
 """All header keys that mean something."""
 
@@ -76,11 +76,26 @@ class Table:
 
 def read_csv(path: Path) -> Table:
     """Read a text: comments with keys, a row of names, rows of numbers."""
-    return _read_plain(path) or _read_by_lines(path)
+    lines, comments = _count_lines(path)
+    # but for the row of names
+    check_length(path, lines - comments - 1)
+    return _read_plain(path, lines) or _read_by_lines(path)
 
 
-def _read_plain(path: Path) -> Table | None:
-    """A well-formed file at once; None where anything in it needs a closer look."""
+def _count_lines(path: Path) -> tuple[int, int]:
+    """Lines of a text, and how many of them are comments; they end as on any system."""
+    ends, comments, last = {b"\n": 0, b"\r": 0}, 0, b"\n"
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            for end in ends:
+                ends[end] += chunk.count(end)
+                comments += (last + chunk).count(end + b"#")
+            last = chunk[-1:]
+    return max(ends.values()) + (last not in ends), comments
+
+
+def _read_plain(path: Path, count: int) -> Table | None:
+    """A well-formed file of so many lines at once; None where anything in it needs a closer look."""
     begun: list[str] = []
     with path.open(encoding="utf-8", errors="surrogateescape") as file:
         for line in file:
@@ -93,7 +108,6 @@ def _read_plain(path: Path) -> Table | None:
     names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
     if "t" not in names or not has_place(names) or not first.strip():
         return None
-    check_length(path, path.stat().st_size // max(1, len(first)))
     used = [name for name in names if is_column(name)]
     try:
         # any comment, blank line or short row among the numbers is left to the closer look
@@ -104,7 +118,7 @@ def _read_plain(path: Path) -> Table | None:
         return None
     head = _parsed(path, begun)
     lines = np.arange(len(begun) + 1, len(begun) + 1 + len(table))
-    if sum(1 for _ in path.open("rb")) != lines[-1]:
+    if count != lines[-1]:
         return None
     columns = {name: table[:, names.index(name)].copy() for name in used}
     return Table(head.header, columns, lines, [name for name in names if name not in used])
@@ -165,7 +179,6 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
 
 def _lines(path: Path) -> list[str]:
     """Lines of a text; bytes that are no UTF-8 are kept, because comments may hold anything."""
-    check_length(path, path.stat().st_size // _FEWEST_BYTES)
     content = path.read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise SeparatrixError(f"{path}: text in UTF-16, expected UTF-8")
