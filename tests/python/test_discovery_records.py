@@ -409,7 +409,7 @@ def test_an_angle_is_told_in_rad():
 
 
 def test_columns_that_are_not_used_may_hold_anything(tmp_path):
-    text = "# units: s, m\nt,flag,x\n" + "\n".join(f"{k / 100},ok?,{np.cos(k / 9)}" for k in range(200))
+    text = "# units: t s, x m\nt,flag,x\n" + "\n".join(f"{k / 100},ok?,{np.cos(k / 9)}" for k in range(200))
     (tmp_path / "flags.csv").write_text(text)
     record = read_record(tmp_path / "flags.csv")
     assert record.x[:2] == pytest.approx([1.0, np.cos(1 / 9)])

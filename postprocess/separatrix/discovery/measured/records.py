@@ -65,18 +65,19 @@ def make_record(
     """Check arrays that did not come from a file as if they had."""
     texts = {key: str(value) for key, value in (header or {}).items()}
     used = {key: column for key, column in columns.items() if is_column(key)}
-    return _checked(Path(name), Table(texts, used, unused=sorted(columns.keys() - used.keys())), at_rest)
+    unused = sorted(columns.keys() - used.keys())
+    return _checked(Path(name), Table(texts, used, unused=unused, names=list(columns)), at_rest)
 
 
 def _checked(path: Path, table: Table, at_rest: bool) -> Record:
-    header, columns = table.header, dict(table.columns)
-    kept = np.arange(columns["t"].size)
+    header = table.header
+    kept = np.arange(table.columns["t"].size)
 
     def where(row: int) -> str:
         return f"{path}, row {kept[row] + 1}" if table.lines is None else f"{path}:{table.lines[kept[row]]}"
 
     notes: list[str] = []
-    unit, of_time = to_si(path, header, columns, notes)
+    columns, unit, of_time = to_si(path, table, notes)
     numbers = numbers_of(path, header, of_time, notes)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))

@@ -72,6 +72,8 @@ class Table:
     columns: dict[str, np.ndarray]
     lines: np.ndarray | None = None
     unused: list[str] = field(default_factory=list)
+    # of all columns in the order of the file; without those not used where a file has no such order
+    names: list[str] = field(default_factory=list)
 
 
 def read_csv(path: Path) -> Table:
@@ -121,7 +123,7 @@ def _read_plain(path: Path, count: int) -> Table | None:
     if count != lines[-1]:
         return None
     columns = {name: table[:, names.index(name)].copy() for name in used}
-    return Table(head.header, columns, lines, [name for name in names if name not in used])
+    return Table(head.header, columns, lines, [name for name in names if name not in used], names)
 
 
 def check_length(path: Path, samples: int) -> None:
@@ -174,7 +176,7 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
         raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
     table = np.array(rows)
     columns = {name: table[:, i].copy() for i, name in enumerate(used)}
-    return Table(header, columns, np.array(lines), [name for name in names if name not in used])
+    return Table(header, columns, np.array(lines), [name for name in names if name not in used], names)
 
 
 def _lines(path: Path) -> list[str]:
@@ -274,13 +276,14 @@ def read_hdf5(path: Path) -> Table:
         raise SeparatrixError(f"{path}: the datasets are not equally long lists")
     if len(units) == 2:
         header.setdefault("units", ", ".join(units))
-    return Table(header, columns, unused=unused)
+    return Table(header, columns, unused=unused, names=list(columns))
 
 
 def _texts(file: h5py.File) -> tuple[dict[str, str], list[str]]:
+    """Keys of the header, and the units of t and x by name where the datasets have them."""
     header = {key: _text(value) for key, value in file.attrs.items()}
-    found = [file[name].attrs for name in ("t", "x") if name in file]
-    return header, [_text(attributes["units"]) for attributes in found if "units" in attributes]
+    found = {name: file[name].attrs for name in ("t", "x") if name in file}
+    return header, [f"{name} {_text(one['units'])}" for name, one in found.items() if "units" in one]
 
 
 def _text(value: object) -> str:
