@@ -213,5 +213,6 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         notes=list(record.notes),
         file=record.file,
         sensors=sensors,
+        own_x=record.own_x,
         **channels,
     )

@@ -4,7 +4,7 @@
 
 `x.BODY`, `v.BODY`, `a.BODY` are place, velocity and acceleration of a body, `F.JOINT` is the force of a
 spring or a soft contact, positive where it pulls the second of its ends back towards the first. Not every
-body needs a sensor. `x` and `v` alone are of the watched body.
+body needs a sensor. `x` and `v` without a body are of the watched one.
 """
 
 from dataclasses import dataclass, field
@@ -88,11 +88,7 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
             "bodies: keep a part "
             f"of it, or every {-(-record.t.size // _MOST_SAMPLES)}th row"
         )
-    columns = dict(record.sensors)
-    if not columns:
-        columns[f"x.{structure.watched}"] = record.x
-        if record.v is not None:
-            columns[f"v.{structure.watched}"] = record.v
+    columns = _by_body(record, structure.watched)
     sensors = [_sensor(record, name, values, structure, notes) for name, values in columns.items()]
     first = sensors[0]
     prepared = SensedPrepared(
@@ -108,6 +104,17 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
     _find_drive(prepared, model)
     return prepared
+
+
+def _by_body(record: Record, watched: str) -> dict[str, np.ndarray]:
+    """Columns by what they are of; `x` and `v` are of the watched body."""
+    own_x = {f"x.{watched}": record.x} if record.own_x else {}
+    own_v = {} if record.v is None else {f"v.{watched}": record.v}
+    for name in (own_x | own_v).keys() & record.sensors.keys():
+        raise SeparatrixError(
+            f"{record.file}: found columns {name[0]} and {name}, allowed one of them: {watched} is watched"
+        )
+    return own_x | record.sensors | own_v
 
 
 def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure, notes: list[str]) -> Sensor:
