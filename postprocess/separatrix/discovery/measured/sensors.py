@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.measured.bodies import Structure, structure_of
-from separatrix.discovery.measured.preflight import Prepared, turning
+from separatrix.discovery.measured.preflight import Prepared, check_periods, from_measured_angle
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.errors import SeparatrixError
@@ -20,7 +20,6 @@ from separatrix.library import Model
 
 # laws of joints whose force follows from place and speed
 FORCES = ("linear", "polynomial", "kelvin_voigt")
-_FEWEST_PER_PERIOD, _FEWEST_PERIODS = 12, 2.0
 _MOST_SAMPLES = 50_000
 
 
@@ -186,9 +185,7 @@ def _find_drive(prepared: SensedPrepared, model: Model) -> None:
             "natural frequency"
         )
     if record.phi is not None:
-        prepared.frequency, prepared.phase = turning(record)
-        prepared.origin = float(record.t[0])
-        prepared.phase_known = True
+        from_measured_angle(prepared)
     else:
         prepared.frequency = header.get("drive_frequency_rad_s", frequencies.pop())
         prepared.phase = header.get("phase", 0.0)
@@ -199,15 +196,4 @@ def _find_drive(prepared: SensedPrepared, model: Model) -> None:
             )
         if not prepared.phase_stated:
             prepared.notes.append("no phase: it is searched for")
-    if prepared.period_samples < _FEWEST_PER_PERIOD:
-        raise SeparatrixError(
-            f"{record.file}: {prepared.period_samples:.1f} samples per drive period, at least "
-            f"{_FEWEST_PER_PERIOD} "
-            "are needed"
-        )
-    periods = record.duration / record.interval / prepared.period_samples
-    if periods < _FEWEST_PERIODS:
-        raise SeparatrixError(
-            f"{record.file}{record.part}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} "
-            "are needed"
-        )
+    check_periods(prepared)
