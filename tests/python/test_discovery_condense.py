@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from separatrix.discovery.fitting import noise
+from separatrix.discovery.fitting.data import gather
 from separatrix.discovery.measured import tables
 from separatrix.discovery.measured.condense import (
     NODES,
@@ -16,6 +17,7 @@ from separatrix.discovery.measured.condense import (
     expected_left,
     stride,
 )
+from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.records import make_record, read_record
 from separatrix.errors import SeparatrixError
 
@@ -161,6 +163,22 @@ def test_records_that_cannot_be_condensed_are_refused_with_words(monkeypatch):
         condensed(record, kept=np.ones(record.t.size, bool))
 
 
+@pytest.mark.parametrize(("most", "factor"), [(200_000, 1), (1500, 4)])
+def test_condensing_that_gave_way_is_told(monkeypatch, most, factor):
+    """Where too many rows would stay, stretches need not be smooth within the noise any more."""
+    monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", most)
+    prepared = Prepared(moving(), SIGMA, np.inf, 0.0)
+    gather([prepared], 1.0, None)
+    count = prepared.samples.t.size
+    assert count <= most
+    assert prepared.samples.factor == factor
+    (said,) = (note for note in prepared.notes if "condensed" in note)
+    if factor == 1:
+        assert said.endswith(f"in which it is smooth are condensed to {count} values that say as much")
+    else:
+        assert said.endswith(f"smooth within {factor} times the noise are condensed to {count} values")
+
+
 def test_the_expected_noise_is_that_of_dense_projections():
     """Against the projectors themselves, which nothing else forms any more."""
     random = np.random.default_rng(0)
@@ -194,10 +212,41 @@ def test_reading_takes_memory_in_proportion_to_the_file(tmp_path):
     assert most < 20 * path.stat().st_size
 
 
-def test_too_long_a_record_is_refused_with_what_to_do(tmp_path, monkeypatch):
+def long_csv(path, first_row: str = "", pause: str = "", end: str = "\n", count: int = 1000):
+    """So many rows, the first of which may be short, with a comment among them or none."""
+    t = np.arange(count) / 100
+    rows = [f"{a:.12f},{np.sin(a):.25f}" for a in t]
+    rows[0] = first_row or rows[0]
+    rows[count // 2] += pause
+    path.write_text(end.join(["# units: s, m", "# operator: none", "t,x", *rows, ""]), newline="")
+    return path
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("pause", ["", "\n# a pause"])
+@pytest.mark.parametrize("first_row", ["", "0,0"])
+def test_rows_are_counted_and_not_guessed_from_bytes(tmp_path, monkeypatch, end, pause, first_row):
+    path = long_csv(tmp_path / "long.csv", first_row, pause.replace("\n", end), end)
+    monkeypatch.setattr(tables, "MOST_SAMPLES", 1000)
+    assert read_record(path).t.size == 1000
+    monkeypatch.setattr(tables, "MOST_SAMPLES", 999)
+    with pytest.raises(SeparatrixError, match=r"about 1e\+03 samples.*every 2th row"):
+        read_record(path)
+
+
+def test_lines_are_counted_across_chunks_and_without_an_end(tmp_path, monkeypatch):
+    path = tmp_path / "short.csv"
+    path.write_text("# one: 1\n# two: 2\nt,x\n0,1\n# three\n1,2")
+    for size in range(1, 12):
+        monkeypatch.setattr(tables, "_CHUNK", size)
+        assert tables._count_lines(path) == (6, 3)
+
+
+@pytest.mark.parametrize("pause", ["", "\n# a pause"])
+def test_too_long_a_record_is_refused_before_it_is_read(tmp_path, monkeypatch, pause):
+    path = long_csv(tmp_path / "long.csv", pause=pause)
     monkeypatch.setattr(tables, "MOST_SAMPLES", 100)
-    path = tmp_path / "long.csv"
-    t = np.arange(1000) / 100
-    path.write_text("t,x\n" + "".join(f"{a:.4f},{np.sin(a):.6f}\n" for a in t))
-    with pytest.raises(SeparatrixError, match=r"about 1.02e\+03 samples.*every \d+th row"):
+    monkeypatch.setattr(tables, "_parsed", None)
+    monkeypatch.setattr(np, "loadtxt", None)
+    with pytest.raises(SeparatrixError, match=r"about 1e\+03 samples.*every 10th row"):
         read_record(path)

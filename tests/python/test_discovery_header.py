@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Headers as a person would write them are understood, or refused with an example of a right one."""
 
+import h5py
 import numpy as np
 import pytest
 from separatrix.discovery.measured.records import make_record, read_record
@@ -90,3 +91,86 @@ def test_units_beside_the_names_of_columns(tmp_path):
     assert np.allclose(record.t, T)
     assert np.allclose(record.x, 1e-3 * COLUMNS["x"])
     assert not any("units" in one for one in record.notes)
+
+
+IN_BETWEEN = {"t": T, "y": 7 + 0 * T, "x": COLUMNS["x"], "v": 0.5 * np.cos(5 * T)}
+
+
+def as_array(path, columns, header):
+    return make_record(path.name, columns, header)
+
+
+def as_csv(path, columns, header):
+    head = [*(f"# {key}: {text}" for key, text in header.items()), ",".join(columns)]
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, delimiter=",", header="\n".join(head), comments="")
+    return read_record(path)
+
+
+def as_text(path, columns, header):
+    """Read line by line, because of a comment among the rows."""
+    as_csv(path, columns, header)
+    path.write_text(path.read_text() + "# end\n")
+    return read_record(path)
+
+
+def as_npz(path, columns, header):
+    np.savez(path.with_suffix(".npz"), **columns, **header)
+    return read_record(path.with_suffix(".npz"))
+
+
+def as_hdf5(path, columns, header):
+    with h5py.File(path, "w") as file:
+        for name, column in columns.items():
+            file[name] = column
+        file.attrs.update(header)
+    return read_record(path)
+
+
+ORDERED = [as_array, as_csv, as_text]
+
+
+@pytest.mark.parametrize("written", ORDERED)
+@pytest.mark.parametrize(
+    ("names", "units", "size"),
+    [
+        ("tyx", "s, mm, m", {"x": 1}),
+        ("tyx", "s, furlong, mm", {"x": 1e-3}),
+        ("tyx", "t s, x mm", {"x": 1e-3}),
+        ("ytx", "mm, s, m", {"x": 1}),
+        # what is told stands before what is not used
+        ("txy", "s, mm", {"x": 1e-3}),
+        ("txyv", "s, mm", {"x": 1e-3, "v": 1}),
+        ("txyv", "s, m, m, mm/s", {"x": 1, "v": 1e-3}),
+        ("txvy", "s, m, mm/s", {"x": 1, "v": 1e-3}),
+    ],
+)
+def test_units_in_order_count_columns_that_are_not_used(written, names, units, size, tmp_path):
+    record = written(tmp_path / "record", {name: IN_BETWEEN[name] for name in names}, {"units": units})
+    for name, factor in size.items():
+        assert np.allclose(getattr(record, name), factor * IN_BETWEEN[name])
+
+
+@pytest.mark.parametrize("written", ORDERED)
+@pytest.mark.parametrize(("names", "units"), [("tyx", "s, mm"), ("ytx", "s, mm"), ("txyv", "s, m, mm/s")])
+def test_units_in_order_of_some_columns_are_refused_where_one_is_not_used(written, names, units, tmp_path):
+    why = f"units '{units}': {units.count(',') + 1} units in the order of {len(names)} columns, of which y is"
+    with pytest.raises(SeparatrixError, match=f"{why} not used: say them by name, as in 'units: t s, x mm'"):
+        written(tmp_path / "record", {name: IN_BETWEEN[name] for name in names}, {"units": units})
+
+
+@pytest.mark.parametrize("written", [as_npz, as_hdf5])
+def test_arrays_without_an_order_have_units_of_those_that_are_used(written, tmp_path):
+    """Where an array that is not used stands among the others nobody knows."""
+    columns = {name: IN_BETWEEN[name] for name in "tyx"}
+    assert np.allclose(written(tmp_path / "two", columns, {"units": "s, mm"}).x, 1e-3 * COLUMNS["x"])
+    with pytest.raises(SeparatrixError, match="3 units in the order of 3 columns, of which y is not used"):
+        written(tmp_path / "three", columns, {"units": "s, mm, m"})
+
+
+def test_units_of_datasets_are_their_own_whatever_lies_between(tmp_path):
+    with h5py.File(tmp_path / "record.h5", "w") as file:
+        for name in "txv":
+            file[name] = IN_BETWEEN[name]
+        file["t"].attrs["units"], file["x"].attrs["units"] = "s", "mm"
+    assert np.allclose(read_record(tmp_path / "record.h5").x, 1e-3 * COLUMNS["x"])

@@ -21,6 +21,19 @@ from separatrix.library import Model
 
 pytestmark = pytest.mark.usefixtures("library")
 
+FREE = """\
+[body]
+mass = 1
+[restoring]
+law = "linear"
+stiffness = 88
+[friction]
+law = "viscous"
+damping = 0.3
+[drive]
+law = "none"
+"""
+
 
 class Spy:
     """A model that remembers what it was asked to fly."""
@@ -36,12 +49,12 @@ class Spy:
         return self.model.segments(active, values, start, *more, **options)
 
 
-def fitted(stiffness: float) -> Fitted:
+def fitted(stiffness: float, case: str = CASE, begin: float = 0.0) -> Fitted:
     """The machine with another stiffness, on a record of half of its drive that begins at 0.7 rad."""
     t = np.arange(600) / 100
     head = {"drive_ratio": 1.2, "phase": 0.7, "drive_scale": 0.5, "sensor_noise_sigma_m": 1e-3}
-    record = make_record("record", {"t": t, "x": 0.7 + 0.2 * np.cos(11.3 * t)}, head)
-    model = Spy(Model.from_text(CASE))
+    record = make_record("record", {"t": begin + t, "x": 0.7 + 0.2 * np.cos(11.3 * t)}, head)
+    model = Spy(Model.from_text(case))
     free = base_parameters(model, measured_force=False)
     first = np.arange(0, 600, 50)
     problem = Problem(model, [prepare(record, model)], padded(0 * first, first, first + 50), free)
@@ -82,6 +95,12 @@ def test_of_several_rivals_the_nearest_counts():
     assert (best.d_prime, best.rival) == (min(apart), int(np.argmin(apart)))
     assert {each.rival for each in found} <= {0, 1}
     assert f"one and {'near' if best.rival else 'far'} would differ" in best.text("one", ["far", "near"])
+
+
+def test_a_free_motion_lasts_as_long_as_the_record_whenever_that_began():
+    at_0, later = (d_primes(fitted(1.0, FREE, t), [fitted(1.04, FREE, t)], None, 1.0) for t in (0.0, 1000.0))
+    assert at_0[0] > 1
+    assert later == [pytest.approx(at_0[0], rel=1e-6)]
 
 
 def test_what_the_parameters_of_a_machine_can_be_is_not_apart():

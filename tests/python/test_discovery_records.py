@@ -14,6 +14,7 @@ from separatrix.discovery import cli
 from separatrix.discovery.cli import main
 from separatrix.discovery.measured.records import make_record, read_record, unique_names
 from separatrix.discovery.results import FILES, replacing
+from separatrix.discovery.workflow import _all_different
 from separatrix.errors import SeparatrixError
 
 HEAD = [
@@ -339,6 +340,21 @@ def test_the_same_record_is_not_taken_twice(tmp_path, library, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_runs_along_one_commanded_motion_are_two_records():
+    """Their force tells them apart; a copy that lacks a column is a copy."""
+    t, x = rows()
+    force = np.cos(5 * t)
+    one, other = (make_record(f"run{k}", {"t": t, "x": x, "force": k * force}) for k in (1, 2))
+    _all_different([one, other])
+    for copy in ({"t": t, "x": x, "force": force}, {"t": t, "x": x}, {"t": t, "x": x, "v": force}):
+        with pytest.raises(SeparatrixError, match="copy: the same record as run1"):
+            _all_different([one, make_record("copy", copy)])
+    bodies = [make_record(f"b{k}", {"t": t, "x.first": x, "x.second": k * force}) for k in (1, 2)]
+    _all_different(bodies)
+    with pytest.raises(SeparatrixError, match="b2: the same record as b2"):
+        _all_different([*bodies, bodies[1]])
+
+
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     before = listing(tmp_path)
@@ -393,7 +409,7 @@ def test_an_angle_is_told_in_rad():
 
 
 def test_columns_that_are_not_used_may_hold_anything(tmp_path):
-    text = "# units: s, m\nt,flag,x\n" + "\n".join(f"{k / 100},ok?,{np.cos(k / 9)}" for k in range(200))
+    text = "# units: t s, x m\nt,flag,x\n" + "\n".join(f"{k / 100},ok?,{np.cos(k / 9)}" for k in range(200))
     (tmp_path / "flags.csv").write_text(text)
     record = read_record(tmp_path / "flags.csv")
     assert record.x[:2] == pytest.approx([1.0, np.cos(1 / 9)])

@@ -177,8 +177,15 @@ def _all_different(records: list[Record]) -> None:
     """Refuse a record that is given twice: it would count twice, or foretell itself."""
     for place, one in enumerate(records):
         for other in records[:place]:
-            if np.array_equal(one.x, other.x) and np.array_equal(one.t, other.t):
+            if _same(one, other):
                 raise SeparatrixError(f"{one.file}: the same record as {other.file}", USAGE)
+
+
+def _same(one: Record, other: Record) -> bool:
+    """Whether all columns that two records share are the same; a commanded x(t) may be that of many runs."""
+    pairs = [(getattr(one, name), getattr(other, name)) for name in ("t", "x", "v", "force")]
+    pairs += [(one.sensors[name], other.sensors[name]) for name in one.sensors.keys() & other.sensors.keys()]
+    return all(first is None or second is None or np.array_equal(first, second) for first, second in pairs)
 
 
 def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
@@ -206,5 +213,6 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
         notes=list(record.notes),
         file=record.file,
         sensors=sensors,
+        own_x=record.own_x,
         **channels,
     )

@@ -80,7 +80,7 @@ def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: floa
     """What tells a machine from others in a record at a drive ratio of the case, in standard errors."""
     first = one.problem.prepared[0]
     frequency = None if ratio is None else one.model.drive_frequency({"drive.ratio": ratio})
-    length = 2 * np.pi / (frequency or first.natural or 2 * np.pi / (first.record.t[-1] / _PERIODS))
+    length = 2 * np.pi / (frequency or first.natural or 2 * np.pi / (first.record.duration / _PERIODS))
     values = _values(one, frequency, scale)
     start = _states(one, values, frequency, length, scale)
     times = np.tile(np.arange(_STEPS) * length / _STEPS, _PERIODS)

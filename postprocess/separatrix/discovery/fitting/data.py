@@ -145,9 +145,13 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
     at = np.concatenate([np.arange(first, last, every) for first, last in record.pieces])
     seen = smooth(record.t[at], record.x[at], one.sigma, period / every)
     one.samples = condense(record, period, one.sigma, _events(record.t.size, at, seen))
+    factor = one.samples.factor
+    within, as_much = "", " that say as much"
+    if factor > 1:
+        within, as_much = f" within {factor:.0f} times the noise", ""
     one.notes.append(
         f"{record.t.size} samples, {period:.0f} per period of the motion: stretches in which it is "
-        f"smooth are condensed to {one.samples.t.size} values that say as much"
+        f"smooth{within} are condensed to {one.samples.t.size} values{as_much}"
     )
     one.samples.blind = _blind(one, seen)
     return seen

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from separatrix.errors import SeparatrixError
 
@@ -50,17 +51,15 @@ def pieces_of(
 
 def _lost(t: np.ndarray, steps: np.ndarray, usual: float) -> np.ndarray:
     """Rows after a gap where stamps scatter: all later ones are late, not one alone."""
-    late = t - usual * np.arange(t.size)
     rows = np.flatnonzero(steps > _LATE * usual) + 1
-    jumps = np.array(
-        [late[row : row + _AROUND].mean() - late[max(0, row - _AROUND) : row].mean() for row in rows]
-    )
-    found = []
-    for row, jump in zip(rows, jumps, strict=True):
-        largest = jump == jumps[np.abs(rows - row) < _AROUND].max()
-        if steps[row - 1] > _LOST * usual or (jump > 0.5 * usual and largest):
-            found.append(row)
-    return np.array(found, int)
+    late = np.pad(t - usual * np.arange(t.size), _AROUND)
+    before = sum(late[rows + k] for k in range(_AROUND)) / np.minimum(_AROUND, rows)
+    after = sum(late[rows + _AROUND + k] for k in range(_AROUND)) / np.minimum(_AROUND, t.size - rows)
+    jumps = np.full(t.size, -np.inf)
+    jumps[rows] = after - before
+    largest = jumps == maximum_filter1d(jumps, 2 * _AROUND - 1)
+    lasting = (jumps[rows] > 0.5 * usual) & largest[rows]
+    return rows[(steps[rows - 1] > _LOST * usual) | lasting]
 
 
 def _evened(t: np.ndarray, x: np.ndarray, pieces, where, notes: list[str]) -> np.ndarray:

@@ -62,6 +62,8 @@ class Samples:
     left: np.ndarray
     left_v: np.ndarray
     products: np.ndarray
+    # of the noise, within which stretches are smooth: more than 1 where too many rows would stay
+    factor: float = 1.0
     # rows whose velocity says nothing: an impact lies so near that the sensor may be on either side of it
     blind: np.ndarray | None = None
     _noises: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
@@ -216,12 +218,9 @@ def condense(
             )
         unseen *= 4
         at_jumps *= 2
-    if unseen > _UNSEEN:
-        record.notes.append(
-            f"{record.t.size} samples: stretches that are smooth within {np.sqrt(unseen / _UNSEEN):.0f} "
-            "times the noise are condensed"
-        )
-    return _rows(record, taken)
+    found = _rows(record, taken)
+    found.factor = float(np.sqrt(unseen / _UNSEEN))
+    return found
 
 
 def _power(samples: float) -> int:

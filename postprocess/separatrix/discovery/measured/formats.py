@@ -153,7 +153,7 @@ def _of_arrays(path: Path, found: dict[str, object]) -> Table:
         raise SeparatrixError(f"{path}: the columns are not equally long ({sizes})")
     header = {key: _word(value) for key, value in found.items() if key in KEYS}
     unused = sorted(found.keys() - columns.keys() - header.keys())
-    return Table(header, columns, unused=unused)
+    return Table(header, columns, unused=unused, names=list(columns))
 
 
 def _word(value: object) -> str:

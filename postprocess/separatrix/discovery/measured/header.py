@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, SAME, is_noise, is_sensor
+from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, SAME, Table, is_noise, is_sensor
 from separatrix.errors import SeparatrixError
 
 _TURN = 2 * np.pi
@@ -114,20 +114,17 @@ def _doubt(header: dict[str, str], numbers: dict[str, float], notes: list[str]) 
         notes.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
 
 
-def to_si(
-    path: Path, header: dict[str, str], columns: dict[str, np.ndarray], notes: list[str]
-) -> tuple[str, float]:
-    """Turn the columns into SI; return the unit of x, m or rad, and the unit of time [s]."""
-    if "units" not in header:
+def to_si(path: Path, table: Table, notes: list[str]) -> tuple[dict[str, np.ndarray], str, float]:
+    """The columns in SI, the unit of x, m or rad, and the unit of time [s]."""
+    if "units" not in table.header:
         notes.append("no 'units': read as s and m (rad of an angle)")
-        return "m", 1.0
-    units = _units(path, header["units"], columns)
-    for name in columns:
+        return dict(table.columns), "m", 1.0
+    units, columns = _units(path, table), {}
+    for name, column in table.columns.items():
         unit = units.get(name, units.get(_kind(name)))
-        if unit is not None:
-            columns[name] = columns[name] * UNITS[_kind(name)][unit]
+        columns[name] = column if unit is None else column * UNITS[_kind(name)][unit]
     place = next(units[name] for name in units if _kind(name) == "x")
-    return "rad" if place in _ANGLE else "m", _TIME[units["t"]]
+    return columns, "rad" if place in _ANGLE else "m", _TIME[units["t"]]
 
 
 def _kind(name: str) -> str:
@@ -136,24 +133,39 @@ def _kind(name: str) -> str:
     return SAME.get(kind, kind)
 
 
-def _units(path: Path, text: str, columns: dict[str, np.ndarray]) -> dict[str, str]:
+def _units(path: Path, table: Table) -> dict[str, str]:
     """Unit of each column: `s, mm`, in the order of the columns, or by name, as in `t s, x mm`."""
+    text, columns = table.header["units"], table.columns
     entries = [entry.strip() for entry in re.split(r"[,;]", text) if entry.strip()]
-    found, order = {}, iter([name for name in columns if _kind(name) in UNITS])
-    for entry in entries:
-        name, unit = _entry(entry, [one for one in columns if is_sensor(one)])
-        name = name or next(order, None)
+    told = [_entry(entry, [one for one in columns if is_sensor(one)]) for entry in entries]
+    _check_order(path, table, sum(not name for name, _ in told))
+    found, order = {}, iter(table.names)
+    for name, unit in told:
+        if not name:
+            name = next(order, "")
+            if name not in columns:
+                continue
         unit = _SAME.get(unit, unit)
-        if name is None:
-            # of a column that is not used
-            continue
         if unit not in UNITS.get(_kind(name), ()) or name in found:
             _refuse(path, text)
         found[name] = unit
-    told = {_kind(name) for name in found if name in columns or name in UNITS}
-    if not {"t", "x"} <= told:
+    if not {"t", "x"} <= {_kind(name) for name in found if name in columns or name in UNITS}:
         _refuse(path, text)
     return found
+
+
+def _check_order(path: Path, table: Table, count: int) -> None:
+    """Refuse so many units in order where it matters whether columns that are not used have some of them."""
+    used = list(table.columns)
+    among_all = [name for name in table.names[:count] if name in used]
+    fewer = count < len(table.names) and among_all != used[:count]
+    if fewer or (count > len(table.names) and table.unused):
+        raise SeparatrixError(
+            f"{path}: units '{table.header['units']}': {count} units in the order of "
+            f"{len(used) + len(table.unused)} columns, of which {', '.join(table.unused)} "
+            f"{'is' if len(table.unused) == 1 else 'are'} not used: say them by name, as in "
+            "'units: t s, x mm'"
+        )
 
 
 def _entry(entry: str, sensors: list[str]) -> tuple[str, str]:

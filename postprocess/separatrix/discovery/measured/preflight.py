@@ -188,17 +188,7 @@ def _find_drive(prepared: Prepared, model) -> None:
         return
     prepared.natural = model.drive_frequency({"drive.ratio": 1.0})
     if record.phi is not None:
-        prepared.frequency, prepared.phase = turning(record)
-        if prepared.frequency * record.duration < np.pi:
-            raise SeparatrixError(
-                f"{record.file}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
-                "not the angle of a turning crank"
-            )
-        # the errors of angle and rate are independent in the middle of the record
-        prepared.origin = float(record.t.mean())
-        prepared.phase += prepared.frequency * (prepared.origin - float(record.t[0]))
-        prepared.phase_known = True
-        _measured_angle(prepared)
+        from_measured_angle(prepared)
     else:
         header = record.header
         if "drive_frequency_rad_s" in header:
@@ -212,7 +202,12 @@ def _find_drive(prepared: Prepared, model) -> None:
         prepared.phase_stated = "phase" in header
         if not prepared.phase_stated:
             prepared.notes.append("no phase: it is searched for")
-    samples = prepared.period_samples
+    check_periods(prepared)
+
+
+def check_periods(prepared: Prepared) -> None:
+    """Refuse a record with too few samples in a period of the drive, or too few periods."""
+    record, samples = prepared.record, prepared.period_samples
     if samples < _FEWEST_PER_PERIOD:
         raise SeparatrixError(
             f"{record.file}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
@@ -225,7 +220,23 @@ def _find_drive(prepared: Prepared, model) -> None:
         )
 
 
-def turning(record: Record) -> tuple[float, float]:
+def from_measured_angle(prepared: Prepared) -> None:
+    """Take frequency and phase of the drive, with their standard errors, from the measured crank angle."""
+    record = prepared.record
+    prepared.frequency, prepared.phase = _turning(record)
+    if prepared.frequency * record.duration < np.pi:
+        raise SeparatrixError(
+            f"{record.file}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
+            "not the angle of a turning crank"
+        )
+    # the errors of angle and rate are independent in the middle of the record
+    prepared.origin = float(record.t.mean())
+    prepared.phase += prepared.frequency * (prepared.origin - float(record.t[0]))
+    prepared.phase_known = True
+    _errors_of_angle(prepared)
+
+
+def _turning(record: Record) -> tuple[float, float]:
     """Frequency of a measured crank angle [rad/s] and the angle at the first row.
 
     Each piece is unwrapped by itself; the turns in a gap follow from the frequency within the pieces.
@@ -248,7 +259,7 @@ def turning(record: Record) -> tuple[float, float]:
     return slope + float(more), float(start)
 
 
-def _measured_angle(prepared: Prepared) -> None:
+def _errors_of_angle(prepared: Prepared) -> None:
     """Standard errors of angle and rate of a measured crank, from its noise: stated, or its scatter."""
     record = prepared.record
     t = record.t - prepared.origin

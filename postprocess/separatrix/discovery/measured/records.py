@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.discovery.measured.clock import pieces_of
-from separatrix.discovery.measured.faults import check_clipping, left_out
 from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
+from separatrix.discovery.measured.sensor_faults import check_clipping, left_out
 from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_sensor
 from separatrix.errors import SeparatrixError
 
@@ -29,8 +29,10 @@ class Record:
     v: np.ndarray | None = None
     force: np.ndarray | None = None
     phi: np.ndarray | None = None
-    # of several bodies: columns by what they are of, as `x.BODY`; x is the first place among them
+    # of several bodies: columns by what they are of, as `x.BODY`
     sensors: dict[str, np.ndarray] = field(default_factory=dict)
+    # whether x is a column itself, and not the first place among the sensors
+    own_x: bool = True
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -65,26 +67,31 @@ def make_record(
     """Check arrays that did not come from a file as if they had."""
     texts = {key: str(value) for key, value in (header or {}).items()}
     used = {key: column for key, column in columns.items() if is_column(key)}
-    return _checked(Path(name), Table(texts, used, unused=sorted(columns.keys() - used.keys())), at_rest)
+    unused = sorted(columns.keys() - used.keys())
+    return _checked(Path(name), Table(texts, used, unused=unused, names=list(columns)), at_rest)
 
 
 def _checked(path: Path, table: Table, at_rest: bool) -> Record:
-    header, columns = table.header, dict(table.columns)
-    kept = np.arange(columns["t"].size)
+    header = table.header
+    kept = np.arange(table.columns["t"].size)
 
     def where(row: int) -> str:
         return f"{path}, row {kept[row] + 1}" if table.lines is None else f"{path}:{table.lines[kept[row]]}"
 
     notes: list[str] = []
-    unit, of_time = to_si(path, header, columns, notes)
+    columns, unit, of_time = to_si(path, table, notes)
     numbers = numbers_of(path, header, of_time, notes)
     for name, column in columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
             raise SeparatrixError(f"{where(bad[0])}: '{name}' is {column[bad[0]]}; {bad.size} such values")
     sensors = [name for name in columns if is_sensor(name)]
-    if "x" not in columns:
-        columns["x"] = columns[next(name for name in sensors if name[0] == "x")]
+    places = [name for name in sensors if name[0] == "x"]
+    own_x = "x" in columns
+    if own_x:
+        places.insert(0, "x")
+    else:
+        columns["x"] = columns[places[0]]
     t, x = columns["t"], columns["x"]
     if t.size < _FEWEST_SAMPLES:
         raise SeparatrixError(f"{path}: {t.size} samples, at least {_FEWEST_SAMPLES} are needed")
@@ -109,14 +116,14 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
             f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
     if not at_rest:
-        for place in [columns[name] for name in sensors if name[0] == "x"] or [x]:
-            check_clipping(place, unit, where, notes)
+        for name in places:
+            check_clipping(columns[name], unit, where, notes)
     if table.unused:
         notes.append(f"columns that are not used: {', '.join(table.unused)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
     of_bodies = {name: columns[name] for name in sensors}
     told = {"header": numbers, "pieces": pieces, "notes": notes, "file": str(path)}
-    return Record(path.stem, t, sensors=of_bodies, **told, **channels)
+    return Record(path.stem, t, sensors=of_bodies, own_x=own_x, **told, **channels)
 
 
 def unique_names(records: Iterable[Record]) -> None:

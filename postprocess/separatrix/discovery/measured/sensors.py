@@ -4,7 +4,7 @@
 
 `x.BODY`, `v.BODY`, `a.BODY` are place, velocity and acceleration of a body, `F.JOINT` is the force of a
 spring or a soft contact, positive where it pulls the second of its ends back towards the first. Not every
-body needs a sensor. `x` and `v` alone are of the watched body.
+body needs a sensor. `x` and `v` without a body are of the watched one.
 """
 
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.measured.bodies import Structure, structure_of
-from separatrix.discovery.measured.preflight import Prepared, turning
+from separatrix.discovery.measured.preflight import Prepared, check_periods, from_measured_angle
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.errors import SeparatrixError
@@ -20,7 +20,6 @@ from separatrix.library import Model
 
 # laws of joints whose force follows from place and speed
 FORCES = ("linear", "polynomial", "kelvin_voigt")
-_FEWEST_PER_PERIOD, _FEWEST_PERIODS = 12, 2.0
 _MOST_SAMPLES = 50_000
 
 
@@ -88,11 +87,7 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
             "bodies: keep a part "
             f"of it, or every {-(-record.t.size // _MOST_SAMPLES)}th row"
         )
-    columns = dict(record.sensors)
-    if not columns:
-        columns[f"x.{structure.watched}"] = record.x
-        if record.v is not None:
-            columns[f"v.{structure.watched}"] = record.v
+    columns = _by_body(record, structure.watched)
     sensors = [_sensor(record, name, values, structure, notes) for name, values in columns.items()]
     first = sensors[0]
     prepared = SensedPrepared(
@@ -108,6 +103,17 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
     _find_drive(prepared, model)
     return prepared
+
+
+def _by_body(record: Record, watched: str) -> dict[str, np.ndarray]:
+    """Columns by what they are of; `x` and `v` are of the watched body."""
+    own_x = {f"x.{watched}": record.x} if record.own_x else {}
+    own_v = {} if record.v is None else {f"v.{watched}": record.v}
+    for name in (own_x | own_v).keys() & record.sensors.keys():
+        raise SeparatrixError(
+            f"{record.file}: found columns {name[0]} and {name}, allowed one of them: {watched} is watched"
+        )
+    return own_x | record.sensors | own_v
 
 
 def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure, notes: list[str]) -> Sensor:
@@ -179,9 +185,7 @@ def _find_drive(prepared: SensedPrepared, model: Model) -> None:
             "natural frequency"
         )
     if record.phi is not None:
-        prepared.frequency, prepared.phase = turning(record)
-        prepared.origin = float(record.t[0])
-        prepared.phase_known = True
+        from_measured_angle(prepared)
     else:
         prepared.frequency = header.get("drive_frequency_rad_s", frequencies.pop())
         prepared.phase = header.get("phase", 0.0)
@@ -192,15 +196,4 @@ def _find_drive(prepared: SensedPrepared, model: Model) -> None:
             )
         if not prepared.phase_stated:
             prepared.notes.append("no phase: it is searched for")
-    if prepared.period_samples < _FEWEST_PER_PERIOD:
-        raise SeparatrixError(
-            f"{record.file}: {prepared.period_samples:.1f} samples per drive period, at least "
-            f"{_FEWEST_PER_PERIOD} "
-            "are needed"
-        )
-    periods = record.duration / record.interval / prepared.period_samples
-    if periods < _FEWEST_PERIODS:
-        raise SeparatrixError(
-            f"{record.file}{record.part}: {periods:.2f} drive periods, at least {_FEWEST_PERIODS:g} "
-            "are needed"
-        )
+    check_periods(prepared)

@@ -38,8 +38,8 @@ _SENSOR = re.compile(r"[xvaF]\.[A-Za-z_][\w.]*")
 _NOISE = "noise."
 MOST_SAMPLES = 10_000_000
 """Samples of a record that are read."""
-# lines of a header; bytes of a row with two numbers
-_MOST_HEADER, _FEWEST_BYTES = 1000, 8
+# lines of a header; bytes that are looked at together
+_MOST_HEADER, _CHUNK = 1000, 1_000_000
 KEYS = NUMBERS | {"units"}
 """All header keys that mean something."""
 
@@ -72,15 +72,32 @@ class Table:
     columns: dict[str, np.ndarray]
     lines: np.ndarray | None = None
     unused: list[str] = field(default_factory=list)
+    # of all columns in the order of the file; without those not used where a file has no such order
+    names: list[str] = field(default_factory=list)
 
 
 def read_csv(path: Path) -> Table:
     """Read a text: comments with keys, a row of names, rows of numbers."""
-    return _read_plain(path) or _read_by_lines(path)
+    lines, comments = _count_lines(path)
+    # but for the row of names
+    check_length(path, lines - comments - 1)
+    return _read_plain(path, lines) or _read_by_lines(path)
 
 
-def _read_plain(path: Path) -> Table | None:
-    """A well-formed file at once; None where anything in it needs a closer look."""
+def _count_lines(path: Path) -> tuple[int, int]:
+    """Lines of a text, and how many of them are comments; they end as on any system."""
+    ends, comments, last = {b"\n": 0, b"\r": 0}, 0, b"\n"
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            for end in ends:
+                ends[end] += chunk.count(end)
+                comments += (last + chunk).count(end + b"#")
+            last = chunk[-1:]
+    return max(ends.values()) + (last not in ends), comments
+
+
+def _read_plain(path: Path, count: int) -> Table | None:
+    """A well-formed file of so many lines at once; None where anything in it needs a closer look."""
     begun: list[str] = []
     with path.open(encoding="utf-8", errors="surrogateescape") as file:
         for line in file:
@@ -93,7 +110,6 @@ def _read_plain(path: Path) -> Table | None:
     names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
     if "t" not in names or not has_place(names) or not first.strip():
         return None
-    check_length(path, path.stat().st_size // max(1, len(first)))
     used = [name for name in names if is_column(name)]
     try:
         # any comment, blank line or short row among the numbers is left to the closer look
@@ -104,10 +120,10 @@ def _read_plain(path: Path) -> Table | None:
         return None
     head = _parsed(path, begun)
     lines = np.arange(len(begun) + 1, len(begun) + 1 + len(table))
-    if sum(1 for _ in path.open("rb")) != lines[-1]:
+    if count != lines[-1]:
         return None
     columns = {name: table[:, names.index(name)].copy() for name in used}
-    return Table(head.header, columns, lines, [name for name in names if name not in used])
+    return Table(head.header, columns, lines, [name for name in names if name not in used], names)
 
 
 def check_length(path: Path, samples: int) -> None:
@@ -160,12 +176,11 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
         raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
     table = np.array(rows)
     columns = {name: table[:, i].copy() for i, name in enumerate(used)}
-    return Table(header, columns, np.array(lines), [name for name in names if name not in used])
+    return Table(header, columns, np.array(lines), [name for name in names if name not in used], names)
 
 
 def _lines(path: Path) -> list[str]:
     """Lines of a text; bytes that are no UTF-8 are kept, because comments may hold anything."""
-    check_length(path, path.stat().st_size // _FEWEST_BYTES)
     content = path.read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise SeparatrixError(f"{path}: text in UTF-16, expected UTF-8")
@@ -261,13 +276,14 @@ def read_hdf5(path: Path) -> Table:
         raise SeparatrixError(f"{path}: the datasets are not equally long lists")
     if len(units) == 2:
         header.setdefault("units", ", ".join(units))
-    return Table(header, columns, unused=unused)
+    return Table(header, columns, unused=unused, names=list(columns))
 
 
 def _texts(file: h5py.File) -> tuple[dict[str, str], list[str]]:
+    """Keys of the header, and the units of t and x by name where the datasets have them."""
     header = {key: _text(value) for key, value in file.attrs.items()}
-    found = [file[name].attrs for name in ("t", "x") if name in file]
-    return header, [_text(attributes["units"]) for attributes in found if "units" in attributes]
+    found = {name: file[name].attrs for name in ("t", "x") if name in file}
+    return header, [f"{name} {_text(one['units'])}" for name, one in found.items() if "units" in one]
 
 
 def _text(value: object) -> str:
