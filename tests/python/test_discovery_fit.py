@@ -296,8 +296,12 @@ def test_a_segment_bars_the_way_of_a_step_where_it_loses_more_than_all_gain(jump
     np.testing.assert_array_equal(found, barred)
 
 
-def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch):
-    """Only the quiet record has v; the memory of the noise is kept, because the machine misses nothing."""
+@pytest.mark.parametrize(("in_force", "of_v"), [(False, 0.2), (True, 0.1)])
+def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, in_force, of_v):
+    """Only the quiet record has v; the memory of the noise is kept, because the machine misses nothing.
+
+    Where the force is compared its noise is none of the velocity.
+    """
     answers = {0: Noise({0: 1.0, 1: 1.0}, 0.5), 1: Noise({0: 2.0}, 0.0)}
     monkeypatch.setattr(base_module, "noise_of", lambda _problem, _fit, channel, *_: answers[channel])
     prepared = [
@@ -313,9 +317,9 @@ def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch):
         for sigma, v in ((1e-3, np.zeros(3)), (1e-2, None))
     ]
     data = SimpleNamespace(prepared=prepared)
-    measure_noise(data, None, SimpleNamespace(reduced_chi2=1.0), 1.0)
+    measure_noise(data, SimpleNamespace(in_force=in_force), SimpleNamespace(reduced_chi2=1.0), 1.0)
     assert [one.memory for one in prepared] == [0.5, 0.5]
-    assert [one.velocity_sigma for one in prepared] == [0.2, 0.1]
+    assert [one.velocity_sigma for one in prepared] == [of_v, 0.1]
 
 
 @pytest.mark.parametrize("renewed", [False, True])
