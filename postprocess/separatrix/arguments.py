@@ -21,8 +21,10 @@ def list_of(allowed: Collection[str]) -> Callable[[str], list[str]]:
 
     def read(text: str) -> list[str]:
         names = [name.strip().lower() for name in text.split(",") if name.strip()]
-        if not names or not set(names) <= set(allowed):
-            raise argparse.ArgumentTypeError(f"'{text}' is not a list out of {', '.join(allowed)}")
+        unknown = [name for name in names if name not in allowed]
+        if unknown or not names:
+            found = ", ".join(unknown) or text
+            raise argparse.ArgumentTypeError(f"found '{found}', allowed a list out of {', '.join(allowed)}")
         return names
 
     return read

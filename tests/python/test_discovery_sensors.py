@@ -128,7 +128,11 @@ def test_the_error_of_a_crank_angle_counts_in_the_fit():
 @pytest.mark.parametrize(
     ("t", "rate", "words"),
     [
-        (T, 0.0, r"'phi' advances by \S+ rad in all: not the angle of a turning crank"),
+        (
+            T,
+            0.0,
+            r"'phi' advances by \S+ rad in all: too short a record, or not the angle of a turning crank",
+        ),
         (T[:100], RATE, r"1\.15 drive periods, at least 2 are needed"),
         (10 * T, RATE, "8.6 samples per drive period, at least 12 are needed"),
     ],

@@ -299,7 +299,7 @@ def test_runs_that_agree_are_drawn_as_one(tmp_path: Path) -> None:
         (["--slice", "drive.ratio=a"], "is not NAME=VALUE"),
         (["--axes", "x0"], "is not two names"),
         (["--axes", "x0,x0"], "axes: found x0, x0"),
-        (["--units", "inch"], "is not a list out of mm"),
+        (["--units", "inch"], "found 'inch', allowed a list out of mm"),
         (["--colours", "nocolour"], "which is no colour"),
         (["--colour-map", "none", "--field", "settle_time"], "which matplotlib does not have"),
         (["--size", "85"], "is not WxH"),

@@ -20,7 +20,7 @@ from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
 from separatrix.discovery.options import COMPARED, Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
-from separatrix.discovery.wording import of_effects, searched, with_error
+from separatrix.discovery.wording import at_knot, of_effects, searched, with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import INTERNAL, INTERRUPTED, NO_MEMORY, TERMINATED, SeparatrixError
 from separatrix.version import __version__
@@ -143,7 +143,10 @@ def summary(verdict: dict) -> list[str]:
             f"  in any case {' and '.join(verdict['in_families'])}: the form is in doubt, not the family"
         )
     lines += [f"  {name} sits {place}" for name, place in verdict["places"].items()]
-    lines += [f"  {path} = {with_error(verdict['parameters'][path])}" for path in of_effects(verdict)]
+    lines += [
+        f"  {path}{at_knot(verdict['parameters'][path])} = {with_error(verdict['parameters'][path])}"
+        for path in of_effects(verdict)
+    ]
     if verdict["function"]:
         lines.append(f"  {verdict['families'][-1]}: {verdict['function']['text']}")
     for use, gap in verdict["gap"].items():
@@ -151,7 +154,9 @@ def summary(verdict: dict) -> list[str]:
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"
         )
     lines += [f"  {one['text']}" for one in verdict["remains"]]
-    lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
+    if verdict["outcome"] != "none":
+        # of no gap it is what noise and small faults of the rig leave
+        lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
     lines += [f"  {reason}" for reason in verdict["reasons"]]
     if verdict["separating_experiment"]:
         lines.append(f"  to separate them: {verdict['separating_experiment']}")
@@ -201,7 +206,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--effects",
         metavar="LIST",
-        type=list_of([*STARTS, *JOINT_EFFECTS]),
+        type=list_of(dict.fromkeys([*STARTS, *JOINT_EFFECTS])),
         help="only these effects of the catalogue",
     )
     parser.add_argument(

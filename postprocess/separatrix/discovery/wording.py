@@ -79,6 +79,11 @@ def with_error(one: dict) -> str:
     return f"{one['value']:.{digits}g} +- {one['standard_error']:.2g}{unit}"
 
 
+def at_knot(one: dict) -> str:
+    """Where a value of a table stands, with a space before it; nothing of other parameters."""
+    return f" at {one['at']}" if one.get("at") else ""
+
+
 def interval(one: dict, digits: int) -> str:
     """The 95 % interval of a parameter of the verdict, or why it has none."""
     if one["interval_95"] is None:

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from separatrix.discovery.decision.decide import Decision, conclude
 from separatrix.discovery.decision.flexible import best_table
 from separatrix.discovery.decision.gates import judge_ceiling, pass_gates, weigh_faults
-from separatrix.discovery.decision.judge import clear_of
+from separatrix.discovery.decision.judge import clear_of, lead
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.rig import share_beside_faults
@@ -24,7 +24,8 @@ from separatrix.discovery.fitting.smooth import function_of
 def with_function(bench: Bench, decision: Decision) -> Decision:
     """The decision with what the records tell of the function of its last effect.
 
-    A closed form that this refutes yields to the table of its family, or is in doubt.
+    A closed form that this refutes yields to the table of its family, or is in doubt: then the one of more
+    evidence leads.
     """
     fitted = decision.corrected.fitted if decision.corrected else None
     if fitted is None or isinstance(fitted.problem, CoordinateProblem):
@@ -60,11 +61,13 @@ def _held_against_it(bench: Bench, decision: Decision) -> Decision:
     own = share_beside_faults(table.fitted, best.fitted) * function.gain
     if chi2.sf(own, table.parameters) > LIKELY:
         return decision
-    known = any(one.name == table.name for one in decision.rivals)
-    rivals = decision.rivals if known else [*decision.rivals, table]
+    first = table if all(table.gates.values()) and lead(table, best) > 0 else best
+    others = {one.name: one for one in (best, *decision.rivals, table) if one.name != first.name}
+    rivals = list(others.values())
     return replace(
         decision,
         outcome="ambiguous",
+        accepted=[first],
         rivals=rivals,
         alternatives=[list(one.fitted.names) for one in rivals],
         reasons=[*decision.reasons, said],

@@ -10,7 +10,7 @@ from separatrix.discovery.decision.beside_faults import in_words
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.decoys import decoys
 from separatrix.discovery.decision.experiments import experiments
-from separatrix.discovery.decision.judge import LARGER_NOISE, Judged
+from separatrix.discovery.decision.judge import LARGER_NOISE, LITTLE, Judged
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
 from separatrix.discovery.decision.other_machine import other_drive, other_machine, other_phase, other_units
@@ -23,11 +23,11 @@ from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
-from separatrix.discovery.fitting.members import friction_at
+from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
 from separatrix.discovery.fitting.refit import WORSE, Fitted
 from separatrix.discovery.fitting.rig import beside_faults
 from separatrix.discovery.fitting.shapes import FORM_OF
-from separatrix.discovery.fitting.smooth import Function
+from separatrix.discovery.fitting.smooth import Function, Part
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
@@ -181,11 +181,21 @@ def _function(found: Function | None, final: Fitted) -> dict | None:
         "closed_forms": found.forms,
         "text": "; ".join(
             f"{member.quantity}{f' {one.name}' if one.name else ''} {one.value[0]:.4g} at {one.at[0]:.3g} "
-            f"{member.unit} to {one.value[-1]:.4g} at {one.at[-1]:.3g} {member.unit}"
+            f"{member.unit}{_hump(one, member)} to {one.value[-1]:.4g} at {one.at[-1]:.3g} {member.unit}"
             for one in found.parts
         )
         + shape,
     }
+
+
+def _hump(one: Part, member: Member) -> str:
+    """The value that is farthest outside of those at the ends, in words, if it is outside by its error."""
+    ends = sorted((one.value[0], one.value[-1]))
+    outside = np.maximum(one.value - ends[1], ends[0] - one.value)
+    place = int(np.argmax(outside))
+    if not outside[place] > 2 * one.error[place]:
+        return ""
+    return f" by {one.value[place]:.4g} at {one.at[place]:.3g} {member.unit}"
 
 
 def d_prime(found: Round) -> dict[str, float]:
@@ -234,6 +244,11 @@ def _notes(findings: Findings) -> list[str]:
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(bench.training, findings.base)
     best = findings.decision.accepted
+    if best and best[0].leaves == LITTLE:
+        notes.append(
+            f"what effect.{best[0].name} leaves is little of the gap and yet more than noise: its law is not "
+            "quite this one, and errors of parameters count noise alone"
+        )
     if best and best[0].leaves == LARGER_NOISE:
         size = best[0].ceiling.fit.sample_chi2
         notes.append(
@@ -314,10 +329,20 @@ def _parameters(fitted: Fitted) -> dict:
                 "value": number,
                 "standard_error": one.slope(value) * float(error) if known else None,
                 "interval_95": sorted((low[path], high[path])) if known else None,
+                "at": _knot_of(path, fitted),
                 "note": "" if known else "at its bound" if held else "these records say nothing about it",
                 "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
             }
     return found
+
+
+def _knot_of(path: str, fitted: Fitted) -> str:
+    """The knot that a value of a table stands at, in words; '' of other parameters."""
+    for member in MEMBERS:
+        if member.knots and path.startswith(tuple(f"effect.{member.effect}.{key}[" for key in member.values)):
+            knot = fitted.model.parameters[f"effect.{member.effect}.{member.knots}{path[path.index('[') :]}"]
+            return f"{member.variable} {knot.value:.4g} {member.unit}"
+    return ""
 
 
 def _gap(findings: Findings) -> dict:

@@ -16,6 +16,8 @@ from separatrix.errors import SeparatrixError
 
 _FEWEST_PER_PERIOD = 12
 _FEWEST_PERIODS = 2.0
+# share by which a stated drive frequency may differ from that of a measured crank angle
+_OFF = 0.01
 # largest difference of the intervals of two pieces, over the interval, with a measured force
 _UNEVEN = 1e-2
 # sizes of a record against those of the machine beyond which a unit must be wrong
@@ -227,7 +229,12 @@ def from_measured_angle(prepared: Prepared) -> None:
     if prepared.frequency * record.duration < np.pi:
         raise SeparatrixError(
             f"{record.file}: 'phi' advances by {prepared.frequency * record.duration:.3g} rad in all: "
-            "not the angle of a turning crank"
+            "too short a record, or not the angle of a turning crank"
+        )
+    stated = record.header.get("drive_frequency_rad_s")
+    if stated is not None and abs(prepared.frequency / stated - 1) > _OFF:
+        prepared.notes.append(
+            f"drive_frequency_rad_s is {stated:g}, phi turns at {prepared.frequency:.4g} rad/s: that is taken"
         )
     # the errors of angle and rate are independent in the middle of the record
     prepared.origin = float(record.t.mean())

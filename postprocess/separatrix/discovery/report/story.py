@@ -5,6 +5,7 @@
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.wording import (
+    at_knot,
     digits_of,
     interval,
     number,
@@ -100,9 +101,8 @@ def _summary(verdict: dict) -> Section:
         one = verdict["parameters"][path]
         digits = digits_of(one["value"], one["standard_error"])
         known = "" if one["interval_95"] is None else "95 % interval "
-        lines.append(
-            f"{path} = {with_unit(one['value'], one['unit'], digits)}, {known}{interval(one, digits)}."
-        )
+        size = with_unit(one["value"], one["unit"], digits)
+        lines.append(f"{path}{at_knot(one)} = {size}, {known}{interval(one, digits)}.")
     if verdict["function"]:
         lines.append(f"{verdict['families'][-1].capitalize()}: {verdict['function']['text']}.")
     for use, one in verdict["gap"].items():
@@ -215,7 +215,9 @@ def _where(verdict: dict) -> Section:
     if not verdict["where"]:
         said: list = ["No bin of any map differs from zero by more than chance."]
     else:
+        no_gap = ["There is no gap: what follows is what noise and small faults of a rig leave."]
         said = [
+            *(no_gap if verdict["outcome"] == "none" else []),
             "In each bin a constant force is fitted to what the base machine leaves over. These bins "
             "differ from zero by "
             "more than chance, given how many bins there are:",
@@ -322,7 +324,7 @@ def _parameters(verdict: dict) -> Section:
         digits = digits_of(one["value"], one["standard_error"])
         rows.append(
             [
-                path,
+                path + at_knot(one),
                 number(one["value"], digits),
                 "-" if one["standard_error"] is None else number(one["standard_error"], 2),
                 interval(one, digits),
