@@ -201,6 +201,30 @@ def test_a_function_that_cannot_do_what_an_effect_does_is_not_drawn_for_it():
     assert (verdict["effects"], verdict["function"]) == (["drive_ripple"], None)
 
 
+def test_what_ripples_with_a_measured_crank_moves_its_first_harmonic_too():
+    """A crank that runs ahead and behind twice a turn: the phase is measured and cannot take that in."""
+    without = base()
+    harmonics = {"cosine[1]": 0.0, "cosine[2]": 0.0, "cosine[3]": 0.002}
+    harmonics |= {"sine[1]": -0.002, "sine[2]": 0.0, "sine[3]": 0.002}
+    true = without.with_effect("drive_harmonics", harmonics)
+    random = np.random.default_rng(7)
+    records = []
+    for record in records_of(true):
+        ratio = record.header["drive_ratio"]
+        angle = 0.4 + without.drive_frequency({"drive.ratio": ratio}) * record.t
+        angle += 1e-4 * random.standard_normal(angle.size)
+        columns = {"t": record.t, "x": record.x, "phi": angle}
+        header = {"units": "s, m, rad", "sensor_noise_sigma_m": SIGMA}
+        records.append(make_record(record.name, columns, header))
+    options = Options(quick=True, candidates=("drive_ripple",))
+    verdict, _ = investigate(without, records[:2], records[2:], options)
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["drive_harmonics"])
+    for path, value in harmonics.items():
+        if path != "cosine[1]":
+            found = verdict["parameters"][f"effect.drive_harmonics.{path}"]
+            assert abs(found["value"] - value) < 4 * found["standard_error"] + 1e-5
+
+
 def test_harmonics_of_the_drive_are_found_as_a_function():
     without = base()
     harmonics = {"cosine[1]": 0.0, "cosine[2]": 0.004, "cosine[3]": -0.002}

@@ -145,7 +145,7 @@ def with_table(
     free = [
         one for one in base.problem.free if not (member.replaces and one.path.startswith(member.replaces))
     ]
-    added, start = _table(member, begun, alike)
+    added, start = _table(member, begun, alike, any(one.phase_known for one in data.prepared))
     if member.beside:
         key, of = member.beside
         added.append(Free(f"effect.{member.effect}.{key}", 0.0, 0.0, np.inf, max(of(known), 1e-6)))
@@ -189,13 +189,15 @@ def table_of(fitted: Fitted, member: Member) -> list[tuple[np.ndarray, np.ndarra
     return found
 
 
-def _table(member: Member, begun: list[np.ndarray], alike: bool) -> tuple[list[Free], list[float]]:
-    """The free values of a table, and those to start from."""
+def _table(
+    member: Member, begun: list[np.ndarray], alike: bool, turns: bool
+) -> tuple[list[Free], list[float]]:
+    """The free values of a table, and those to start from; `turns`: a crank angle is measured."""
     added, start = [], []
     bound = (-1.0, np.inf if member.by_share else 1.0) if member.anchor else (member.least, np.inf)
-    # what the anchor, or scale and phase of the drive, would only repeat
-    first = 1 if member.anchor or not member.knots else 0
     for key, whole in zip(member.values[:1] if alike else member.values, begun, strict=False):
+        # what the anchor, or scale and phase of the drive, would only repeat; a measured phase is not free
+        first = 1 if member.anchor or not (member.knots or (turns and key == "sine")) else 0
         table, size = whole, 0.05 * max(float(np.max(np.abs(whole))), 1e-6)
         if member.anchor:
             table, size = whole - whole[0], 0.05
