@@ -83,7 +83,8 @@ def page_of(title: str, sections: list[Section]) -> str:
 
 def _html(one: Content) -> str:
     if isinstance(one, Beside):
-        return '<div class="beside">' + "".join(_html(each) for each in one.pictures) + "</div>"
+        pictures = "".join(_html(each) for each in one.pictures)
+        return f'<div class="beside">{pictures}</div>' if len(one.pictures) > 1 else pictures
     if isinstance(one, str):
         return f"<p>{escape(one)}</p>"
     if isinstance(one, list):
