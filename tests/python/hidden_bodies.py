@@ -15,6 +15,24 @@ import structures
 from scipy.integrate import solve_ivp
 from structures import Structure
 
+# the case of the owner is some per cent off in every number
+SPRINGS = """
+body.first.mass = 1
+body.second.mass = 0.8
+watch.body = "second"
+drive.force = {law = "force", body = "first", amplitude = 4.1, frequency = 7}
+run.duration = 20
+[spring.frame]
+between = ["first"]
+stiffness = 41
+damping = 0.28
+[spring.coupling]
+between = ["first", "second"]
+stiffness = 58
+damping = 0.22
+"""
+"""Two bodies in a row on springs, the first driven."""
+
 
 @dataclass
 class Sprung:

@@ -8,26 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_bodies import Sprung, record
+from hidden_bodies import SPRINGS, Sprung, record
 from separatrix.discovery import Options, discover
 from separatrix.errors import SeparatrixError
 from structures import Friction, Rigid, Soft, Structure
 
-# the case of the owner is some per cent off in every number
-TWO = """
-body.first.mass = 1
-body.second.mass = 0.8
-watch.body = "second"
-drive.force = {law = "force", body = "first", amplitude = 4.1, frequency = 7}
-run.duration = 20
-[spring.frame]
-between = ["first"]
-stiffness = 41
-damping = 0.28
-[spring.coupling]
-between = ["first", "second"]
-stiffness = 58
-damping = 0.22
+TWO = f"""{SPRINGS}
 [friction.rail]
 between = ["first"]
 force = 0.16
@@ -37,20 +23,7 @@ law = "newton"
 restitution = 0.73
 upper = 0.123
 """
-RAIL = """
-body.first.mass = 1
-body.second.mass = 0.8
-watch.body = "second"
-drive.force = {law = "force", body = "first", amplitude = 6.1, frequency = 5}
-run.duration = 20
-[spring.frame]
-between = ["first"]
-stiffness = 41
-damping = 0.28
-[spring.coupling]
-between = ["first", "second"]
-stiffness = 58
-damping = 0.22
+RAIL = f"""{SPRINGS.replace("amplitude = 4.1, frequency = 7", "amplitude = 6.1, frequency = 5")}
 [friction.rail]
 between = ["first"]
 force = 0.85

@@ -157,6 +157,16 @@ def test_channels_that_cannot_be_what_they_are_called_are_refused(channel, facto
         prepare(record, Model.from_text(CASE))
 
 
+@pytest.mark.parametrize(("stated", "told"), [(RATE, False), (12.0, True)])
+def test_a_stated_frequency_that_the_crank_contradicts_is_told(stated, told):
+    record = driven(np.arange(800) / 100, drive_frequency_rad_s=stated)
+    prepared = prepare(record, Model.from_text(CASE))
+    assert prepared.frequency == pytest.approx(RATE, rel=1e-9)
+    said = f"drive_frequency_rad_s is {stated:g}, phi turns at 9.9 rad/s: that is taken"
+    assert (said in prepared.notes) == told
+    assert any("drive_frequency" in one for one in prepared.notes) == told
+
+
 @pytest.mark.parametrize(("size", "accepted"), [(1.0, True), (-1.0, False)])
 def test_a_velocity_is_recognised_where_x_moves_less_than_its_noise_from_sample_to_sample(size, accepted):
     """As 50 000 samples at 4 kHz with noise of 1 % of the motion."""

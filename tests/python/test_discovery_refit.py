@@ -9,7 +9,7 @@ import pytest
 from separatrix.discovery.fitting import data as data_module
 from separatrix.discovery.fitting import refit
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.machine import FAULT_OF_RIG, Free
 from separatrix.discovery.fitting.refit import Fitted
 
 FREE = [Free("restoring.stiffness", 9.0), Free("effect.viscous.damping", 0.5, lower=0.0)]
@@ -42,6 +42,28 @@ def test_a_candidate_is_fitted_from_the_base_before_it_is_worse(
     found = refit._above_base(data, poor, base, candidate)
     assert found.fit.values.tolist() == wanted
     assert found.fit.converged == converged
+
+
+def test_a_motion_is_imitated_without_faults_of_the_rig_and_followed_with_them(monkeypatch):
+    """The motion of the other name is that of its machine: faults that records showed are not in it."""
+    fault = Free(f"{FAULT_OF_RIG}curve_2", 0.0, -3.0, 3.0, record=0)
+    free = [FREE[0], fault, FREE[1]]
+    problem = SimpleNamespace(free=free, evaluate=lambda *_, **__: None, imitating=lambda _: "imitated")
+    other = Fitted(("coulomb",), None, problem, fit([8.0, 1.5, 0.4], 100.0), (2,))
+    one = Fitted(("viscous",), None, problem, fit([9.0, 0.0, 0.5], 300.0), (2,))
+    candidate = SimpleNamespace(names=("viscous",), free=free, added=(2,), linear=np.array([True]))
+    begun = []
+
+    def minimise(problem, values, starts, most, fixed=None):
+        begun.append((problem, values.tolist(), None if fixed is None else fixed.tolist()))
+        # a tenth of the size of the other moves the machine by so much
+        return fit([8.1, *values[1:2], 0.02] if problem == "imitated" else values, 90.0)
+
+    monkeypatch.setattr(refit, "minimise", minimise)
+    monkeypatch.setattr(refit, "polished", lambda data, problem, fit, *_, **__: fit)
+    refit._imitated(SimpleNamespace(last=0), one, other, candidate)
+    assert begun[0] == ("imitated", [8.0, 0.0, 0.0], [False, True, False])
+    assert begun[1][1] == pytest.approx([9.0, 1.5, 0.2])
 
 
 @pytest.mark.parametrize(("linear", "added", "chi2", "far", "enough"), [

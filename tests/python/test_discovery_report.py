@@ -16,10 +16,13 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from program import CASE
+from separatrix.discovery.cli import summary
+from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import comparison
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.report.story import sections
+from separatrix.discovery.workflow import investigate
 from separatrix.library import Model
 
 SECTIONS = [
@@ -110,14 +113,17 @@ def verdict(outcome: str) -> dict:
     parameters = {
         "restoring.stiffness": {
             "value": 88.8833, "standard_error": 0.0804, "interval_95": [88.7257, 89.0409], "unit": "N/m",
+            "at": "",
         }
     }  # fmt: skip
     parameters["contact.stiffness"] = {
         "value": 1.0, "standard_error": None, "interval_95": None, "note": "at its bound", "unit": "N",
+        "at": "",
     }  # fmt: skip
     if found:
         parameters["effect.cubic_spring.stiffness"] = {
             "value": 9.83014, "standard_error": 0.8334, "interval_95": [8.19671, 11.4636], "unit": "N/m^3",
+            "at": "",
         }  # fmt: skip
     return {
         "outcome": outcome,
@@ -281,6 +287,50 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
         assert row[1] == (one["path"] or "-")
         assert same(row[2].split(" ")[0], one["size"])
         assert row[3] == one["reason"]
+
+
+def test_where_nothing_is_missing_no_region_misses_a_force(report: tuple) -> None:
+    told, page, _ = report
+    nothing = told["outcome"] == "none"
+    assert ("what follows is what noise and small faults of a rig leave" in page.text) == nothing
+    assert any(line.startswith("  where:") for line in summary(told)) != nothing
+
+
+def test_a_value_of_a_table_is_told_with_its_knot() -> None:
+    told = verdict("named")
+    path = "effect.cubic_spring.stiffness"
+    told["parameters"][path]["at"] = "stretch 0.2 m"
+    assert any(line.startswith(f"  {path} at stretch 0.2 m = ") for line in summary(told))
+    assert any(line.startswith(f"{path} at stretch 0.2 m = ") for line in sections(told)[0].body[1])
+
+
+def test_a_motion_that_is_to_be_driven_faster_says_how_much() -> None:
+    told = verdict("ambiguous")
+    told["experiments"] = [{"drive_ratio": None, "scale": 2.0, "rate": 4.0, "d_prime": 9.0, "text": ""}]
+    table = next(one for one in sections(told) if one.key == "next").body[1]
+    assert (table.head[0], table.rows) == ("times as fast", [["4", "2", "9"]])
+
+
+def test_the_verdicts_here_have_the_keys_of_those_of_the_workflow(library: Path) -> None:
+    base = Model.from_text(CASE)
+    true = base.with_effect("viscous", {"damping": 0.5})
+    t, records = np.arange(600) / 100, []
+    for number, ratio in enumerate((0.8, 1.25, 0.95)):
+        motion = true.segments(
+            ["drive.ratio"], np.array([ratio]), np.array([(0.6, 0.5, 0.4)]), [0, t.size], t, derivatives=False
+        )
+        x = motion.x + 1e-3 * np.random.default_rng(number).standard_normal(t.size)
+        records.append(make_record(f"r{number}", {"t": t, "x": x}, {"drive_ratio": ratio, "phase": 0.4}))
+    options = Options(quick=True, candidates=("viscous",))
+    real, _ = investigate(base, records[:2], records[2:], options)
+    assert real["outcome"] == "named"
+    ours = verdict("named")
+    assert ours.keys() <= real.keys()
+    for key in ("gap", "records", "candidates", "parameters"):
+        one, other = (
+            told[key] if isinstance(told[key], list) else [*told[key].values()] for told in (ours, real)
+        )
+        assert one[0].keys() <= other[0].keys(), key
 
 
 def test_the_excess_that_was_removed(report: tuple) -> None:

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from hidden_bodies import SPRINGS
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.machine import record_nuisances
 from separatrix.discovery.fitting.sensed import gather_sensed
@@ -16,21 +17,6 @@ from separatrix.library import Model
 
 pytestmark = pytest.mark.usefixtures("library")
 
-TWO = """
-body.first.mass = 1
-body.second.mass = 0.8
-watch.body = "second"
-drive.force = {law = "force", body = "first", amplitude = 4, frequency = 7}
-run.duration = 20
-[spring.frame]
-between = ["first"]
-stiffness = 40
-damping = 0.3
-[spring.coupling]
-between = ["first", "second"]
-stiffness = 60
-damping = 0.2
-"""
 RATE, START = 7.3, 0.7
 T = np.arange(1000) / 100
 X, V = np.sin(RATE * T), RATE * np.cos(RATE * T)
@@ -60,7 +46,7 @@ def record(**columns: np.ndarray) -> Record:
     ],
 )
 def test_x_and_v_are_of_the_watched_body_also_beside_named_columns(columns, found):
-    whole, model = record(**columns), Model.from_text(TWO)
+    whole, model = record(**columns), Model.from_text(SPRINGS)
     for one in (whole, _cut(whole, 0, 900, "")):
         prepared = prepare_sensors(one, model)
         assert [sensor.name for sensor in prepared.sensors] == found
@@ -77,7 +63,7 @@ def test_x_and_v_are_of_the_watched_body_also_beside_named_columns(columns, foun
 def test_a_body_with_two_columns_of_a_kind_is_refused(kind):
     columns = {"x": X, kind: X, f"{kind}_second": X}
     with pytest.raises(SeparatrixError, match=f"columns {kind} and {kind}.second, allowed one of them"):
-        prepare_sensors(record(**columns), Model.from_text(TWO))
+        prepare_sensors(record(**columns), Model.from_text(SPRINGS))
 
 
 def test_x_beside_a_named_place_is_tested_for_clipping():
@@ -96,7 +82,7 @@ def turned(t: np.ndarray, rate: float, noise: float = 0.0, **header: float) -> R
 @pytest.mark.parametrize("stated", [0.0, 1e-3, 4e-3])
 def test_a_noisy_crank_angle_is_known_within_its_error(stated):
     header = {"phi_noise_sigma_rad": stated} if stated else {}
-    one = prepare_sensors(turned(T, RATE, 1e-3, **header), Model.from_text(TWO))
+    one = prepare_sensors(turned(T, RATE, 1e-3, **header), Model.from_text(SPRINGS))
     assert one.phase_known
     # where errors of angle and rate are independent
     assert one.origin == pytest.approx(T.mean())
@@ -112,7 +98,7 @@ def test_a_noisy_crank_angle_is_known_within_its_error(stated):
 
 
 def test_the_error_of_a_crank_angle_counts_in_the_fit():
-    model = Model.from_text(TWO)
+    model = Model.from_text(SPRINGS)
     one = prepare_sensors(turned(T, RATE, 1e-3), model)
     first = np.arange(0, T.size, 100)
     free = record_nuisances([one])
@@ -139,4 +125,4 @@ def test_the_error_of_a_crank_angle_counts_in_the_fit():
 )
 def test_an_angle_that_tells_no_drive_is_refused(t, rate, words):
     with pytest.raises(SeparatrixError, match=f"turned: .*{words}"):
-        prepare_sensors(turned(t, rate), Model.from_text(TWO))
+        prepare_sensors(turned(t, rate), Model.from_text(SPRINGS))

@@ -10,11 +10,14 @@ from program import CASE
 from scipy.signal import lfilter
 from scipy.stats import chi2
 from separatrix.discovery import Options, discover
-from separatrix.discovery.decision.judge import Judged, adequate, sizeable
+from separatrix.discovery.decision.judge import LARGER_NOISE, LITTLE, NOISE, Judged, adequate, sizeable
 from separatrix.discovery.decision.remains import Remains, share_text
+from separatrix.discovery.decision.verdict import _hump, _of_accepted
 from separatrix.discovery.fitting.ceiling import Ceiling, Family
 from separatrix.discovery.fitting.machine import drive_nuisances
+from separatrix.discovery.fitting.members import MEMBERS
 from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.smooth import Part
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded
@@ -136,6 +139,34 @@ def test_what_a_force_depends_on_is_what_explains_most(speed, place, pieces, mos
     gains = {"speed": speed, "place": place, "pieces": pieces}
     families = [Family(name, gain, 5, float(chi2.sf(gain, 5))) for name, gain in gains.items()]
     assert Ceiling(families, None).mostly == mostly
+
+
+def test_a_law_that_leaves_more_than_noise_says_that_its_errors_count_noise_alone():
+    def said(leaves: str, beside: bool) -> list[str]:
+        left = SimpleNamespace(fit=SimpleNamespace(sample_chi2=1.44))
+        told = SimpleNamespace(beside_faults=beside)
+        return _of_accepted(SimpleNamespace(leaves=leaves, name="viscous", ceiling=left, prediction=told))
+
+    assert said(NOISE, False) == []
+    assert "errors of parameters count noise alone" in said(LITTLE, False)[0]
+    assert "1.2 times as large" in said(LARGER_NOISE, False)[0]
+    (note,) = said(NOISE, True)
+    assert "beside small faults of the rig" in note
+
+
+def test_a_function_is_told_with_its_hump():
+    none = np.zeros((5, 5))
+    member = next(one for one in MEMBERS if one.effect == "friction_place_curve")
+    at = np.linspace(-0.02, 0.02, 5)
+
+    def hump(value: list[float], error: float) -> str:
+        part = Part("", at, np.array(value), error**2 * np.eye(5), none, none[0], none[0])
+        return _hump(part, member)
+
+    assert hump([0.06, 0.07, 0.096, 0.07, 0.059], 0.001) == " through 0.096 at 0 m"
+    assert hump([0.06, 0.05, 0.02, 0.05, 0.059], 0.001) == " through 0.02 at 0 m"
+    assert hump([0.06, 0.07, 0.08, 0.09, 0.10], 0.001) == ""
+    assert hump([0.06, 0.07, 0.096, 0.07, 0.059], 0.02) == ""
 
 
 def test_what_remains_is_told_in_words():

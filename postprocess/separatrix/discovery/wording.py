@@ -81,7 +81,7 @@ def with_error(one: dict) -> str:
 
 def at_knot(one: dict) -> str:
     """Where a value of a table stands, with a space before it; nothing of other parameters."""
-    return f" at {one['at']}" if one.get("at") else ""
+    return f" at {one['at']}" if one["at"] else ""
 
 
 def interval(one: dict, digits: int) -> str:

@@ -54,16 +54,17 @@ def _held_against_it(bench: Bench, decision: Decision) -> Decision:
         weigh_faults(bench, table)
     pass_gates(bench, table, found.base, [], found.screened.tests)
     judge_ceiling(bench, table)
-    if all(table.gates.values()) and clear_of(table, best, bench.options):
+    passes = all(table.gates.values())
+    if passes and clear_of(table, best, bench.options):
         bare = replace(decision, accepted=[], rivals=[], alternatives=[], reasons=[], function=None)
         return with_function(bench, conclude(bench, bare, table, []))
     # small faults of the rig bend a function, too
     own = share_beside_faults(table.fitted, best.fitted) * function.gain
     if chi2.sf(own, table.parameters) > LIKELY:
         return decision
-    first = table if all(table.gates.values()) and lead(table, best) > 0 else best
-    others = {one.name: one for one in (best, *decision.rivals, table) if one.name != first.name}
-    rivals = list(others.values())
+    first = table if passes and lead(table, best) > 0 else best
+    every = {one.name: one for one in (best, *decision.rivals, table)}
+    rivals = [one for name, one in every.items() if name != first.name]
     return replace(
         decision,
         outcome="ambiguous",

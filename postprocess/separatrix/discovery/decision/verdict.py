@@ -195,7 +195,7 @@ def _hump(one: Part, member: Member) -> str:
     place = int(np.argmax(outside))
     if not outside[place] > 2 * one.error[place]:
         return ""
-    return f" by {one.value[place]:.4g} at {one.at[place]:.3g} {member.unit}"
+    return f" through {one.value[place]:.4g} at {one.at[place]:.3g} {member.unit}"
 
 
 def d_prime(found: Round) -> dict[str, float]:
@@ -244,17 +244,7 @@ def _notes(findings: Findings) -> list[str]:
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(bench.training, findings.base)
     best = findings.decision.accepted
-    if best and best[0].leaves == LITTLE:
-        notes.append(
-            f"what effect.{best[0].name} leaves is little of the gap and yet more than noise: its law is not "
-            "quite this one, and errors of parameters count noise alone"
-        )
-    if best and best[0].leaves == LARGER_NOISE:
-        size = best[0].ceiling.fit.sample_chi2
-        notes.append(
-            f"reduced chi^2 is {size:.3g} with effect.{best[0].name}, and no force explains more: the noise "
-            f"is taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
-        )
+    notes += _of_accepted(best[0]) if best else []
     fit = findings.base.fit
     if not fit.converged:
         notes.append("the base machine did not converge")
@@ -263,11 +253,6 @@ def _notes(findings: Findings) -> list[str]:
         notes.append(f"the fit of effect.{added.name} did not converge")
     for _, data, fitted in fits:
         notes += unused(data, fitted.fit)
-    if best and best[0].prediction is not None and best[0].prediction.beside_faults:
-        notes.append(
-            "held-out records are foretold, and their gap is told, by the parameters as they are beside "
-            "small faults of the rig; those of the verdict and of extended.toml are as fitted"
-        )
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     if contact and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
@@ -275,6 +260,28 @@ def _notes(findings: Findings) -> list[str]:
             ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][2].fit) else ""
         )
         notes.append(f"no impacts are seen in the records{why}; the fitted machine has {hits}")
+    return notes
+
+
+def _of_accepted(best: Judged) -> list[str]:
+    """What the numbers of an accepted effect do not say by themselves."""
+    notes = []
+    if best.leaves == LITTLE:
+        notes.append(
+            f"what effect.{best.name} leaves is little of the gap and yet more than noise: its law is not "
+            "quite this one, and errors of parameters count noise alone"
+        )
+    if best.leaves == LARGER_NOISE:
+        size = best.ceiling.fit.sample_chi2
+        notes.append(
+            f"reduced chi^2 is {size:.3g} with effect.{best.name}, and no force explains more: the noise "
+            f"is taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
+        )
+    if best.prediction is not None and best.prediction.beside_faults:
+        notes.append(
+            "held-out records are foretold, and their gap is told, by the parameters as they are beside "
+            "small faults of the rig; those of the verdict and of extended.toml are as fitted"
+        )
     return notes
 
 
@@ -338,9 +345,10 @@ def _parameters(fitted: Fitted) -> dict:
 
 def _knot_of(path: str, fitted: Fitted) -> str:
     """The knot that a value of a table stands at, in words; '' of other parameters."""
-    for member in MEMBERS:
-        if member.knots and path.startswith(tuple(f"effect.{member.effect}.{key}[" for key in member.values)):
-            knot = fitted.model.parameters[f"effect.{member.effect}.{member.knots}{path[path.index('[') :]}"]
+    table, bracket, place = path.partition("[")
+    for member in MEMBERS if bracket else ():
+        if member.knots and table in [f"effect.{member.effect}.{key}" for key in member.values]:
+            knot = fitted.model.parameters[f"effect.{member.effect}.{member.knots}[{place}"]
             return f"{member.variable} {knot.value:.4g} {member.unit}"
     return ""
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.machine import Free
-from separatrix.discovery.fitting.problem import Problem, padded_table
+from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.measured.bodies import Structure, structure_of
-from separatrix.discovery.measured.segments import Segments
+from separatrix.discovery.measured.segments import Segments, padded_table
 from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
 
 _TOLERANCE = 1e-10

@@ -11,7 +11,7 @@ from separatrix.discovery.fitting.forces import force_argument, force_needed
 from separatrix.discovery.fitting.late import DELAY, Flown, flown_late
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared
-from separatrix.discovery.measured.segments import Segments, padded, seeing
+from separatrix.discovery.measured.segments import Segments, padded, padded_table, seeing
 from separatrix.errors import SeparatrixError
 
 # of the adaptive flight, relative to the place counted from the origin: a third quicker than 1e-9; the share
@@ -494,10 +494,3 @@ class Problem:
             by_parameter[:, moves] += whole[:, :n]
             found.append((whole[:, n : n + 2], by_parameter))
         return found
-
-
-def padded_table(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Values of samples one after the other as a table by segment, 0 where a segment has none."""
-    table = np.zeros(inside.shape + flat.shape[1:])
-    table[inside] = flat
-    return table

@@ -283,9 +283,7 @@ class _Curve:
             # a closed form may begin elsewhere
             freed = self._known(origin=True) if self.member.origin else known
             centre = self.values + self.beside
-            found = (
-                None if known is None else smoothed(known.information, known.gradient, centre, self.penalty)
-            )
+            found = smoothed(known.information, known.gradient, centre, self.penalty)
             if found is None:
                 return None
             inner = np.linalg.solve(self._slopes(), found[0] - centre)
@@ -309,7 +307,7 @@ class _Curve:
         """Squares over the misfit by which the function follows the records better than a fitted machine."""
         return 2 * float(gain_over(self.fitted, fitted)[0]) / max(1.0, fitted.fit.reduced_chi2)
 
-    def _known(self, origin: bool = False) -> "_Known | None":
+    def _known(self, origin: bool = False) -> "_Known":
         """What records know of the values, all else free, the `origin` of their variable only if asked."""
         fit = self.fitted.fit
         scale = max(1.0, fit.reduced_chi2)

@@ -62,6 +62,13 @@ def padded(record: np.ndarray, first: np.ndarray, last: np.ndarray) -> Segments:
     return Segments(record, first, last, index, inside)
 
 
+def padded_table(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Values of samples one after the other as a table by segment, 0 where a segment has none."""
+    table = np.zeros(inside.shape + flat.shape[1:])
+    table[inside] = flat
+    return table
+
+
 def seeing(segments: Segments, records: list[Samples]) -> np.ndarray:
     """Samples of the segments (segments, length) whose velocity says something, if it was measured."""
     found = segments.inside.copy()
