@@ -228,7 +228,7 @@ def test_a_field_without_finite_values_is_drawn(tmp_path: Path, value: float) ->
         (["text.h5"], 65, "cannot be read as HDF5"),
         (["b.h5", "--field", "colour"], 64, "no field 'colour'; known fields: amplitude, attractor"),
         (["p.h5", "--field", "regime"], 64, "--field is for basin files"),
-        (["b.h5", "--formats", "gif"], 64, "not a list out of png, pdf, svg"),
+        (["b.h5", "--formats", "gif"], 64, "found 'gif', allowed a list out of png, pdf, svg"),
         (["b.h5", "--dpi", "0"], 64, "from 50 to 2400"),
         (["b.h5", "-o", "text.h5"], 73, "cannot be written"),
         ([], 64, "required"),
