@@ -12,6 +12,7 @@ import effects
 import figure
 import followed
 import records
+import seeds
 from bars import LONG, bars
 from markdown import table
 from rates import Rate, rate
@@ -173,6 +174,8 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "asked": asked,
         "unreachable": unreachable,
         "seed": seed,
+        "developed_on": seeds.developed_on(),
+        "of_this_seed": seeds.warning(seed),
         "version": versions(folders, found),
         "none": sum(one.kind == "none" for one in found),
         "single": sum(one.kind == "single" for one in found),

@@ -82,6 +82,17 @@ def test_the_command_line(source_dir, option, code):
     assert (option in result.stderr) == (code != 0)
 
 
+def test_a_seed_is_asked_for_and_the_page_says_whether_it_was_developed_on(campaign, monkeypatch, capsys):
+    import campaign as program
+    import seeds
+
+    monkeypatch.setattr(sys, "argv", ["discovery_campaign"])
+    assert program.main() == 64
+    assert f"{seeds.DEVELOPED_ON[0]}, {seeds.DEVELOPED_ON[1]}" in capsys.readouterr().err
+    assert "is not among them" in seeds.warning(max(seeds.DEVELOPED_ON) + 1)
+    assert all(f"{seed}, is one of them" in seeds.warning(seed) for seed in seeds.DEVELOPED_ON)
+
+
 def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_path, monkeypatch):
     import campaign as program
     import report
@@ -162,6 +173,7 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
             assert not (folder / "page.md").is_file()
         assert start(source_dir, folder, 0.0).wait(timeout=300) == 0
         results[name] = (folder / "page.md").read_text()
+        assert f"The seed of this page, {SEED}, is one of them." in results[name]
         found = sorted((folder / "out" / f"seed_{SEED}" / "results").glob("*.json"))
         assert all(json.loads(path.read_text())["verdict"]["effects"] == ["cubic_spring"] for path in found)
         assert [json.loads(path.read_text())["number"] for path in found] == list(range(CASES))

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seeds whose truths were looked at. Add one as soon as the method is changed after a look at its page."""
+
+DEVELOPED_ON = (
+    1,
+    3,
+    31,
+    41,
+    99,
+    1009,
+    2026,
+    2027,
+    2028,
+    3017,
+    4211,
+    4313,
+    5101,
+    5202,
+    5303,
+    5404,
+    6007,
+    9241,
+    51239,
+    60001,
+    70481,
+    90127,
+)
+
+
+def developed_on() -> str:
+    """The seeds that the method was developed on, in words."""
+    *first, last = map(str, DEVELOPED_ON)
+    return f"{', '.join(first)} and {last}"
+
+
+def warning(seed: int) -> str:
+    """What has to be said of a page of this seed; empty where nobody has looked."""
+    if seed in DEVELOPED_ON:
+        return f"**The seed of this page, {seed}, is one of them.**"
+    return "The seed of this page is not among them."
