@@ -19,7 +19,12 @@ from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import blocking, minimise
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.noise import Noise
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, gauss_newton_step
+from separatrix.discovery.fitting.normal_equations import (
+    blocks_of,
+    eliminate,
+    gauss_newton_step,
+    inverse_scaled,
+)
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.measured.signals import white_noise
@@ -71,6 +76,24 @@ def test_a_closed_parameter_stays(table):
     )
     assert step[1] == 0
     assert step[open_] == pytest.approx(other, abs=1e-12)
+
+
+def test_an_inverse_does_not_depend_on_the_units_and_leaves_out_what_is_not_known():
+    random = np.random.default_rng(5)
+    table = random.standard_normal((20, 5))
+    # one unknown without information, one the sum of two others, in units as of stiffness and of time
+    table[:, 1] = 0
+    table[:, 4] = table[:, 2] + table[:, 3]
+    known = np.array([True, False, True, True, True])
+    matrix = table.T @ table
+    inverse = inverse_scaled(matrix, known)
+    assert (inverse[1] == 0).all()
+    assert (inverse[:, 1] == 0).all()
+    # of what the data tell it is the covariance: the sum of both is known, they and their sum are not apart
+    assert np.allclose(matrix @ inverse @ matrix, matrix)
+    units = np.array([1e-9, 1.0, 1e7, 1e7, 1e7])
+    other = inverse_scaled(matrix * np.outer(units, units), known)
+    assert np.allclose(other * np.outer(units, units), inverse)
 
 
 def test_projection_leaves_what_a_regression_leaves(table):

@@ -18,7 +18,7 @@ from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
+from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import evidence_of_faults
 from separatrix.discovery.fitting.sensed import SensedData
@@ -221,8 +221,7 @@ def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant
     evidence = (0.5 * gain + 0.5 * foretold) / noise - rank - np.log(hypothesis.values.size)
     size = None
     if hypothesis.formula and count:
-        scaled, sizes = _scaled(matrix)
-        variance = noise * np.diag(np.linalg.pinv(scaled, hermitian=True)) / sizes**2
+        variance = noise * np.diag(inverse_scaled(matrix, np.diag(matrix) > 0, 1e-15))
         size = (float(values[p]), float(np.sqrt(variance[p])))
     chance = family_wise((gain + max(0.0, foretold)) / noise, max(1, rank), hypothesis.values.size)
     return Character(hypothesis, constant, closed, closed_held, evidence, chance, size)
@@ -237,10 +236,7 @@ def _columns(hypothesis: Hypothesis, motion: Motion, constant: float) -> tuple[n
 
 def _normal(motion: Motion, columns: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Normal equations of the parameters and the columns, starts eliminated."""
-    evaluation = motion.fit.evaluation
-    weights = evaluation.used * motion.fit.good[:, None]
-    whole = np.concatenate([evaluation.by_parameter, *columns], axis=2)
-    return eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0].total()
+    return motion.fit.normal_equations(motion.fit.evaluation.by_parameter, *columns).total()
 
 
 def _solved(

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from separatrix.discovery.fitting.forces import force_needed
+from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.errors import SeparatrixError
 
@@ -165,23 +166,13 @@ def _left(apart: np.ndarray, slopes: np.ndarray, count: int, seen: float, prior:
         matrix += seen * by_parameter.T @ by_parameter
         gradient += seen * by_parameter.T @ difference
         square += seen * float(difference @ difference)
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    step = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-11, hermitian=True) @ (gradient / size)
-    return float(np.sqrt(max(0.0, square - step @ (gradient / size))))
+    return _length(square, matrix, gradient)
 
 
 def _prior(one: Fitted, places: list[int]) -> np.ndarray:
     """What the records know of some free parameters: the inverse of their covariance."""
     covariance = one.covariance[np.ix_(places, places)]
-    known = np.flatnonzero(np.diag(covariance) > 0)
-    # parameters differ by many orders of magnitude in SI units
-    size = np.sqrt(np.diag(covariance)[known])
-    units = np.outer(size, size)
-    prior = np.zeros_like(covariance)
-    prior[np.ix_(known, known)] = (
-        np.linalg.pinv(covariance[np.ix_(known, known)] / units, hermitian=True) / units
-    )
-    return prior
+    return inverse_scaled(covariance, np.diag(covariance) > 0, 1e-15)
 
 
 def _along_other_motions(one: Fitted, others: list[Fitted]) -> list[Experiment]:
@@ -214,9 +205,13 @@ def _apart_in_force(one: Fitted, other: Fitted, scale: float, rate: float) -> fl
         return 0.0
     columns = np.column_stack(slopes)
     matrix, gradient = _prior(one, places) + columns.T @ columns, columns.T @ apart
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    step = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-11, hermitian=True) @ (gradient / size)
-    return float(np.sqrt(max(0.0, apart @ apart - step @ (gradient / size))))
+    return _length(apart @ apart, matrix, gradient)
+
+
+def _length(square: float, matrix: np.ndarray, gradient: np.ndarray) -> float:
+    """Length of a difference whose square is given, less what parameters imitate."""
+    imitated = gradient @ inverse_scaled(matrix, np.diag(matrix) > 0, 1e-11) @ gradient
+    return float(np.sqrt(max(0.0, square - imitated)))
 
 
 def _moved(one: Fitted, places: list[int]) -> Iterator[tuple[np.ndarray, float]]:

@@ -13,7 +13,7 @@ from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of, names_for
 from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.normal_equations import solve_scaled
 from separatrix.discovery.fitting.places import SensedScales
 from separatrix.discovery.fitting.refit import (
     Fitted,
@@ -311,11 +311,8 @@ def pair_gains(screen_round: Round) -> list[tuple[float, str, str]]:
     fit = screen_round.base.fit
     evaluation = fit.evaluation
     signatures = screen_round.signatures
-    columns = np.concatenate([evaluation.by_parameter, *[one.columns for one in signatures]], axis=2)
-    weights = evaluation.used * fit.good[:, None]
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))[
-        0
-    ].total()
+    columns = [evaluation.by_parameter, *[one.columns for one in signatures]]
+    matrix, gradient = fit.normal_equations(*columns).total()
     left, score = project(matrix, gradient, evaluation.by_parameter.shape[2], ~fit.at_bound)
     edges = np.cumsum([0, *[one.columns.shape[2] for one in signatures]])
     found = []

@@ -19,7 +19,7 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.joint_response import columns_of
 from separatrix.discovery.fitting.motions import after_impacts, impacts_at, scaled_motion
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.normal_equations import inverse_scaled, solve_scaled
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project
@@ -193,19 +193,13 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
     """One force per column, each by itself, and its error by block bootstrap."""
     fit = fitted.fit
     evaluation = fit.evaluation
-    weights = evaluation.used * fit.good[:, None]
     base = evaluation.by_parameter[:, :, ~fit.at_bound]
     p = base.shape[2]
-    whole = np.concatenate([base, columns], axis=2)
-    reduced = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[0]
+    reduced = fit.normal_equations(base, columns)
     diagonal = np.einsum("kii->ki", reduced.matrix)[:, p:]
     total, _ = reduced.total()
     # parameters of the base projected out, segment by segment, by the same combination of their columns
-    scale = 1 / np.sqrt(np.maximum(np.diag(total)[:p], 1e-300))
-    inner = np.linalg.pinv(total[:p, :p] * np.outer(scale, scale), rcond=1e-11, hermitian=True) * np.outer(
-        scale, scale
-    )
-    mixture = inner @ total[:p, p:]
+    mixture = inverse_scaled(total[:p, :p], np.diag(total)[:p] > 0, 1e-11) @ total[:p, p:]
     cross = reduced.matrix[:, p:, :p]
     size = (
         diagonal
@@ -230,12 +224,8 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
 def _gains(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
     """What the bins of each map together explain of chi^2, beyond chance."""
     fit = fitted.fit
-    evaluation, weights = fit.evaluation, fit.evaluation.used * fit.good[:, None]
-    p = evaluation.by_parameter.shape[2]
-    whole = np.concatenate([evaluation.by_parameter, columns], axis=2)
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[
-        0
-    ].total()
+    p = fit.evaluation.by_parameter.shape[2]
+    matrix, gradient = fit.normal_equations(fit.evaluation.by_parameter, columns).total()
     left, score = project(matrix, gradient, p, ~fit.at_bound)
     gains, edges = [], np.cumsum([0, *sizes])
     for first, last in itertools.pairwise(edges):

@@ -24,7 +24,6 @@ from separatrix.discovery.fitting.motions import (
     scaled_motion,
     splines,
 )
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.rig import cleaned
@@ -88,13 +87,8 @@ def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
 
 
 def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
-    evaluation = fit.evaluation
-    weights = evaluation.used * fit.good[:, None]
-    p = evaluation.by_parameter.shape[2]
-    whole = np.concatenate([evaluation.by_parameter, columns], axis=2)
-    matrix, gradient = eliminate(blocks_of(evaluation.by_start, whole, evaluation.residual, weights))[
-        0
-    ].total()
+    p = fit.evaluation.by_parameter.shape[2]
+    matrix, gradient = fit.normal_equations(fit.evaluation.by_parameter, columns).total()
     left, score = project(matrix, gradient, p, ~fit.at_bound)
     # relative to what the columns were before anything was projected out
     size = np.sqrt(np.maximum(np.diag(matrix)[p:], 1e-300))
@@ -111,8 +105,7 @@ def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int
     piece = np.minimum(np.arange(inside.shape[1])[None, :] * _PIECES // lengths[:, None], _PIECES - 1)
     forces = (piece[:, :, None] == np.arange(_PIECES)) * inside[:, :, None].astype(float)
     columns = force_columns(problem, fit, forces, mass)
-    weights = fit.evaluation.used * fit.good[:, None]
-    reduced = eliminate(blocks_of(fit.evaluation.by_start, columns, fit.evaluation.residual, weights))[0]
+    reduced = fit.normal_equations(columns)
     size = np.sqrt(np.maximum(np.einsum("kii->ki", reduced.matrix), 1e-300))
     scaled = reduced.matrix / (size[:, :, None] * size[:, None, :])
     values, vectors = np.linalg.eigh(scaled)

@@ -75,6 +75,13 @@ class Fit:
         most = max(_NEAR, 1e-4 * self.total, _KINK * max(1.0, self.reduced_chi2) if self.exhausted else 0.0)
         return bool(self.decrement < most and self.good.any() and not self.caught)
 
+    def normal_equations(self, *columns: np.ndarray) -> Reduced:
+        """Of derivatives of the residual (segments, samples, any), starts eliminated, over good segments."""
+        seen = self.evaluation
+        weights = seen.used * self.good[:, None]
+        whole = np.concatenate(columns, axis=2)
+        return eliminate(blocks_of(seen.by_start, whole, seen.residual, weights))[0]
+
     @property
     def good(self) -> np.ndarray:
         """Segments that were flown and whose impacts are steady."""

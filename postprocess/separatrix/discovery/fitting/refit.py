@@ -11,6 +11,7 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.data import Data, fit_stages, polished
 from separatrix.discovery.fitting.fit import Fit, blocking, minimise
 from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.screen import Screened
 
@@ -64,14 +65,8 @@ class Fitted:
     def covariance(self) -> np.ndarray:
         """Of all free parameters, starts projected out, enlarged where the fit is worse than the noise."""
         matrix = self.fit.reduced.matrix[self.fit.good].sum(axis=0)
-        open_ = np.flatnonzero(~self.fit.at_bound & (np.diag(matrix) > 0))
-        covariance = np.zeros_like(matrix)
-        if open_.size:
-            inner = matrix[np.ix_(open_, open_)]
-            scale = 1 / np.sqrt(np.diag(inner))
-            scaled = np.linalg.pinv(inner * np.outer(scale, scale), rcond=1e-10, hermitian=True)
-            covariance[np.ix_(open_, open_)] = scaled * np.outer(scale, scale)
-        return covariance * max(1.0, self.fit.reduced_chi2)
+        open_ = ~self.fit.at_bound & (np.diag(matrix) > 0)
+        return inverse_scaled(matrix, open_) * max(1.0, self.fit.reduced_chi2)
 
 
 def refit(

@@ -19,7 +19,7 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_forces import FAULT, fault_columns_of
 from separatrix.discovery.fitting.machine import FAULT_OF_RIG, Free
 from separatrix.discovery.fitting.motions import scaled_motion
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, inverse_scaled, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
 from separatrix.discovery.fitting.response import force_columns, in_swings
@@ -101,7 +101,7 @@ class Beside:
     def add_to(self, matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray) -> None:
         """Add what is known to normal equations whose first unknowns these are, and let them move."""
         m, seen = self.shift.size, np.diag(self.covariance) > 0
-        precision = _inverse(self.covariance, seen)
+        precision = inverse_scaled(self.covariance, seen)
         matrix[:m, :m] += precision
         gradient[:m] += precision @ self.shift
         open_[:m] |= seen
@@ -184,7 +184,7 @@ def beside_faults(problem: Problem, fit: Fit) -> Beside:
     matrix, _ = _bounded(matrix, gradient, p, open_)
     steps = solve_scaled(matrix, gradient, open_)[:p] - solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     shown = open_ & (np.diag(matrix) > 0)
-    covariance = _inverse(matrix, shown)[:p, :p]
+    covariance = inverse_scaled(matrix, shown)[:p, :p]
     return Beside(steps, covariance * max(1.0, cleaned(problem, fit).reduced_chi2))
 
 
@@ -192,20 +192,12 @@ def _equations(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.n
     """Columns of parameters and faults, their normal equations beside the starts, and which may move."""
     evaluation = fit.evaluation
     columns = np.concatenate([evaluation.by_parameter, fault_columns(problem, fit)], axis=2)
-    weights = evaluation.used * fit.good[:, None]
-    reduced, _, _ = eliminate(blocks_of(evaluation.by_start, columns, evaluation.residual, weights))
     faults = columns.shape[2] - evaluation.by_parameter.shape[2]
-    return columns, *reduced.total(), np.r_[~fit.at_bound & fit.movable, np.ones(faults, bool)]
-
-
-def _inverse(matrix: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric matrix in units of its diagonal, 0 of what is not shown."""
-    found = np.zeros_like(matrix)
-    inner = matrix[np.ix_(shown, shown)]
-    scale = 1 / np.sqrt(np.diag(inner))
-    units = np.outer(scale, scale)
-    found[np.ix_(shown, shown)] = np.linalg.pinv(inner * units, rcond=1e-10, hermitian=True) * units
-    return found
+    return (
+        columns,
+        *fit.normal_equations(columns).total(),
+        np.r_[~fit.at_bound & fit.movable, np.ones(faults, bool)],
+    )
 
 
 def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> tuple[np.ndarray, float]:
@@ -380,7 +372,7 @@ def _surprise(known: Beside | None) -> float:
     if known is None:
         return 0.0
     seen = np.diag(known.covariance) > 0
-    precision = _inverse(known.covariance, seen)
+    precision = inverse_scaled(known.covariance, seen)
     return _log_determinant(precision, seen) - float(known.shift @ precision @ known.shift)
 
 

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, solve_scaled
+from separatrix.discovery.fitting.normal_equations import solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 
 # bootstrap of the null
@@ -107,13 +107,9 @@ def _shown(problem: Problem, fit: Fit, candidate: Candidate, values: np.ndarray)
 
 def screen(fit: Fit, signatures: list[Signature]) -> Screened:
     """Project all signatures off starts and base parameters and compare them."""
-    evaluation = fit.evaluation
-    weights = evaluation.used * fit.good[:, None]
-    base = evaluation.by_parameter
+    base = fit.evaluation.by_parameter
     p = base.shape[2]
-    columns = np.concatenate([base, *[one.columns for one in signatures]], axis=2)
-    blocks = blocks_of(evaluation.by_start, columns, evaluation.residual, weights)
-    matrix, gradient = eliminate(blocks)[0].total()
+    matrix, gradient = fit.normal_equations(base, *[one.columns for one in signatures]).total()
     open_ = ~fit.at_bound
     left, score = project(matrix, gradient, p, open_)
     names = [one.name for one in signatures]

@@ -23,6 +23,7 @@ from separatrix.discovery.fitting.curves import (
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.members import Member, friction_at
+from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms
 from separatrix.discovery.fitting.spline import roughness, smoothed
@@ -320,9 +321,7 @@ class _Curve:
         if not origin:
             inside |= [one.path in self.member.origin for one in self.fitted.problem.free]
         open_ = np.flatnonzero(~inside & ~fit.at_bound & (np.diag(matrix) > 0))
-        size = np.sqrt(np.diag(matrix)[open_])
-        units = np.outer(size, size)
-        inner = np.linalg.pinv(matrix[np.ix_(open_, open_)] / units, rcond=1e-10, hermitian=True) / units
+        inner = inverse_scaled(matrix[np.ix_(open_, open_)], np.full(open_.size, True))
         across = matrix[np.ix_(self.places, open_)]
         back = np.linalg.inv(self._slopes())
         alone = matrix[np.ix_(self.places, self.places)] - across @ inner @ across.T
