@@ -217,22 +217,10 @@ class Model:
         `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
         takes the place of the measured force of the case; the crank angles of `start` are not looked at.
         """
-        for path in active:
-            if active.count(path) > 1:
-                raise CaseError(f"active: found '{path}' twice")
-        chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
-        start = np.asarray(start, float)
-        start = _array(start, (len(start), 3), "start")
-        if directions is None:
-            directions = np.eye(len(active))
-        if not derivatives:
-            directions = np.zeros((0, len(active)))
-        directions = _array(directions, (len(directions), len(active)), "directions")
+        chosen = self._along(active, values)
+        start, first, times = _many(start, 3, first, times)
+        directions = _directions(directions, len(active), derivatives)
         count = len(start)
-        first = np.ascontiguousarray(first, np.int32)
-        if first.shape != (count + 1,):
-            raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
-        times = _array(times, (int(first[-1]),), "times")
         start, interval, series = _with_force(start, first, times, force)
         m, columns = len(times), len(directions) + 3
         x, v = np.empty(m), np.empty(m)
@@ -306,18 +294,10 @@ class Model:
         All else is as for `segments`.
         """
         n = len(self.coordinates)
-        chosen = self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
-        start = _array(start, (len(start), 2 * n + 1), "start")
-        if directions is None:
-            directions = np.eye(len(active))
-        if not derivatives:
-            directions = np.zeros((0, len(active)))
-        directions = _array(directions, (len(directions), len(active)), "directions")
+        chosen = self._along(active, values)
+        start, first, times = _many(start, 2 * n + 1, first, times)
+        directions = _directions(directions, len(active), derivatives)
         count = len(start)
-        first = np.ascontiguousarray(first, np.int32)
-        if first.shape != (count + 1,):
-            raise CaseError(f"first: found shape {first.shape}, allowed ({count + 1},)")
-        times = _array(times, (int(first[-1]),), "times")
         motion = np.empty((times.size, 2 * n))
         slopes = np.empty((times.size, 2 * n, len(directions) + 2 * n + 1)) if derivatives else None
         report = np.zeros((3, count), np.int32)
@@ -361,6 +341,13 @@ class Model:
         """Return number, indices and values of parameters by path."""
         index = (ctypes.c_int * len(values))(*(self._find(path) for path in values))
         return len(values), index, (ctypes.c_double * len(values))(*values.values())
+
+    def _along(self, active: Sequence[str], values: np.ndarray) -> tuple[int, ctypes.Array, ctypes.Array]:
+        """Return number, indices and values of the parameters along which a flight is differentiated."""
+        for path in active:
+            if active.count(path) > 1:
+                raise CaseError(f"active: found '{path}' twice")
+        return self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
 
     def _find(self, path: str) -> int:
         if path not in self._index:
@@ -457,6 +444,28 @@ def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
     if array.shape != shape:
         raise CaseError(f"{name}: found shape {array.shape}, allowed {shape}")
     return array
+
+
+def _many(
+    start: np.ndarray, width: int, first: np.ndarray, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return starts (segments, width), where each one's samples begin, and their times, as the library reads
+    them."""
+    start = np.asarray(start, float)
+    start = _array(start, (len(start), width), "start")
+    first = np.ascontiguousarray(first, np.int32)
+    if first.shape != (len(start) + 1,):
+        raise CaseError(f"first: found shape {first.shape}, allowed ({len(start) + 1},)")
+    return start, first, _array(times, (int(first[-1]),), "times")
+
+
+def _directions(directions: np.ndarray | None, parameters: int, derivatives: bool) -> np.ndarray:
+    """Return the directions to differentiate along, a row each: as given, else each parameter by itself."""
+    if not derivatives:
+        return np.zeros((0, parameters))
+    if directions is None:
+        return np.eye(parameters)
+    return _array(directions, (len(directions), parameters), "directions")
 
 
 def _with_force(

@@ -71,23 +71,9 @@ class CoordinateProblem(Problem):
             "instant": instant,
         }
 
-    def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
-        """Values of the machine as it was during record `number`."""
-        chosen = {
-            path: number
-            for one, value in zip(self.free, values, strict=True)
-            if not one.is_nuisance
-            for path, number in one.numbers(value).items()
-        }
-        prepared = self.prepared[number]
-        scale = self._nuisance("nuisance:drive_scale", number, values, None)
-        if scale is not None or prepared.drive_scale != 1.0:
-            for path, value in self.amplitudes.items():
-                chosen[path] = prepared.drive_scale * (1.0 if scale is None else scale) * value
-        if prepared.frequency is not None:
-            clock = self._nuisance("nuisance:clock", number, values, 0.0)
-            chosen |= dict.fromkeys(self._frequencies, prepared.frequency * (1 + clock))
-        return chosen
+    def _driven_at(self, frequency: float, chosen: dict[str, float]) -> dict[str, float]:
+        """Every harmonic drive turns at the frequency of the record."""
+        return dict.fromkeys(self._frequencies, frequency)
 
     def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
         """No ratio of frequencies here."""

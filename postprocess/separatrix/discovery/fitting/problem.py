@@ -406,13 +406,17 @@ class Problem:
                 chosen[path] = prepared.drive_scale * (1.0 if scale is None else scale) * value
         if prepared.frequency is not None:
             frequency = prepared.frequency * (1 + self._nuisance("nuisance:clock", number, values, 0.0))
-            ratio = self.model.parameters["drive.ratio"].value
-            chosen["drive.ratio"] = ratio
-            chosen["drive.ratio"] = ratio * frequency / self.model.drive_frequency(chosen)
+            chosen |= self._driven_at(frequency, chosen)
         zero = self._nuisance(SENSOR_ZERO, number, values, None)
         if zero is not None:
             chosen[SENSOR_BIAS] = zero + chosen.get(SENSOR_BIAS, self.model.parameters[SENSOR_BIAS].value)
         return chosen
+
+    def _driven_at(self, frequency: float, chosen: dict[str, float]) -> dict[str, float]:
+        """What makes the drive of the machine with the chosen values turn at a frequency [rad/s]."""
+        ratio = self.model.parameters["drive.ratio"].value
+        frequency_of_ratio = self.model.drive_frequency(chosen | {"drive.ratio": ratio})
+        return {"drive.ratio": ratio * frequency / frequency_of_ratio}
 
     def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float | None) -> float | None:
         for one, value in zip(self.free, values, strict=True):
