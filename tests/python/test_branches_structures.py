@@ -483,7 +483,9 @@ drive = { law = "harmonic", amplitude = 0.5, ratio = 3 }
 }
 
 
-@pytest.mark.parametrize(("kind", "place"), [("structure", 3.00972484), ("one body", 4.098403)])
+@pytest.mark.parametrize(("kind", "place"), [
+    ("structure", 3.00972484), pytest.param("one body", 4.098403, marks=pytest.mark.long),
+])  # fmt: skip
 def test_the_start_of_the_case_is_at_its_crank_angle(separatrix: Path, tmp_path: Path, kind, place):
     """Near the resonant orbit of a hardening spring, beyond what is searched, a quarter of a period later."""
     (tmp_path / "case.toml").write_text(HARDENING[kind])

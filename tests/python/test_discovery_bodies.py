@@ -217,6 +217,7 @@ CASES = {
 }  # fmt: skip
 
 REPEATED = {
+    "place and forces",
     "a stop",
     "a pair",
     "friction with a spring",

@@ -182,7 +182,7 @@ def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
 @pytest.mark.parametrize(
     ("column", "factor", "partial"),
     [
-        ("force", 1e-3, False),
+        pytest.param("force", 1e-3, False, marks=pytest.mark.long),
         ("force", 1e-3, True),
         pytest.param("force", 9.81, False, marks=pytest.mark.long),
         pytest.param("x", 1e3, False, marks=pytest.mark.long),
