@@ -11,7 +11,8 @@ from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.base import _follows_better, fit_base
 from separatrix.discovery.fitting.curves import begun_at, fit_member, knots_at, with_table
 from separatrix.discovery.fitting.data import gather, scales_of
-from separatrix.discovery.fitting.members import MEMBERS
+from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.members import MEMBERS, friction_at
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.shapes import closed_forms, through
 from separatrix.discovery.fitting.smooth import function_of, roughness, smoothed
@@ -300,3 +301,23 @@ def test_a_fit_that_follows_nothing_is_no_good_one():
     assert not _follows_better(fit(0, 0.0), fit(9, 900.0))
     assert not _follows_better(fit(25, 9000.0), fit(12, 900.0))
     assert _follows_better(fit(25, 800.0), fit(25, 900.0))
+
+
+def test_friction_beside_one_that_differs_by_direction_is_that_of_its_own_law() -> None:
+    """0.05 of the weight at any speed; the asymmetry, which needs that friction, is not taken for its own."""
+    model = Model.from_text(CASE.format(contact=NEWTON)).with_effect("asymmetric_friction", {"coulomb": 0.03})
+    free = [
+        Free("friction.kinetic_coefficient", 0.05, 0, 1),
+        Free("effect.asymmetric_friction.coulomb", 0.03),
+    ]
+    known = SimpleNamespace(
+        model=model,
+        problem=SimpleNamespace(free=free, segments=SimpleNamespace(inside=np.ones((1, 3), bool))),
+        fit=SimpleNamespace(
+            values=np.array([0.05, 0.03]), good=np.array([True]),
+            evaluation=SimpleNamespace(x=np.full((1, 3), 0.4)),
+        ),
+    )  # fmt: skip
+    for direction in (1.0, -1.0):
+        found = friction_at(known, np.array([0.1, 0.5, 1.0]), direction)
+        assert found == pytest.approx(0.05 * 9.81, rel=1e-5)

@@ -199,14 +199,18 @@ def restitution_at(model, values: dict[str, float], speeds: np.ndarray) -> np.nd
     return np.abs(flown.impact.speed_after[first] / flown.impact.speed_before[first])
 
 
+_BY_DIRECTION = ("effect.asymmetric_friction.coulomb", "effect.asymmetric_friction.viscous")
+
+
 def friction_at(
     known: Fitted, speeds: np.ndarray, direction: float, base: Fitted | None = None
 ) -> np.ndarray:
     """Friction [N] against the motion in a direction: what slows a body down in the simulator.
 
     That of the known machine beyond that of the base with the numbers of its case; without `base` all of it.
+    An effect that differs by direction stays out of both: no machine has it without sliding friction.
     """
-    values = _values(known)
+    values = _values(known) | {path: 0.0 for path in _BY_DIRECTION if path in known.model.parameters}
     model = known.model if base is None else base.model
     without = {path: value for path, value in values.items() if path in model.parameters}
     if base is None:

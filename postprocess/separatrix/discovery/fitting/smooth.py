@@ -107,7 +107,8 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
     knots = knots_over(member, seen, _KNOTS_BESIDE_ZERO if member.beside else _KNOTS)
     try:
         settled = _settled(data, base, fitted, member, knots)
-    except np.linalg.LinAlgError:
+    except (np.linalg.LinAlgError, SeparatrixError):
+        # or a machine on the way that there is not
         return None
     if settled is None:
         return None
