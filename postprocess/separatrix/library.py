@@ -449,8 +449,7 @@ def _array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
 def _many(
     start: np.ndarray, width: int, first: np.ndarray, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return starts (segments, width), where each one's samples begin, and their times, as the library reads
-    them."""
+    """Return starts (segments, width), first samples and times, as the library reads them."""
     start = np.asarray(start, float)
     start = _array(start, (len(start), width), "start")
     first = np.ascontiguousarray(first, np.int32)

@@ -175,7 +175,7 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "unreachable": unreachable,
         "seed": seed,
         "developed_on": seeds.developed_on(),
-        "of_this_seed": seeds.warning(seed),
+        "of_this_seed": seeds.of_page(seed),
         "version": versions(folders, found),
         "none": sum(one.kind == "none" for one in found),
         "single": sum(one.kind == "single" for one in found),

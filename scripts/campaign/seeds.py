@@ -24,8 +24,11 @@ DEVELOPED_ON = (
     51239,
     60001,
     70481,
+    83477,
     90127,
 )
+BLIND_UP_TO = {83477: "cf4c090"}
+"""Of seeds that were looked at with verdicts on a page: the last commit that was judged before."""
 
 
 def developed_on() -> str:
@@ -34,8 +37,11 @@ def developed_on() -> str:
     return f"{', '.join(first)} and {last}"
 
 
-def warning(seed: int) -> str:
-    """What has to be said of a page of this seed; empty where nobody has looked."""
+def of_page(seed: int) -> str:
+    """What has to be said of a page of this seed."""
+    if seed in BLIND_UP_TO:
+        last = BLIND_UP_TO[seed]
+        return f"Verdicts on {seed} up to commit {last} were given before anybody looked, later ones not."
     if seed in DEVELOPED_ON:
         return f"**The seed of this page, {seed}, is one of them.**"
     return "The seed of this page is not among them."

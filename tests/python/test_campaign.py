@@ -89,8 +89,11 @@ def test_a_seed_is_asked_for_and_the_page_says_whether_it_was_developed_on(campa
     monkeypatch.setattr(sys, "argv", ["discovery_campaign"])
     assert program.main() == 64
     assert f"{seeds.DEVELOPED_ON[0]}, {seeds.DEVELOPED_ON[1]}" in capsys.readouterr().err
-    assert "is not among them" in seeds.warning(max(seeds.DEVELOPED_ON) + 1)
-    assert all(f"{seed}, is one of them" in seeds.warning(seed) for seed in seeds.DEVELOPED_ON)
+    assert "is not among them" in seeds.of_page(max(seeds.DEVELOPED_ON) + 1)
+    for seed in seeds.DEVELOPED_ON:
+        commit = seeds.BLIND_UP_TO.get(seed)
+        assert (f"up to commit {commit}" if commit else f"{seed}, is one of them") in seeds.of_page(seed)
+    assert set(seeds.BLIND_UP_TO) <= set(seeds.DEVELOPED_ON)
 
 
 def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, flexible, functions, judge, several
+from separatrix.discovery.decision import decide, flexible, judge, several
 from separatrix.discovery.decision.gates import foremost
 from separatrix.discovery.decision.judge import (
     Judged,
@@ -217,36 +217,6 @@ def test_a_table_of_friction_is_of_two_directions_unless_its_values_are_shared(n
     one = fitted(name, np.full(COUNT, 47.0))
     one.problem.free = [Free(f"effect.{name}.force_1", 1.0, also=also)]
     assert decide._of_two_directions(Judged(one, None, 0.0, 0.0, np.zeros(0), 1)) == two
-
-
-@pytest.mark.parametrize(("ahead", "passes", "first"), [
-    (44.0, True, "restitution_curve"),
-    (-44.0, True, "restitution_slope"),
-    (44.0, False, "restitution_slope"),
-])  # fmt: skip
-def test_a_form_that_its_function_refutes_leads_only_where_it_foretells_better(
-    monkeypatch, ahead, passes, first
-):
-    """The table is not clearly ahead: fitted and held-out records contradict each other."""
-    form, table = (
-        replace(judged(np.full(COUNT, 2.0), np.zeros(COUNT)), fitted=fitted(name, np.full(COUNT, 96.0)))
-        for name in ("restitution_slope", "restitution_curve")
-    )
-    member = SimpleNamespace(family="restitution over impact speed")
-    refuted = {"linear": {"fits": False, "p": 1e-9}}
-    function = SimpleNamespace(forms=refuted, member=member, gain=50.0)
-    monkeypatch.setattr(functions, "best_table", lambda *_: iter([table]))
-    monkeypatch.setattr(functions, "pass_gates", lambda _, one, *__: one.gates.update(detect=passes))
-    monkeypatch.setattr(functions, "judge_ceiling", lambda *_: None)
-    monkeypatch.setattr(functions, "clear_of", lambda *_: False)
-    monkeypatch.setattr(functions, "lead", lambda *_: ahead)
-    monkeypatch.setattr(functions, "share_beside_faults", lambda *_: 1.0)
-    found = SimpleNamespace(base=form.fitted, screened=SimpleNamespace(tests=1.0))
-    decision = decide.Decision("named", [form], [], [], [found], None, None, function=function)
-    given = functions._held_against_it(SimpleNamespace(options=OPTIONS), decision)
-    assert (given.outcome, [one.name for one in given.accepted]) == ("ambiguous", [first])
-    assert [one.name for one in given.rivals] == [{form.name: table, table.name: form}[first].name]
-    assert "has another form than restitution_slope" in given.reasons[-1]
 
 
 @pytest.mark.parametrize("foretells", [True, False])

@@ -322,7 +322,7 @@ class _Curve:
         if not origin:
             inside |= [one.path in self.member.origin for one in self.fitted.problem.free]
         open_ = np.flatnonzero(~inside & ~fit.at_bound & (np.diag(matrix) > 0))
-        inner = inverse_scaled(matrix[np.ix_(open_, open_)], np.full(open_.size, True))
+        inner = inverse_scaled(matrix, open_)[np.ix_(open_, open_)]
         across = matrix[np.ix_(self.places, open_)]
         back = np.linalg.inv(self._slopes())
         alone = matrix[np.ix_(self.places, self.places)] - across @ inner @ across.T
