@@ -100,13 +100,13 @@ class Accessor:
 
     def trajectory(
         self,
-        x0: float | None = None,
-        v0: float | None = None,
-        crank_angle: float | None = None,
+        x0: float | str | None = None,
+        v0: float | str | None = None,
+        crank_angle: float | str | None = None,
         *,
-        duration: float | None = None,
+        duration: float | str | None = None,
         samples: int | None = None,
-        **parameters: float,
+        **parameters: float | str,
     ) -> xr.Dataset:
         """Return the motion from a start; `drive__ratio=...` puts other values into the machine."""
         from separatrix.motions import trajectory

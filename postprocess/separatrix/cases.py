@@ -14,7 +14,7 @@ import numpy as np
 from separatrix.errors import NO_INPUT, USAGE, CaseError
 from separatrix.library import Model, Parameter
 
-__all__ = ["Case", "linspace", "load"]
+__all__ = ["Case", "linspace", "load", "number", "quantity"]
 
 # The program cuts an override that is longer.
 _LONGEST_SETTING = 4000
@@ -23,15 +23,20 @@ _SHORT = 60
 
 
 class linspace:  # noqa: N801
-    """`count` values from `first` to `last`, both exact: an axis in two numbers and a count."""
+    """`count` values from `first` to `last`, both exact: an axis in two numbers and a count.
 
-    def __init__(self, first: float, last: float, count: int) -> None:
+    The ends are numbers in SI units or texts with a unit.
+    """
+
+    def __init__(self, first: float | str, last: float | str, count: int) -> None:
         """Keep both ends and the count."""
-        self.first, self.last, self.count = float(first), float(last), int(count)
+        self.first, self.last = quantity("linspace", first), quantity("linspace", last)
+        self.count = int(number("linspace", count))
 
     def __repr__(self) -> str:
         """Show it as it was written."""
-        return f"linspace({self.first:g}, {self.last:g}, {self.count})"
+        ends = (repr(end) if isinstance(end, str) else f"{end:g}" for end in (self.first, self.last))
+        return f"linspace({', '.join(ends)}, {self.count})"
 
 
 class Case:
@@ -82,6 +87,28 @@ class Case:
         new = {**(changes or {}), **{key.replace("__", "."): value for key, value in more.items()}}
         settings = [f"{key}={toml(value)}" for key, value in new.items()]
         return type(self)(self._text, self._name, self._settings + tuple(settings), self._directory)
+
+    def in_si(self, path: str, value: float | str) -> float:
+        """Return a value of the key `path` in its SI unit.
+
+        A number is returned as it is, a text ("-3 mm") is read as in a case file; CaseError says what is
+        wrong.
+        """
+        if not isinstance(value, str):
+            return number(path, value)
+        # The axes of the case may not suit the value.
+        found: object = self.with_({"axis": [], path: value}).resolved
+        for key in path.split("."):
+            found = found[key]
+        return float(found)
+
+    def start(self, **given: float | str | None) -> dict[str, float]:
+        """Return x0 [m], v0 [m/s] and crank_angle [rad] of a start; what is None is that of the case."""
+        fixed = self.resolved["start"]
+        return {
+            name: float(fixed[name]) if value is None else self.in_si(f"start.{name}", value)
+            for name, value in given.items()
+        }
 
     @property
     def name(self) -> str:
@@ -180,6 +207,19 @@ def load(path: str | Path) -> Case:
 def as_case(case: "Case | str | Path") -> Case:
     """Return a case, which may be given by its file."""
     return case if isinstance(case, Case) else load(case)
+
+
+def number(name: str, value: object) -> float:
+    """Return a number; CaseError for what is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise CaseError(f"{name}: found {value!r}, allowed a number", USAGE) from None
+
+
+def quantity(name: str, value: object) -> float | str:
+    """Return a number, or a text that the case will read with its unit; CaseError for anything else."""
+    return value if isinstance(value, str) else number(name, value)
 
 
 def toml(value: object) -> str:

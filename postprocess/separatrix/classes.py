@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix import style
-from separatrix.labels import flag_text
+from separatrix.labels import flag_text, unit
 from separatrix.open import decode_word, flag_names, table
 
 CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
@@ -107,13 +107,32 @@ def _word_text(word: str) -> str:
 
 
 def _attractor_text(result: xr.Dataset, identity: int) -> str:
-    """Return 'attractor 1: non-impact, period 1' from the catalogue, over all of its slices."""
+    """Return 'attractor 1: non-impact, period 1' from the catalogue, over all of its slices.
+
+    Attractors of one class are told apart by their event words, or else by their amplitudes.
+    """
     catalogue = table(result, "catalogue")
     if "attractor" not in catalogue:
         return f"attractor {identity}"
-    mine = catalogue["attractor"].values == identity
-    if not mine.any():
+    ids = catalogue["attractor"].values
+    if identity not in ids:
         return f"attractor {identity}"
+    texts = {int(one): _class_text(result, catalogue, ids == one) for one in np.unique(ids)}
+    alike = [one for one, text in texts.items() if text == texts[identity] and one != identity]
+    apart = ""
+    if alike:
+        words = {one: _catalogue_word(catalogue, ids == one) for one in (identity, *alike)}
+        mine = words.pop(identity)
+        apart = (
+            f", {mine}"
+            if mine and mine not in words.values()
+            else _amplitude_text(catalogue, ids == identity)
+        )
+    return f"attractor {identity}: {texts[identity]}{apart}"
+
+
+def _class_text(result: xr.Dataset, catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return 'impact, period 2' of the entries of an attractor."""
     names = flag_names(result["regime"])
     regimes = [flag_text(names.get(int(r), str(r))) for r in np.unique(catalogue["regime"].values[mine])]
     periods = [int(p) for p in np.unique(catalogue["period"].values[mine])]
@@ -121,7 +140,22 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
         period = _aperiodic_text(catalogue, mine)
     else:
         period = ("period " if len(periods) == 1 else "periods ") + ", ".join(str(p) for p in periods)
-    return f"attractor {identity}: {' or '.join(regimes)}, {period}{_rotation_text(catalogue, mine)}"
+    return f"{' or '.join(regimes)}, {period}{_rotation_text(catalogue, mine)}"
+
+
+def _catalogue_word(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return the event word of an attractor; '' where it has none, or another one in each slice."""
+    words = np.unique(catalogue["event_word"].values[mine]) if "event_word" in catalogue else []
+    return decode_word(int(words[0])) if len(words) == 1 else ""
+
+
+def _amplitude_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
+    """Return ', amplitude 0.0155 m', or its range over the slices."""
+    if "amplitude" not in catalogue:
+        return ""
+    values = catalogue["amplitude"].values[mine]
+    ends = dict.fromkeys(f"{value:.4g}" for value in (values.min(), values.max()))
+    return f", amplitude {' to '.join(ends)} {unit(catalogue['amplitude'])}".rstrip()
 
 
 def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:

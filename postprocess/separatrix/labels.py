@@ -9,8 +9,8 @@ _SYMBOLS = {
     "x0": "initial position $x_0$",
     "v0": "initial velocity $v_0$",
     "crank_angle": r"initial crank angle $\varphi_0$",
-    "drive_ratio": r"frequency ratio $\Omega_p/\omega$",
-    "ratio": r"frequency ratio $\Omega_p/\omega$",
+    "drive_ratio": r"frequency ratio $\omega/\omega_0$",
+    "ratio": r"frequency ratio $\omega/\omega_0$",
     "time": "time $t$",
     "x": "position $x$",
     "v": "velocity $v$",
@@ -27,12 +27,12 @@ _SHORT = {
     "x0": "$x_0$",
     "v0": "$v_0$",
     "crank_angle": r"$\varphi_0$",
-    "drive_ratio": r"$\Omega_p/\omega$",
-    "ratio": r"$\Omega_p/\omega$",
+    "drive_ratio": r"$\omega/\omega_0$",
+    "ratio": r"$\omega/\omega_0$",
     "friction_kinetic_coefficient": r"$\mu$",
     "friction_static_coefficient": r"$\mu_s$",
-    "friction_damping": "$b$",
-    "contact_restitution": "$k$",
+    "friction_damping": "$c$",
+    "contact_restitution": "$e$",
 }
 
 

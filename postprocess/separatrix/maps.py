@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from separatrix.cases import Case, as_case, linspace
+from separatrix.cases import Case, as_case, linspace, quantity
 from separatrix.errors import USAGE, CaseError, Interrupted, SeparatrixError
 from separatrix.labelling import Labelling, SecondLookError, axis_values, can_label
 from separatrix.open import open_result
@@ -20,7 +20,16 @@ from separatrix.runner import StoppedError, cores, run
 
 __all__ = ["basin", "points", "sweep"]
 
-Values = linspace | tuple[float, float, int] | Sequence[float] | np.ndarray | int | float | None
+Values = (
+    linspace
+    | tuple[float | str, float | str, int]
+    | Sequence[float | str]
+    | np.ndarray
+    | int
+    | float
+    | str
+    | None
+)
 
 # Below so many points a second process takes longer to start than it saves.
 _FEW_POINTS = 50_000
@@ -128,8 +137,8 @@ def basin(
         Axes by name: `x0`, `v0`, `crank_angle`, or the path of a parameter (`{"drive.ratio": ...}`, as a
         keyword `drive__ratio=...`). Values are `sx.linspace(first, last, count)`, the same as a tuple
         `(first, last, count)`, an ascending list or array, or a whole number: that many values over the range
-        of the case. None takes an axis away. Axes of the case that are not named stay; new ones come first,
-        as the slowest.
+        of the case. Numbers are in SI units; texts have a unit ("-3 mm"). None takes an axis away. Axes of
+        the case that are not named stay; new ones come first, as the slowest.
     output
         The result file. Without one the result is kept in memory and computed in this process.
     threads, workers, ranks
@@ -218,7 +227,8 @@ def sweep(
             raise CaseError(f"sweep over {parameter}: values are missing", USAGE)
     if values is not None:
         table = {key: value for key, value in table.items() if key not in ("from", "to", "count", "values")}
-        table |= _even(_axis_values(table["parameter"], values, None))
+        swept = table["parameter"]
+        table |= _even(case, swept, _axis_values(swept, values, None))
     given = {
         "directions": directions, "starts": starts, "x0": x0, "v0": v0, "samples": samples,
         "limit_tolerance": limit_tolerance,
@@ -250,7 +260,7 @@ def points(
     The rest is as for `basin`.
     """
     case = as_case(case)
-    table = _starts(starts, columns)
+    table = _starts(case, starts, columns)
 
     def listed(place: Path) -> list[str]:
         path = place / "starts.csv"
@@ -310,23 +320,24 @@ def _axis_values(name: str, values: Values, old: Mapping[str, object] | None) ->
             )
         first, last = (old["from"], old["to"]) if "from" in old else (old["values"][0], old["values"][-1])
         return {"from": first, "to": last, "count": int(values)}
-    if isinstance(values, float | np.floating):
-        return {"values": [float(values)]}
+    if isinstance(values, float | np.floating | str):
+        return {"values": [quantity(name, values)]}
     if isinstance(values, tuple) and len(values) == 3 and isinstance(values[2], int | np.integer):
         values = linspace(*values)
     if isinstance(values, linspace):
         return {"from": values.first, "to": values.last, "count": values.count}
-    array = np.asarray(values, float)
+    array = np.asarray(values)
+    array = array if array.dtype.kind in "iuf" else np.asarray(values, object)
     if array.ndim != 1 or array.size == 0:
         raise CaseError(f"axis {name}: found shape {array.shape}, allowed a list of numbers", USAGE)
-    return {"values": array.tolist()}
+    return {"values": [quantity(name, value) for value in array]}
 
 
-def _even(axis: dict[str, object]) -> dict[str, object]:
+def _even(case: Case, parameter: str, axis: dict[str, object]) -> dict[str, object]:
     """Return first, last and count of values that have to be evenly spaced."""
     if "values" not in axis:
         return axis
-    values = np.array(axis["values"])
+    values = np.array([case.in_si(parameter, value) for value in axis["values"]])
     even = {"from": float(values[0]), "to": float(values[-1]), "count": values.size}
     if not np.allclose(axis_values(even), values, rtol=1e-12, atol=1e-12 * np.abs(values).max()):
         raise CaseError("values: found unevenly spaced ones, allowed for a sweep is sx.linspace(...)", USAGE)
@@ -359,7 +370,7 @@ def _workers(workers: int | None, ranks: int | None, number: int, name: str = "w
     return int(workers)
 
 
-def _starts(starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarray]:
+def _starts(case: Case, starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarray]:
     """Return the columns of a table of starts, equally long."""
     if starts is None:
         given = dict(columns)
@@ -372,7 +383,9 @@ def _starts(starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarr
             if not further or str(key) in ("x0", "v0", "ratio")
         }
     else:
-        array = np.asarray(starts, float)
+        array = np.asarray(starts)
+        if array.dtype.kind not in "iuf":
+            raise SeparatrixError("starts: found an array of texts or objects, allowed one of numbers", USAGE)
         if array.ndim != 2 or array.shape[1] not in (2, 3):
             raise SeparatrixError(f"starts: found shape {array.shape}, allowed (n, 2) or (n, 3)", USAGE)
         given = dict(zip(("x0", "v0", "ratio"), array.T, strict=False))
@@ -382,7 +395,18 @@ def _starts(starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarr
             f"starts: found the columns {', '.join(given) or 'none'}, allowed x0, v0 and optionally ratio",
             USAGE,
         )
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, float)) for value in given.values()))
+    columns = {name: np.atleast_1d(_column(case, name, value)) for name, value in given.items()}
+    arrays = np.broadcast_arrays(*columns.values())
     if arrays[0].ndim != 1:
         raise SeparatrixError(f"starts: found columns of shape {arrays[0].shape}, allowed lists", USAGE)
     return dict(zip(given, arrays, strict=True))
+
+
+def _column(case: Case, name: str, values: object) -> np.ndarray:
+    """Return a column of starts in SI units."""
+    column = np.asarray(values)
+    if column.dtype.kind in "iuf":
+        return column.astype(float)
+    path = "drive.ratio" if name == "ratio" else f"start.{name}"
+    numbers = [case.in_si(path, value) for value in np.asarray(values, object).ravel()]
+    return np.array(numbers, float).reshape(column.shape)

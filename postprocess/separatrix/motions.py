@@ -9,7 +9,7 @@ import xarray as xr
 
 import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
-from separatrix.cases import Case, as_case
+from separatrix.cases import Case, as_case, number
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.variables import EVENTS, KINDS, REASONS, REGIMES, SAMPLES, attributes
 from separatrix.version import __version__
@@ -24,11 +24,11 @@ _HUGE = 1e308
 
 def trajectory(
     case: Case | str | Path,
-    x0: float | None = None,
-    v0: float | None = None,
-    crank_angle: float | None = None,
+    x0: float | str | None = None,
+    v0: float | str | None = None,
+    crank_angle: float | str | None = None,
     *,
-    duration: float | None = None,
+    duration: float | str | None = None,
     samples: int | None = None,
 ) -> xr.Dataset:
     """Return one motion, equidistant samples and every event, as a file of `separatrix trajectory` has it.
@@ -38,20 +38,22 @@ def trajectory(
     case
         The machine, as a Case or the file of one.
     x0, v0, crank_angle
-        The start [m, m/s, rad]; what is not given is that of the case.
+        The start: numbers [m, m/s, rad] or texts with a unit ("-3 mm"); what is not given is that of the
+        case.
     duration
-        Seconds; that of the case if not given.
+        Seconds, or a text with a unit; that of the case if not given.
     samples
         Samples per drive period, two or more; those of the case if not given.
     """
     case = as_case(case)
-    if duration is not None and not 0 < duration < np.inf:
+    if isinstance(duration, str):
+        # The window is at most as long.
+        duration = case.with_({"run.window": duration}).in_si("run.duration", duration)
+    if duration is not None and not 0 < number("duration", duration) < np.inf:
         raise SeparatrixError(f"duration: found {duration}, allowed more than 0", USAGE)
     if samples is not None and samples < 2:
         raise SeparatrixError(f"samples: found {samples}, allowed 2 or more", USAGE)
-    fixed = case.resolved["start"]
-    given = {"x0": x0, "v0": v0, "crank_angle": crank_angle}
-    start = {name: float(fixed[name] if value is None else value) for name, value in given.items()}
+    start = case.start(x0=x0, v0=v0, crank_angle=crank_angle)
     motion = simulate.trajectory(
         case.model, tuple(start.values()), duration=duration or 0.0, samples_per_period=samples or 0
     )

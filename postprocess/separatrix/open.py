@@ -122,7 +122,10 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
             _check_header(path, attributes)
             return attributes, _read_provenance(file), [name for name in TABLES if name in file]
     except OSError as error:
-        raise SeparatrixError(f"{path}: cannot be read as HDF5 ({_first_line(error)})", BAD_DATA) from error
+        reason = _first_line(error)
+        if path.suffix == ".toml" and not h5py.is_hdf5(path):
+            reason = "found a case, allowed is a result; `separatrix basin` makes one of a case"
+        raise SeparatrixError(f"{path}: cannot be read as HDF5 ({reason})", BAD_DATA) from error
 
 
 def _check_header(path: Path, attributes: dict) -> None:

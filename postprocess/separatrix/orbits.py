@@ -11,7 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from separatrix.boundaries import file_of_map
-from separatrix.cases import Case, as_case, linspace, toml
+from separatrix.cases import Case, as_case, linspace, quantity, toml
 from separatrix.errors import CANNOT_CREATE, INTERNAL, USAGE, SeparatrixError
 from separatrix.maps import kept_in_memory, with_axes
 from separatrix.open import open_result
@@ -56,8 +56,8 @@ class Stability:
 def branches(
     case: Case | str | Path,
     parameter: str,
-    start: float | None = None,
-    stop: float | None = None,
+    start: float | str | None = None,
+    stop: float | str | None = None,
     *,
     searches: int | None = None,
     free: tuple[str, float, float] | None = None,
@@ -75,7 +75,8 @@ def branches(
     case
         The machine, as a Case or the file of one; one body or a structure.
     parameter, start, stop
-        The path of the parameter and its range; without one that of the sweep or the axis of the case.
+        The path of the parameter and its range, numbers or texts with a unit; without one that of the sweep
+        or the axis of the case.
     searches
         At how many values orbits are searched; 12 if not given.
     free
@@ -98,13 +99,14 @@ def branches(
     options = ["--parameter", parameter]
     for name, value in (("--from", start), ("--to", stop)):
         if value is not None:
-            options += [name, toml(value)]
+            options += [name, toml(case.in_si(parameter, value))]
     if searches is not None:
         options += ["--searches", str(searches)]
     if contacts:
         options += ["--contacts"]
     if free is not None:
-        options += ["--free", free[0], "--free-from", toml(free[1]), "--free-to", toml(free[2])]
+        options += ["--free", free[0], "--free-from", toml(case.in_si(free[0], free[1]))]
+        options += ["--free-to", toml(case.in_si(free[0], free[2]))]
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         target = (Path(folder) / "branches.h5" if output is None else Path(output).expanduser()).absolute()
         if output is not None and target.exists() and not overwrite:
@@ -119,9 +121,9 @@ def branches(
 
 def stability(
     case: Case | str | Path,
-    x0: float | None = None,
-    v0: float | None = None,
-    crank_angle: float | None = None,
+    x0: float | str | None = None,
+    v0: float | str | None = None,
+    crank_angle: float | str | None = None,
     *,
     periods: int | None = None,
 ) -> Stability:
@@ -132,12 +134,14 @@ def stability(
     case
         The machine, as a Case or the file of one; one body or a structure.
     x0, v0, crank_angle
-        The start [m, m/s, rad]; what is not given is that of the case.
+        The start: numbers [m, m/s, rad] or texts with a unit; what is not given is that of the case.
     periods
         Drive periods watched, after a quarter as many, 64 or more; 20000 if not given.
     """
     given = {"start.x0": x0, "start.v0": v0, "start.crank_angle": crank_angle}
-    case = as_case(case).with_({name: float(value) for name, value in given.items() if value is not None})
+    case = as_case(case).with_(
+        {name: quantity(name, value) for name, value in given.items() if value is not None}
+    )
     events: list[dict] = []
     options = [] if periods is None else ["--periods", str(periods)]
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:

@@ -67,15 +67,21 @@ contains
     type(chains_t), intent(out) :: chains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: mine(:), all_values(:), packed(:)
-    integer :: direction
+    logical :: here(2)
+    integer :: direction, done
     chains = new_chains(size(values), samples)
     chains%ran = ran
     allocate (mine(0))
+    here = ran .and. modulo([0, 1], team%size()) == team%rank()
+    ! Both directions are one stretch of work: its progress never goes back.
+    call journal%begin('values', count(here)*size(values, kind=int64), 0_int64)
+    done = 0
     do direction = 1, 2
-      if (.not. ran(direction) .or. modulo(direction - 1, team%size()) /= team%rank()) cycle
-      call journal%begin('values', size(values, kind=int64), 0_int64)
-      call run_chain(journal, time_limit, grid, span, path, values, direction == 1, samples, longest, tolerance, packed, error)
+      if (.not. here(direction)) cycle
+      call run_chain(journal, done, time_limit, grid, span, path, values, direction == 1, samples, longest, tolerance, packed, &
+                     error)
       if (allocated(error)) exit
+      done = done + size(values)
       mine = [mine, real(direction, wp), packed]
     end do
     call team%agree(error)
@@ -95,9 +101,10 @@ contains
   end function new_chains
 
   !> One chain as plain numbers: holds, samples, number of limits, and of each marks before and behind, the bracket in
-  !> steps, that of the settled motion, its outcome.
-  subroutine run_chain(journal, time_limit, grid, span, path, values, up, samples, longest, tolerance, packed, error)
+  !> steps, that of the settled motion, its outcome. `done` values were run before.
+  subroutine run_chain(journal, done, time_limit, grid, span, path, values, up, samples, longest, tolerance, packed, error)
     type(journal_t), intent(inout) :: journal
+    integer, intent(in) :: done
     real(wp), intent(in) :: time_limit
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
@@ -142,7 +149,7 @@ contains
         before = i
         state = held%state
       end if
-      call journal%progress(int(i, int64))
+      call journal%progress(int(done + i, int64))
       call check_stop(journal, time_limit, 'running '//trim(path)//trim(merge(' up  ', ' down', up)), error)
       if (allocated(error)) return
     end do

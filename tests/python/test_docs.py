@@ -86,6 +86,8 @@ def test_the_site_builds_without_a_warning(
 ) -> None:
     """All pages, the interfaces of Python and Fortran, and every link among them."""
     pytest.importorskip("myst_parser", reason="scripts/bootstrap.sh --docs installs what the site needs")
+    made = [*(DOCS / "reference").glob("*.md"), *(DOCS / "gallery").glob("*.md")]
+    kept = {path: path.read_text() for path in made}
     command = [
         sys.executable,
         DOCS.parent / "scripts" / "docs",
@@ -97,6 +99,7 @@ def test_the_site_builds_without_a_warning(
     ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+    assert [path.name for path in made if path.read_text() != kept[path]] == [], "scripts/docs --pages"
     home = (tmp_path / "site" / "index.html").read_text()
     assert "petals.png" in home and "Start in 60 seconds" in home
     for page in (tmp_path / "site").glob("*.html"):
@@ -105,6 +108,18 @@ def test_the_site_builds_without_a_warning(
             re.findall(r"<pre(?! tabindex)|<img(?![^>]* alt=)|role=.heading.(?! aria-level)", text) == []
         ), page
         assert '<html class="no-js" lang="en"' in text
+
+
+def test_links_between_documents_lead_somewhere() -> None:
+    """Who reads the documents in a checkout meets no dead link."""
+    top = DOCS.parent
+    dead = []
+    for page in [*top.glob("*.md"), *DOCS.rglob("*.md"), *(top / "src").rglob("*.md")]:
+        text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+        for link in re.findall(r"\]\(([^)\s#]+)[^)]*\)", text):
+            if not re.match("[a-z]+:", link) and not (page.parent / link).exists():
+                dead.append(f"{page.relative_to(top)}: {link}")
+    assert dead == []
 
 
 def test_the_links_of_a_site_are_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -169,7 +169,7 @@ def test_figures_say_what_they_show(tmp_path: Path, kind: str) -> None:
         assert "Separatrix 0.1.0" in figure.separatrix_caption
         for ax in figure.axes:
             assert ax.get_ylabel()
-            assert re.search(r"\((m|s|m/s)\)|Omega", ax.get_xlabel() or "(m)")
+            assert re.search(r"\((m|s|m/s)\)|omega", ax.get_xlabel() or "(m)")
 
 
 def test_nothing_of_a_figure_lies_over_another(tmp_path: Path) -> None:
@@ -353,17 +353,17 @@ def test_the_caption_of_a_map_has_the_start_values_that_are_no_axes(
     caption = draw(path, "regime").separatrix_caption
     assert text in caption
     assert sum(caption.count(symbol) for symbol in ("$x_0$", "$v_0$", "varphi")) == text.count("_0$")
-    assert ("Omega" in caption) == ("drive_ratio" not in axes)
+    assert ("omega" in caption) == ("drive_ratio" not in axes)
 
 
 def test_points_at_several_ratios_have_none_in_the_caption(tmp_path: Path) -> None:
     path = write_points(tmp_path / "p.h5")
     with open_result(path) as result:
-        assert "Omega" in points.scatter(result, "title").separatrix_caption
+        assert "omega" in points.scatter(result, "title").separatrix_caption
     with h5py.File(path, "r+") as file:
         file["ratio"][0] = 1.1
     with open_result(path) as result:
-        assert "Omega" not in points.scatter(result, "title").separatrix_caption
+        assert "omega" not in points.scatter(result, "title").separatrix_caption
 
 
 def test_holds_that_failed_are_not_drawn(tmp_path: Path) -> None:

@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 import separatrix as sx
 from figure_probes import V0, X0, colour_at, legend_texts
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
 from PIL import Image
 from program import CASE
 from sample_files import write_basin, write_sweep
 from separatrix import cli, style
+from separatrix.classes import classes
 from separatrix.errors import SeparatrixError
 from separatrix.figures import basin, section, sweep
 from separatrix.figures.animation import animate, ffmpeg
@@ -177,6 +180,33 @@ def test_captions_hold_every_number_of_the_machine(tmp_path: Path, library: Path
     assert result.separatrix.plot(caption="none").separatrix_caption == ""
 
 
+def test_captions_use_the_symbols_of_the_documents_and_name_every_unit(library: Path) -> None:
+    """m, c, k, e and omega as in docs/start.md; gravity only where it acts."""
+    soft = {"law": "kelvin_voigt", "stiffness": 87125, "damping": 0, "upper": 1.26e-3}
+    for friction, contact, holds, absent in (
+        ({"law": "viscous", "damping": 0.4}, soft, "$c$ = 0.4 N s/m|$k_c$ = 87125 N/m|$k$ = 200 N/m", "$g$"),
+        (
+            {"law": "coulomb", "kinetic_coefficient": 0.2},
+            {"law": "newton", "restitution": 0.8, "upper": 1.26e-3},
+            r"$g$ = 9.81 m/s$^{2}$|restitution $e$ = 0.8|$\mu$ = 0.2|$\omega/\omega_0$ = 2.6",
+            "$c$",
+        ),
+    ):
+        case = sx.Case.from_dict(
+            {
+                "body": {"mass": 0.5},
+                "restoring": {"law": "linear", "stiffness": 200},
+                "friction": friction,
+                "contact": contact,
+                "drive": {"law": "harmonic", "amplitude": 0.001, "ratio": 2.6},
+                "run": {"duration": 1.0},
+            }
+        )
+        caption = sx.trajectory(case).separatrix.plot("phase", caption="full").separatrix_caption
+        assert [piece for piece in holds.split("|") if piece not in caption] == []
+        assert absent not in caption
+
+
 def test_a_caption_tells_a_measured_force_by_its_samples(library: Path) -> None:
     """How many, of what size, how often, with units; those of a pendulum are a torque."""
     force = (2.0 * np.cos(2 * np.pi * np.arange(40) / 40)).tolist()
@@ -194,6 +224,60 @@ def test_a_caption_tells_a_measured_force_by_its_samples(library: Path) -> None:
         caption = result.separatrix.plot(caption="full").separatrix_caption
         assert "measured force drive, interval = 0.1 s" in caption
         assert f"force: 40 values from -2 to 2 {unit}, repeated;" in caption
+
+
+def test_attractors_of_one_class_are_told_apart(library: Path) -> None:
+    """By their event words where those differ, else by their amplitudes; others have neither."""
+    attractors = {"attractor": [1, 2, 3], "period": [2, 2, 1], "event_word": [0o71, 0o711, 0o71]}
+    result = sx.basin(sx.Case.from_text(CASE), x0=4, v0=4, progress=False)
+    for words, expected in (
+        ([0o711, 0o11, 0o7], ["impact, period 2, RR.", "impact, period 2, RR", "impact, period 1"]),
+        (
+            [0o711, 0o711, 0o711],
+            ["impact, period 2, amplitude 0.1 m", "impact, period 2, amplitude 0.25 m", "impact, period 1"],
+        ),
+    ):
+        catalogue = {name: ("entry", np.array(values)) for name, values in attractors.items()}
+        catalogue |= {
+            "event_word": ("entry", np.array(words)),
+            "regime": ("entry", np.full(3, 2)),
+            "amplitude": ("entry", np.array([0.1, 0.25, 0.3]), {"units": "m"}),
+        }
+        plain = result.drop_vars([name for name in result.variables if str(name).startswith("catalogue_")])
+        changed = plain.assign({f"catalogue_{name}": entry for name, entry in catalogue.items()})
+        texts = [entry.text for entry in classes(changed, "attractor", dict.fromkeys((1, 2, 3), 1))]
+        assert texts == [f"attractor {number}: {text}" for number, text in enumerate(expected, 1)]
+
+
+def longest(ax: Axes) -> Line2D:
+    return max(ax.lines, key=lambda line: len(line.get_xdata()))
+
+
+def test_figures_of_motions_points_and_branches_take_units(library: Path) -> None:
+    """Lengths, speeds and times of axes, barriers, captions and contacts alike."""
+    case = sx.Case.from_text(CASE).with_(
+        contact={"law": "kelvin_voigt", "stiffness": 1e4, "damping": 5, "upper": 1.2}
+    )
+    motion = sx.trajectory(case, 0.5, 8.0, duration=20.0, samples=200)
+    units = ["mm", "cm/s", "ms"]
+    for name in ("history", "phase", "contact"):
+        given, asked = (motion.separatrix.plot(name, units=wish) for wish in ([], units))
+        for before, after in zip(given.axes, asked.axes, strict=True):
+            for axis in ("x", "y"):
+                label = getattr(after, f"get_{axis}label")()
+                factor = next(
+                    (f for unit, f in zip(units, (1e3, 1e2, 1e3), strict=True) if f"({unit})" in label), 1
+                )
+                assert factor > 1 or "(N)" in label
+                data = [longest(ax).get_data()[axis == "y"] for ax in (before, after)]
+                ends = [np.array([np.nanmin(values), np.nanmax(values)]) for values in data]
+                assert ends[1] == pytest.approx(factor * ends[0], rel=1e-6)
+    caption = motion.separatrix.plot("phase", units=units).separatrix_caption
+    assert "$x_0$ = 500 mm, $v_0$ = 800 cm/s" in caption
+    starts = sx.points(sx.Case.from_text(CASE), x0=[0.1, 0.2, 0.3], v0=[0.0, 1.0, 2.0], progress=False)
+    drawn = starts.separatrix.plot(units=["mm"])
+    assert "(mm)" in drawn.axes[0].get_xlabel()
+    assert drawn.axes[0].collections[0].get_offsets()[:, 0].max() == pytest.approx(300.0)
 
 
 def test_marks_lie_on_the_attractors(library: Path) -> None:

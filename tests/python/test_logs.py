@@ -70,6 +70,16 @@ def test_progress_is_in_a_log_at_once(separatrix, tmp_path):
     process.wait()
 
 
+def test_progress_of_a_sweep_never_goes_back(separatrix, tmp_path):
+    """Both directions are one stretch of work."""
+    write_case(tmp_path)
+    sweep = ("--set=sweep.starts=[0, 0]", "--progress", "1e-6", "--json")
+    outcome = succeed(separatrix, "sweep", "case.toml", *sweep, "-o", "sweep.h5", folder=tmp_path)
+    told = [json.loads(line) for line in outcome.out.splitlines()]
+    done = [(line["done"], line["total"]) for line in told if line.get("of") == "values"]
+    assert done == [(number, 14) for number in range(1, 15)]
+
+
 def test_a_log_that_cannot_be_written(separatrix, tmp_path):
     write_case(tmp_path)
     outcome = run(separatrix, "basin", "case.toml", "--log", "none/run.jsonl", folder=tmp_path)

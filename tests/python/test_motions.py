@@ -278,7 +278,7 @@ def test_the_figures_of_a_plane_say_where_its_motions_start(results):
             captions[kind] = basin.basin_map(results[kind], result, "regime", "title").separatrix_caption
     assert "$x_0$ = 0.4 m, $v_0$ = 0 m/s" in captions["plane"]
     assert "$x_0$" not in captions["map"]
-    assert r"$\Omega_p/\omega$ = 1.2" in captions["map"]
+    assert r"$\omega/\omega_0$ = 1.2" in captions["map"]
     for kind in ("stack", "plane"):
-        assert r"$\Omega_p/\omega$" not in captions[kind]
+        assert r"$\omega/\omega_0$" not in captions[kind]
     assert r"$\mu" not in captions["plane"]

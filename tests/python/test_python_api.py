@@ -150,6 +150,35 @@ def test_cases_are_changed_by_the_rules_of_the_program(case: sx.Case) -> None:
     assert "contact.restitution=0.8" in repr(other)
 
 
+def test_values_have_units_wherever_a_case_has_them(case: sx.Case) -> None:
+    """A text with a unit is the number in SI units; what is neither is one line."""
+    assert sx.trajectory(case, "-3 mm", v0=0.5, duration="2 s", samples=4).equals(
+        sx.trajectory(case, -0.003, v0=0.5, duration=2.0, samples=4)
+    )
+    assert sx.points(case, x0=["-3 mm", 0.1], v0=0).x0.values.tolist() == [-0.003, 0.1]
+    few = sx.basin(case, x0=("-30 mm", "30 mm", 3), v0=["-1 cm/s", 0.5], progress=False)
+    assert few.x0.values.tolist() == [-0.03, 0.0, 0.03]
+    assert few.v0.values.tolist() == [-0.01, 0.5]
+    assert sx.basin(case, x0=2, v0="5 mm/s", progress=False).v0.values.tolist() == [0.005]
+    assert case.in_si("start.crank_angle", "180 deg") == pytest.approx(np.pi)
+    assert str(sx.stability(case, "-3 mm", periods=64)) == str(sx.stability(case, -0.003, periods=64))
+    calls = (
+        lambda value: sx.trajectory(case, value),
+        lambda value: sx.trajectory(case, duration=value),
+        lambda value: sx.stability(case, value),
+        lambda value: sx.points(case, x0=[value], v0=[0.0]),
+        lambda value: sx.basin(case, x0=(value, 1.0, 3)),
+        lambda value: sx.sweep(case, "drive.ratio", (value, 2.0, 3)),
+        lambda value: sx.branches(case, "drive.ratio", value, 2.0),
+    )
+    for call in calls:
+        for value in ("3 mg", "three", {}):
+            with pytest.raises(sx.CaseError) as refused:
+                call(value)
+            assert "found" in str(refused.value)
+            assert "\n" not in str(refused.value)
+
+
 def test_errors_say_what_the_program_says(case: sx.Case, tmp_path: Path) -> None:
     """File, line, key, found, allowed; all problems at once; nothing of the command line."""
     bad = tmp_path / "bad.toml"

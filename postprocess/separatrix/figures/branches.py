@@ -43,7 +43,7 @@ _LINES = {"SN": ("C0", "-"), "PD": ("C1", "--"), "GR": ("C2", "-."), "stick_onse
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figure of a file of branches by name."""
-    look.require("file of branches")
+    look.require("file of branches", "units")
     found = {"branches": diagram(result, title, look)}
     if result.sizes.get("curve_point"):
         found["curves"] = chart(result, title, look)
@@ -52,6 +52,7 @@ def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, F
 
 def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the curves of labelled points over both parameters, with their points of codimension two."""
+    result = look.selected(result)
     figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
     ax = figure.add_subplot()
     number, across, up = (result[name].values for name in ("curve", "curve_parameter", "curve_free"))
@@ -86,23 +87,25 @@ def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
 _TOUCH_BOTH = 0.25
 
 
-def height(result: xr.Dataset) -> tuple[np.ndarray, str]:
-    """Return what is drawn over the parameter, and its name.
+def height(result: xr.Dataset, look: Look = DEFAULT) -> tuple[np.ndarray, str]:
+    """Return what is drawn over the parameter, in the units asked for, and its name; `result` is in SI units.
 
     The amplitude; between two stops, where that of all that touches both is the play, a point on the section.
     Of a file of equilibria or of places of rest alone their position.
     """
     if "x_max" not in result:
         place = "equilibrium_x" if "equilibrium_x" in result else "rest_x_low"
-        return np.empty(0), f"position at rest ({unit(result[place])})"
+        return np.empty(0), f"position at rest ({look.unit(unit(result[place]))})"
     amplitude = (result["x_max"].values - result["x_min"].values) / 2
-    lengths = unit(result["x_max"])
+    factor, lengths = look.factor(unit(result["x_max"])), look.unit(unit(result["x_max"]))
     both = np.zeros(amplitude.shape, bool)
     for play in _plays(result):
         both |= np.isclose(amplitude, play / 2, rtol=1e-9, atol=0)
     if both.mean() < _TOUCH_BOTH:
-        return amplitude, rf"amplitude $(x_\mathrm{{max}} - x_\mathrm{{min}})/2$ ({lengths})"
-    return result["x"].values, f"{result['x'].attrs.get('long_name', 'position on the section')} ({lengths})"
+        return factor * amplitude, rf"amplitude $(x_\mathrm{{max}} - x_\mathrm{{min}})/2$ ({lengths})"
+    return factor * result[
+        "x"
+    ].values, f"{result['x'].attrs.get('long_name', 'position on the section')} ({lengths})"
 
 
 def _plays(result: xr.Dataset) -> list[np.ndarray]:
@@ -125,12 +128,14 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the amplitude of every orbit, or a point on its section, over the parameter."""
     figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
     ax = figure.add_subplot()
-    handles = draw(ax, result)
+    handles = draw(ax, result, look)
+    name = height(result, look)[1]
+    result = look.selected(result)
     parameters = ("parameter", "equilibrium_parameter", "rest_parameter")
     across = result[next(name for name in parameters if name in result)].copy()
     across.name = str(result.attrs["parameter"]).replace(".", "_")
     ax.set_xlabel(axis_label(across))
-    ax.set_ylabel(height(result)[1])
+    ax.set_ylabel(name)
     counts = []
     if "branch" in result:
         counts.append(f"{int(result['branch'].max())} branches from {int(result.attrs['seeds'])} seeds")
@@ -151,9 +156,10 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     return figure
 
 
-def draw(ax: Axes, result: xr.Dataset) -> list[Line2D]:
+def draw(ax: Axes, result: xr.Dataset, look: Look = DEFAULT) -> list[Line2D]:
     """Draw the branches of orbits and equilibria and their labelled points; return what the legend needs."""
-    up, name = height(result)
+    up, name = height(result, look)
+    result = look.selected(result)
     labels = []
     if "branch" in result:
         labels.append(_draw_lines(ax, result, "", up, ("black", "0.45")))

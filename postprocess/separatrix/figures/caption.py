@@ -14,23 +14,24 @@ from separatrix.figures.look import Look
 from separatrix.figures.parts import numbers_of_parts, parts, several_bodies
 from separatrix.library import Model
 
-# symbol and unit of the parameters that matter for a caption, in this order
+# Symbols are those of docs/start.md and docs/theory.md: m, c, k, e, omega.
+# symbol and unit of the parameters that matter for a caption, in this order; the library knows better units
 _FRICTION = {
     "kinetic_coefficient": (r"$\mu$", ""),
     "static_coefficient": (r"$\mu_s$", ""),
-    "damping": ("$b$", "N s/m"),
+    "damping": ("$c$", "N s/m"),
     "stribeck_velocity": ("$v_s$", "m/s"),
     "stribeck_exponent": (r"$\delta$", ""),
 }
 _CONTACT = {
-    "restitution": ("restitution $k$", ""),
+    "restitution": ("restitution $e$", ""),
     "upper": (r"$x_\mathrm{upper}$", "m"),
     "lower": (r"$x_\mathrm{lower}$", "m"),
 }
 _BODIES = {"mass": ("$m_1$", "kg"), "driven_mass": ("$m_2$", "kg"), "friction": ("$b$", "N")}
 _STOP = {
-    "restitution": ("$k$", ""),
-    "stiffness": ("$K$", ""),
+    "restitution": ("$e$", ""),
+    "stiffness": ("$k_c$", ""),
     "exponent": ("$n$", ""),
     "damping": ("damping", ""),
 }
@@ -39,7 +40,7 @@ _SOFT = {key: _STOP[key] for key in ("stiffness", "exponent", "damping")}
 _FURTHER = {
     "body.mass": "$m$",
     "body.gravity": "$g$",
-    "restoring.stiffness": "$c$",
+    "restoring.stiffness": "$k$",
     "restoring.free_length": "$l_0$",
 }
 # not mentioned where they are 0, as they are by default
@@ -73,9 +74,9 @@ def describe_case(result: xr.Dataset) -> list[str]:
     the ratio of a machine without a drive.
     """
     case = resolved_case(result)
-    axes = _axes(result, case)
+    axes, units = _axes(result, case), _units(str(result.attrs.get("resolved_case", "")))
     if "driven_mass" in case.get("body", {}):
-        return _two_bodies(case, axes)
+        return _two_bodies(case, axes, units)
     if several_bodies(case):
         return [numbers_of_parts(case)]
     pieces = []
@@ -83,17 +84,17 @@ def describe_case(result: xr.Dataset) -> list[str]:
     if isinstance(friction, dict):
         law = str(friction.get("law", ""))
         name = f"{_LAW_NAMES.get(law, law.replace('_', ' '))} friction".strip()
-        pieces.append(", ".join([name, *_values(friction, _FRICTION, "friction", axes)]))
+        pieces.append(", ".join([name, *_values(friction, _FRICTION, "friction", axes, units)]))
     contact = case.get("contact")
     if isinstance(contact, dict):
-        values = _values(contact, _CONTACT, "contact", axes)
+        values = _values(contact, _CONTACT, "contact", axes, units)
         if "stiffness" in contact:
-            soft = _values(contact, _SOFT, "contact", axes)
+            soft = _values(contact, _SOFT, "contact", axes, units)
             values = [str(contact["law"]).replace("_", "-"), *soft, *values]
         pieces.append(", ".join(values) if values else "no barrier")
     ratio = _drive_ratio(result, case)
     if ratio is not None and "drive_ratio" not in axes:
-        pieces.append(rf"$\Omega_p/\omega$ = {ratio:g}")
+        pieces.append(rf"$\omega/\omega_0$ = {ratio:g}")
     return pieces
 
 
@@ -119,12 +120,12 @@ def machine_pieces(result: xr.Dataset) -> list[str]:
     for family in () if several else ("body", "restoring", "friction", "contact", "drive"):
         law = case.get(family)
         if isinstance(law, dict):
-            pieces += _law_pieces(family, law, axes, units)
+            pieces += _law_pieces(case, family, law, axes, units)
     if several:
         units = {path: raised(unit) for path, unit in units.items()}
         pieces += parts(case, axes, units)
     for name, effect in case.get("effect", {}).items():
-        pieces += _law_pieces(f"effect.{name}", effect, axes, units)
+        pieces += _law_pieces(case, f"effect.{name}", effect, axes, units)
     run = case.get("run", {})
     if "duration" in run:
         extended = result.attrs.get("kind") == "basin" and run["extension"] > 1
@@ -133,7 +134,14 @@ def machine_pieces(result: xr.Dataset) -> list[str]:
     return pieces
 
 
-def _law_pieces(family: str, law: dict, axes: set[str], units: dict[str, str]) -> list[str]:
+def _has_weight(case: dict) -> bool:
+    """Whether gravity acts: on a pendulum, and by the weight that a friction coefficient multiplies."""
+    friction = case.get("friction", {})
+    rubs = isinstance(friction, dict) and any(key.endswith("_coefficient") for key in friction)
+    return rubs or case.get("restoring", {}).get("law") == "pendulum"
+
+
+def _law_pieces(case: dict, family: str, law: dict, axes: set[str], units: dict[str, str]) -> list[str]:
     said = {"friction": _FRICTION, "contact": {**_CONTACT, **_STOP}, "body": _BODIES}.get(family, {})
     if family == "body" and "driven_mass" not in law:
         said = {}
@@ -143,7 +151,7 @@ def _law_pieces(family: str, law: dict, axes: set[str], units: dict[str, str]) -
         if key == "law" or key in said or path == "drive.ratio" or path.replace(".", "_") in axes:
             continue
         numbers = value if isinstance(value, list) else [value]
-        if value == 0 and path in _ZERO:
+        if (value == 0 and path in _ZERO) or (path == "body.gravity" and not _has_weight(case)):
             continue
         if not all(isinstance(one, int | float) and abs(one) < _HUGE for one in numbers):
             continue
@@ -183,11 +191,11 @@ def raised(unit: str) -> str:
     return re.sub(r"\^(-?[\d.]+)", lambda power: f"$^{{{power[1]}}}$", unit)
 
 
-def _two_bodies(case: dict, axes: set[str]) -> list[str]:
+def _two_bodies(case: dict, axes: set[str], units: dict[str, str]) -> list[str]:
     """The bodies, the friction between them, the drive and the stop; what is an axis is left out."""
     body, drive, contact = (case.get(name, {}) for name in ("body", "drive", "contact"))
     pieces = [
-        ", ".join(_values(body, _BODIES, "body", axes)),
+        ", ".join(_values(body, _BODIES, "body", axes, units)),
         f"drive: {drive.get('law', 'none')}".replace("_", " "),
     ]
     law = str(contact.get("law", "none"))
@@ -198,7 +206,7 @@ def _two_bodies(case: dict, axes: set[str]) -> list[str]:
             if law.startswith("newton")
             else [f"stop on {carrier}", law.replace("_", "-")]
         )
-        pieces.append(", ".join([*stop, *_values(contact, _STOP, "contact", axes)]))
+        pieces.append(", ".join([*stop, *_values(contact, _STOP, "contact", axes, units)]))
     return pieces
 
 
@@ -212,9 +220,9 @@ def start_pieces(result: xr.Dataset) -> list[str]:
     if isinstance(restoring, dict) and restoring.get("law") == "pendulum":
         symbols = {key: (symbol, unit.replace("m", "rad")) for key, (symbol, unit) in _START.items()}
     varying = {str(name) for name in result.dims} | set(str(result.attrs.get("axes", "")).split())
-    pieces = _values(start, symbols, "", varying)
+    pieces = _values(start, symbols, "", varying, {})
     if start.get("crank_angle") and "crank_angle" not in varying:
-        pieces += _values(start, {"crank_angle": (r"$\varphi_0$", "rad")}, "", set())
+        pieces += _values(start, {"crank_angle": (r"$\varphi_0$", "rad")}, "", set(), {})
     return [", ".join(pieces)] if pieces else []
 
 
@@ -254,12 +262,13 @@ def _drive_ratio(result: xr.Dataset, case: dict) -> float | None:
     return float(value) if isinstance(value, int | float) and value > 0 else None
 
 
-def _values(section: dict, symbols: dict, family: str, axes: set) -> list[str]:
+def _values(section: dict, symbols: dict, family: str, axes: set, units: dict[str, str]) -> list[str]:
     texts = []
     for key, (symbol, unit) in symbols.items():
         value = section.get(key)
         name = f"{family}_{key}" if family else key
         if not isinstance(value, int | float) or name in axes or not abs(value) < _HUGE:
             continue
-        texts.append(f"{symbol} = {value:g} {unit}".rstrip())
+        unit = units.get(f"{family}.{key}", unit)
+        texts.append(f"{symbol} = {value:g} {'' if unit == '1' else raised(unit)}".rstrip())
     return texts

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from separatrix import style
 from separatrix.figures import pair
 from separatrix.figures.caption import describe_case, resolved_case, version_text
+from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import plain
 from separatrix.layout import compose
 
@@ -21,21 +22,23 @@ MOST_LOOPS = 8
 _LEAST_SAMPLES = 5
 
 
-def loops(result: xr.Dataset, title: str) -> Figure:
+def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return force over penetration and over time of the contacts, one colour each, at most `MOST_LOOPS`.
 
     Of more contacts those with the most different speeds are shown.
     """
-    figure, axes = _panels()
+    figure, axes = _panels(look)
     found = contacts(result)
-    order = np.argsort([-speed for _, speed, _, _, _ in found])
+    speed, speed_unit = look.factor("m/s"), look.unit("m/s")
+    order = np.argsort([-one[1] for one in found])
     if len(found) > MOST_LOOPS:
         order = order[np.linspace(0, len(found) - 1, MOST_LOOPS).round().astype(int)]
     handles = []
     for place, index in enumerate(order):
         colour = style.OKABE_ITO[place]
-        _draw(axes, found[index], colour)
-        handles.append(Line2D([], [], color=colour, label=f"{found[index][1]:.3g} m/s"))
+        _draw(axes, found[index], colour, look)
+        label = f"{found[index][1] * speed:.3g} {speed_unit}"
+        handles.append(Line2D([], [], color=colour, label=label))
     caption = [f"{len(order)} of {len(found)} contacts, by impact speed", *describe_case(result)]
     compose(figure, title, [*caption, plain(version_text(result))], handles, columns=max(1, len(handles)))
     return figure
@@ -43,7 +46,7 @@ def loops(result: xr.Dataset, title: str) -> Figure:
 
 def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
     """Return the fastest contact of each trajectory over penetration and time, one colour for each."""
-    figure, axes = _panels()
+    figure, axes = _panels(DEFAULT)
     handles, captions = [], []
     for place, result in enumerate(results):
         found = contacts(pair.relative_to_stop(result))
@@ -51,7 +54,7 @@ def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
             continue
         colour = style.OKABE_ITO[place % len(style.OKABE_ITO)]
         fastest = max(found, key=lambda item: item[1])
-        _draw(axes, fastest, colour)
+        _draw(axes, fastest, colour, DEFAULT)
         law = resolved_case(result)["contact"]["law"].replace("_", " ")
         handles.append(Line2D([], [], color=colour, label=f"{law}, {fastest[1]:.3g} m/s"))
         captions += describe_case(result)
@@ -59,11 +62,11 @@ def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
     return figure
 
 
-def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
+def _panels(look: Look) -> tuple[Figure, tuple[Axes, Axes]]:
     figure = style.new_figure(style.DOUBLE_COLUMN, 68.0)
     over_depth, over_time = figure.subplots(1, 2)
-    over_depth.set_xlabel("penetration (m)")
-    over_time.set_xlabel("time since first touch (s)")
+    over_depth.set_xlabel(f"penetration ({look.unit('m')})")
+    over_time.set_xlabel(f"time since first touch ({look.unit('s')})")
     for letter, ax in zip("ab", (over_depth, over_time), strict=True):
         ax.set_ylabel("force of the barrier (N)")
         ax.axhline(0, color="#BBBBBB", linewidth=0.5, zorder=0)
@@ -71,7 +74,7 @@ def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
     return figure, (over_depth, over_time)
 
 
-def _draw(axes: tuple[Axes, Axes], contact: tuple, colour: str) -> None:
+def _draw(axes: tuple[Axes, Axes], contact: tuple, colour: str, look: Look) -> None:
     """Draw a contact from no force to no force: what lies between that and its ends is a jump."""
     start, _, time, depth, force = contact
     over_depth, over_time = axes
@@ -79,8 +82,10 @@ def _draw(axes: tuple[Axes, Axes], contact: tuple, colour: str) -> None:
     early = time[:2] - start
     touch = force[0] - early[0] * (force[1] - force[0]) / (early[1] - early[0])
     force = np.concatenate([[0.0, touch], force, [0.0]])
-    over_depth.plot(np.concatenate([[0.0, 0.0], depth, depth[-1:]]), force, color=colour)
-    over_time.plot(np.concatenate([[0.0, 0.0], time - start, time[-1:] - start]), force, color=colour)
+    depths = look.factor("m") * np.concatenate([[0.0, 0.0], depth, depth[-1:]])
+    times = look.factor("s") * np.concatenate([[0.0, 0.0], time - start, time[-1:] - start])
+    over_depth.plot(depths, force, color=colour)
+    over_time.plot(times, force, color=colour)
 
 
 def contacts(result: xr.Dataset) -> list[tuple[float, float, np.ndarray, np.ndarray, np.ndarray]]:

@@ -98,6 +98,10 @@ class Look:
         """Return by what a number in an SI unit is multiplied."""
         return next((1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit), 1.0)
 
+    def unit(self, si: str) -> str:
+        """Return the unit that takes the place of an SI unit."""
+        return next((name for name in self.units if UNITS[name][0] == si), si)
+
     def _in_units(self, result: xr.Dataset) -> xr.Dataset:
         for name in self.units:
             si, worth = UNITS[name]

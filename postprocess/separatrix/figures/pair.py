@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from separatrix import style
 from separatrix.figures.caption import describe_case, resolved_case, version_text
-from separatrix.labels import axis_label, flag_text, plain
+from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
 
@@ -33,7 +33,7 @@ def history(result: xr.Dataset, title: str) -> Figure:
     both.set_ylabel(axis_label(result["x"]))
     name, distance, stops = _distance(result)
     apart.plot(time, distance, color=style.MOTION)
-    apart.set_ylabel(f"{name} (m)")
+    apart.set_ylabel(f"{name} ({unit(result['x'])})")
     grounded = [] if carried_stop(result) else _stops(result)
     for ax, places in ((both, grounded), (apart, stops)):
         for place in places:

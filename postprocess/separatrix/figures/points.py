@@ -21,8 +21,8 @@ _MARKERS = "osD^vP*X"
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figure of a points file by name."""
-    look.require("list of points")
-    return {"regime": scatter(result, title, look)}
+    look.require("list of points", "units")
+    return {"regime": scatter(look.selected(result), title, look)}
 
 
 def scatter_axes(result: xr.Dataset) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from separatrix import style
 from separatrix.figures import contact, energy, impacts, pair
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
-from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.look import DEFAULT, UNITS, Look
 from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -24,26 +24,43 @@ _MOST_SAMPLES = 4000
 _MOST_MARKERS = 150
 # lines of the bodies beside the watched one, as many as can be told apart
 _OTHER_LINES = ("-", (0, (4, 2)), (0, (1, 1)), (0, (6, 2, 1, 2)))
+# numbers among the attributes, and the variable whose unit each has
+_NUMBERS = {
+    "amplitude": "x", "x_max": "x", "x_min": "x", "barrier_upper": "x", "barrier_lower": "x", "turn": "x",
+    "v_max": "v", "mean_impact_speed": "v", "drive_period": "time", "window": "time",
+}  # fmt: skip
 # these change the velocity at once
 _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figures of a trajectory file by name."""
-    look.require("trajectory")
+    look.require("trajectory", "units")
+    given, result = result, _in_units(result, look)
     two_bodies = "driver_x" in result
     made = {"history": pair.history(result, title) if two_bodies else time_history(result, title, look)}
     # files of earlier versions have no energies of one body
     if "kinetic_energy" in result:
         caption = pair.caption(result) if two_bodies else _caption(result, look)
         made["energy"] = energy.decomposition(result, title, shown(caption, look))
-    seen = pair.relative_to_stop(result)
     if "contact_force" in result:
-        made["contact"] = contact.loops(seen, title)
+        made["contact"] = contact.loops(pair.relative_to_stop(given), title, look)
+    seen = pair.relative_to_stop(result)
     struck = impacts.section(seen, title, look)
     if struck is not None:
         made["impacts"] = struck
     return {**made, "phase": phase_portrait(seen, title, look)}
+
+
+def _in_units(result: xr.Dataset, look: Look) -> xr.Dataset:
+    """Return a motion with its variables, and the numbers among its attributes, in the units asked for."""
+    factors = {
+        name: look.factor(str(result[of].attrs.get("units")))
+        for name, of in _NUMBERS.items()
+        if name in result.attrs
+    }
+    changed = look.selected(result)
+    return changed.assign_attrs({name: result.attrs[name] * factor for name, factor in factors.items()})
 
 
 def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
@@ -52,7 +69,7 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
     whole, zoom = figure.subplots(2, 1)
     time, position = result["time"].values, result["x"].values
     whole.plot(*_envelope(time, position), color=style.MOTION, linewidth=0.7)
-    end = _end(result)
+    end = _end(result, look)
     whole.set_xlim(time[0], end)
     start = max(time[0], end - ZOOM_PERIODS * float(result.attrs["drive_period"]))
     last = time >= start
@@ -108,10 +125,11 @@ def watched_body(result: xr.Dataset) -> str:
     return resolved_case(result).get("watch", {}).get("body", "body")
 
 
-def _end(result: xr.Dataset) -> float:
+def _end(result: xr.Dataset, look: Look) -> float:
     """Return the last time, or the duration of the case if that is at most a sample away: it has a tick."""
     time = result["time"].values
-    duration = resolved_case(result).get("run", {}).get("duration", time[-1])
+    run = resolved_case(result).get("run", {})
+    duration = run["duration"] * look.factor("s") if "duration" in run else time[-1]
     return float(duration if time.size > 1 and abs(duration - time[-1]) <= time[1] - time[0] else time[-1])
 
 
@@ -124,7 +142,7 @@ def phase_portrait(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figu
     ax = figure.add_subplot()
     window = float(result.attrs["window"])
     start = float(result["time"].values[-1]) - window
-    window_text = f"last {window:g} s"
+    window_text = f"last {window:g} {unit(result['time'])}"
     if not np.ptp(result["x"].values[result["time"].values >= start]) > 0:
         start, window_text = float(result["time"].values[0]), "from the start to rest"
     position, velocity, jumps = steady_path(result, start)
@@ -235,7 +253,7 @@ def _barrier_handle(result: xr.Dataset) -> list[Line2D]:
 def _caption(result: xr.Dataset, look: Look) -> list[str]:
     attributes = result.attrs
     pieces = caption_pieces(result, look, describe_case(result))
-    pieces += [_start_text(result), f"steady motion: {_regime_text(attributes['regime'])}"]
+    pieces += [_start_text(result, look), f"steady motion: {_regime_text(attributes['regime'])}"]
     pieces.append(f"amplitude {attributes['amplitude']:.4g} {unit(result['x'])}")
     pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} {unit(result['v'])}")
     if attributes.get("rotation_number"):
@@ -248,11 +266,15 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
     return [*pieces, plain(version_text(result))]
 
 
-def _start_text(result: xr.Dataset) -> str:
+def _start_text(result: xr.Dataset, look: Look) -> str:
     # the first sample is the start but for rounding
     start = resolved_case(result).get("start", {})
-    x, v = (float(start.get(f"{name}0", result[name].values[0])) for name in ("x", "v"))
-    return f"$x_0$ = {x:g} {unit(result['x'])}, $v_0$ = {v:g} {unit(result['v'])}"
+    texts = []
+    for name in ("x", "v"):
+        si = next((UNITS[one][0] for one in look.units if one == unit(result[name])), unit(result[name]))
+        value = start[f"{name}0"] * look.factor(si) if f"{name}0" in start else float(result[name].values[0])
+        texts.append(f"${name}_0$ = {value:g} {unit(result[name])}")
+    return ", ".join(texts)
 
 
 def _regime_text(regime: object) -> str:
