@@ -2,22 +2,70 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
-# Builds Separatrix with and without MPI and runs the tests. The last line counts them; the exit
-# code is 0 only if none failed.
+# test.sh             builds Separatrix with and without MPI and runs the tests; the last line counts them
+# test.sh --all       also the long ones, which repeat a law for a further machine, size or page
+# test.sh NAME...     builds and runs single suites in build/: friction_law, tests/laws/test_friction_law.pf, figures,
+#                     tests/python/test_figures.py; a minute for a suite of Fortran of a build that is there
 #
-#   --all   also the long ones, which repeat a law for a further machine, size or page
+# The exit code is 0 only if no test failed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 chosen="not long"
-case "${1-}" in
-  "") ;;
-  --all) chosen="" ;;
-  *)
-    echo "test: found '$1', allowed --all or nothing" >&2
-    exit 64
-    ;;
-esac
+names=()
+for argument in "$@"; do
+  case "$argument" in
+    --all) chosen="" ;;
+    -h | --help)
+      sed -n '5,10s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+      exit 0
+      ;;
+    -*)
+      echo "test: found '$argument', allowed --all or names of suites" >&2
+      exit 64
+      ;;
+    *) names+=("$argument") ;;
+  esac
+done
+
+# Single suites: those of Fortran by ctest, those of Python by pytest, which need program and library.
+run_suites() {
+  local name stem path suites=() files=()
+  for name in "$@"; do
+    stem=$(basename "$name")
+    stem=${stem%.pf}
+    stem=${stem%.py}
+    stem=test_${stem#test_}
+    path=$(compgen -G "tests/*/$stem.pf" || compgen -G "tests/*/$stem.py" || true)
+    case "$path" in
+      *.pf) suites+=("$stem") ;;
+      *.py) files+=("$path") ;;
+      *)
+        echo "test: found '$name', allowed the name of a file tests/*/test_NAME.pf or tests/*/test_NAME.py" >&2
+        exit 64
+        ;;
+    esac
+  done
+  scripts/bootstrap.sh
+  # shellcheck source=scripts/environment.sh
+  source scripts/environment.sh
+  cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release
+  local jobs status=0
+  jobs=$(env -u OMP_NUM_THREADS nproc)
+  if ((${#suites[@]} > 0)); then
+    cmake --build build -j "$jobs" --target "${suites[@]}"
+    ctest --test-dir build -R "^($(IFS='|' && echo "${suites[*]}"))\$" -j "$jobs" --output-on-failure --no-tests=error || status=1
+  fi
+  if ((${#files[@]} > 0)); then
+    cmake --build build -j "$jobs" --target separatrix separatrix_library separatrix_reference
+    SEPARATRIX_BUILD=$PWD/build .venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile -m "$chosen" "${files[@]}" || status=1
+  fi
+  exit "$status"
+}
+
+if ((${#names[@]} > 0)); then
+  run_suites "${names[@]}"
+fi
 
 scripts/bootstrap.sh --browser --docs
 # shellcheck source=scripts/environment.sh
@@ -40,7 +88,7 @@ ctest --test-dir build -E '^(python|faults)$' -j "$jobs" --output-on-failure --n
 echo "test: building without MPI in build-serial/"
 cmake -S . -B build-serial -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=OFF -DSEPARATRIX_STATIC=ON \
   -DSEPARATRIX_TESTS=ON
-cmake --build build-serial -j "$jobs" --target separatrix separatrix_library "${serial_layers[@]/#/suites-}"
+cmake --build build-serial -j "$jobs" --target separatrix separatrix_library separatrix_reference "${serial_layers[@]/#/suites-}"
 ctest --test-dir build-serial -L "^($(IFS='|' && echo "${serial_layers[*]}"))\$" -j "$jobs" --output-on-failure --no-tests=error \
   --output-junit ctest.xml || status=1
 

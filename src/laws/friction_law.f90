@@ -49,6 +49,7 @@ contains
     type(friction_t) :: law
     real(wp) :: static
     select case (choice%name)
+    case ('none')
     case ('coulomb', 'coulomb_viscous')
       law%kinetic = value_of(choice, 'kinetic_coefficient')*normal_force
       static = value_of(choice, 'static_coefficient')*normal_force
@@ -63,6 +64,8 @@ contains
       law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
       if (law%excess > 0) law%layer_speed = edge_of_layer(law%stribeck_velocity, law%stribeck_exponent)
+    case default
+      error stop 'friction_of: a law of the table has no force'
     end select
   end function friction_of
 
@@ -75,6 +78,7 @@ contains
     law%break_away = value_of(choice, 'static_force')
     if (law%break_away < 0) law%break_away = law%kinetic
     select case (choice%name)
+    case ('friction:coulomb', 'friction:elastic_coulomb')
     case ('friction:coulomb_viscous')
       law%damping = value_of(choice, 'damping')
     case ('friction:coulomb_stribeck')
@@ -85,6 +89,8 @@ contains
       if (law%break_away > law%kinetic) law%fading_speed = value_of(choice, 'fading_velocity')
     case ('friction:coulomb_quadratic')
       law%drag = value_of(choice, 'drag')
+    case default
+      error stop 'friction_of_part: a law of the table has no force'
     end select
   end function friction_of_part
 

@@ -1,15 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Calls the reference library: the same numerics in quadruple precision.
+!> Calls the reference library: the same numerics in quadruple precision. It is loaded when it is first used, so that the program
+!> is built and started without it.
 module reference
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_procpointer, c_funptr, c_int, c_int64_t, &
+    c_null_char, c_ptr
   use attractors, only: attractor_t, pack_attractor
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_table, only: find_law, law_choice_t
   use motion_state, only: options_t
-  use status, only: exit_internal
+  use status, only: exit_internal, exit_no_input
   use trajectory, only: span_t
   implicit none
   private
@@ -19,8 +21,26 @@ module reference
   !> Relative tolerance of the adaptive flight in quadruple precision.
   real(wp), parameter :: reference_tolerance = 1e-20_wp
 
+  !> Looked for in the folder lib/ beside that of the program.
+  character(len=*), parameter :: library = 'libseparatrix_reference.so'
+  integer(c_int), parameter :: resolve_now = 2
+
   interface
-    function separatrix_reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
+    type(c_ptr) function open_library(name, mode) bind(c, name='dlopen')
+      import :: c_char, c_int, c_ptr
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int), value :: mode
+    end function open_library
+
+    type(c_funptr) function function_in(library, name) bind(c, name='dlsym')
+      import :: c_char, c_funptr, c_ptr
+      type(c_ptr), value :: library
+      character(kind=c_char), intent(in) :: name(*)
+    end function function_in
+  end interface
+
+  abstract interface
+    function reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
         attractor_count, packed, points, starts, results) bind(c) result(status)
       import :: c_double, c_int, c_int64_t
       integer(c_int), value :: law_count
@@ -33,8 +53,10 @@ module reference
       real(c_double), intent(in) :: packed(*), starts(*)
       real(c_double), intent(out) :: results(*)
       integer(c_int) :: status
-    end function separatrix_reference_run
+    end function reference_run
   end interface
+
+  procedure(reference_run), pointer :: separatrix_reference_run => null()
 
 contains
 
@@ -52,6 +74,8 @@ contains
     integer(c_int), allocatable :: lengths(:)
     real(c_double), allocatable :: values(:), packed(:), out(:, :)
     integer :: i, k
+    call load(error)
+    if (allocated(error)) return
     allocate (lengths(0), values(0), packed(0), out(6, size(starts, 2)))
     do i = 1, size(laws)
       rows(i) = find_law(trim(laws(i)%family), trim(laws(i)%name))
@@ -70,5 +94,20 @@ contains
     if (status /= 0) call fail(error, exit_internal, 'the reference library could not build the machine')
     results = out
   end subroutine run_reference
+
+  !> Loads the library unless that has been done.
+  subroutine load(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(c_ptr) :: handle
+    type(c_funptr) :: address
+    if (associated(separatrix_reference_run)) return
+    handle = open_library(library//c_null_char, resolve_now)
+    if (c_associated(handle)) then
+      address = function_in(handle, 'separatrix_reference_run'//c_null_char)
+      if (c_associated(address)) call c_f_procpointer(address, separatrix_reference_run)
+    end if
+    if (.not. associated(separatrix_reference_run)) call fail(error, exit_no_input, 'the quadruple-precision library '//library// &
+      ' is not in lib/ beside the folder of the program; cmake --build BUILD --target separatrix_reference builds it')
+  end subroutine load
 
 end module reference
