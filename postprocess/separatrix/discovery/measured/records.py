@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured records: columns t, x [, v, force, phi] from CSV or HDF5, in SI units, checked row by row."""
+"""Measured records: columns t, x [, v, force, phi] of any file, in SI units, checked row by row."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -17,6 +17,8 @@ from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_
 from separatrix.errors import SeparatrixError
 
 _FEWEST_SAMPLES = 60
+# beyond which squares overflow: no measured value [SI]
+_LARGEST = 1e100
 
 
 @dataclass
@@ -82,7 +84,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     columns, unit, of_time = to_si(path, table, notes)
     numbers = numbers_of(path, header, of_time, notes)
     for name, column in columns.items():
-        bad = np.flatnonzero(~np.isfinite(column))
+        bad = np.flatnonzero(~(np.abs(column) < _LARGEST))
         if bad.size:
             raise SeparatrixError(f"{where(bad[0])}: '{name}' is {column[bad[0]]}; {bad.size} such values")
     sensors = [name for name in columns if is_sensor(name)]
