@@ -15,7 +15,7 @@ from separatrix.discovery.measured.tables import (
     SAME,
     Table,
     check_length,
-    has_place,
+    has_motion,
     is_column,
     is_noise,
 )
@@ -57,7 +57,7 @@ def table_of(path: Path, found: Found, names: Mapping[str, str]) -> Table:
     values = _looked_into(path, found.values)
     values = {column_of(name, names): value for name, value in values.items()}
     missing = [] if "t" in values else ["t"]
-    missing += [] if has_place(values) else ["x"]
+    missing += [] if has_motion(values) else ["x"]
     if missing:
         raise SeparatrixError(
             f"{path}: found {_listed([*values, *found.unused])}; '{missing[0]}' is missing of "

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.discovery.measured.tables import Table, check_length, has_place, is_column
+from separatrix.discovery.measured.tables import Table, check_length, has_motion, is_column
 from separatrix.errors import SeparatrixError
 
 _UNIT = ("units", "unit")
@@ -26,7 +26,7 @@ def read_hdf5(path: Path) -> Table:
         units = {name: unit for name in used if (unit := _unit(path, name, file[name]))}
         unused = sorted(set(file) - columns.keys())
     missing = [] if "t" in columns else ["t"]
-    missing += [] if has_place(columns) else ["x"]
+    missing += [] if has_motion(columns) else ["x"]
     if missing:
         raise SeparatrixError(f"{path}: dataset '{missing[0]}' is missing")
     if len({column.shape for column in columns.values()}) != 1 or columns["t"].ndim != 1:

@@ -14,6 +14,7 @@ from separatrix.discovery.measured.tables import (
     NUMBERS,
     SAME,
     Table,
+    has_place,
     is_noise,
     is_sensor,
     kind_of,
@@ -169,7 +170,9 @@ def to_si(path: Path, table: Table, notes: list[str]) -> tuple[dict[str, np.ndar
         with np.errstate(invalid="ignore", over="ignore"):
             # values that are no numbers are refused with their row
             columns[name] = column * _size(kind_of(name), units[name]) if name in units else column
-    place = next((units[name] for name in units if kind_of(name) == "x"), "m")
+    # of an angle alone without a place, too
+    kind = "x" if has_place(table.columns) else "v"
+    place = next((units[name] for name in units if kind_of(name) == kind), "m")
     return columns, "rad" if _is_angle(place) else "m", _size("t", units.get("t", "s"))
 
 
@@ -248,7 +251,7 @@ def _units(path: Path, table: Table) -> dict[str, str]:
             _refuse(path, text)
         found[name] = unit
     known = {kind_of(name) for name in [*found, *table.units] if name in columns or name in UNITS}
-    if not {"t", "x"} <= known:
+    if "t" not in known or not known & ({"x"} if has_place(columns) else {"x", "v"}):
         _refuse(path, text)
     return found
 

@@ -65,7 +65,12 @@ def kind_of(name: str) -> str:
 
 def has_place(names: Iterable[str]) -> bool:
     """Whether a place is among the columns."""
-    return any(name == "x" or (is_sensor(name) and name[0] == "x") for name in names)
+    return any(kind_of(name) == "x" for name in names)
+
+
+def has_motion(names: Iterable[str]) -> bool:
+    """Whether a place or a speed is among the columns."""
+    return any(kind_of(name) in ("x", "v") for name in names)
 
 
 def is_noise(key: str) -> bool:
@@ -131,7 +136,7 @@ def _read_plain(path: Path, count: int) -> Table | None:
                 return None
         first = file.readline()
     names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
-    if "t" not in names or not has_place(names) or not first.strip():
+    if "t" not in names or not has_motion(names) or not first.strip():
         return None
     used = [name for name in names if is_column(name)]
     try:
@@ -188,7 +193,7 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
             continue
         _check_encoding(path, number, text)
         if names is None:
-            separator = next((mark for mark in ";,\t" if _has_t_and_x(text, mark)), ",")
+            separator = next((mark for mark in ";,\t" if _has_t_and_motion(text, mark)), ",")
             names = _names(path, number, text, separator)
             used = [name for name in names if is_column(name)]
             units = _units_of_names(text, separator, used)
@@ -229,9 +234,9 @@ def _check_place(path: Path, number: int, key: str, stands: dict[str, int], belo
         raise SeparatrixError(f"{path}:{number}: '{key}' is given again, first in line {stands[key]}")
 
 
-def _has_t_and_x(text: str, separator: str) -> bool:
+def _has_t_and_motion(text: str, separator: str) -> bool:
     names = {_named(name)[0] for name in text.split(separator)}
-    return "t" in names and has_place(names)
+    return "t" in names and has_motion(names)
 
 
 def _named(text: str) -> tuple[str, str]:
@@ -249,7 +254,7 @@ def _units_of_names(text: str, separator: str, used: list[str]) -> dict[str, str
 
 def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
     names = [_named(name)[0] for name in text.split(separator)]
-    if "t" not in names or not has_place(names):
+    if "t" not in names or not has_motion(names):
         raise SeparatrixError(
             f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]' or, of "
             "several bodies, "

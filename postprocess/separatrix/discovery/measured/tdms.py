@@ -11,10 +11,9 @@ import numpy as np
 from separatrix.discovery.measured.arrays import Found, column_of, common_times, library
 from separatrix.discovery.measured.header import is_stated
 from separatrix.discovery.measured.tables import is_column
-from separatrix.discovery.measured.tdms_bursts import Burst, bursts_of
+from separatrix.discovery.measured.tdms_bursts import OFFSET, START, STEP, Burst, bursts_of
 from separatrix.errors import SeparatrixError
 
-_START, _STEP, _OFFSET = "wf_start_time", "wf_increment", "wf_start_offset"
 # of a step, by which a burst may begin beside where the last one ended
 _BESIDE = 0.5
 
@@ -43,7 +42,7 @@ def read_tdms(path: Path, names: Mapping[str, str]) -> Found:
             found.values[name] = values.as_datetime64("ns") if stamps else values
             unit = str(channel.properties.get("unit_string", ""))
             found.units |= {name: unit} if is_stated(unit) else {}
-            if name != "t" and _STEP in channel.properties:
+            if name != "t" and STEP in channel.properties:
                 waves[name] = _times(path, name, len(values), bursts.get(channel.path, []), found)
     if "t" not in found.values and waves:
         begin = min(start for start, _ in waves.values())
@@ -55,19 +54,22 @@ def _times(path: Path, name: str, size: int, bursts: list[Burst], found: Found) 
     """When the waveform of a channel begins [s], and its times since then, with the gaps between bursts."""
     axis = str(bursts[-1].properties.get("wf_xunit_string", "")) if bursts else ""
     found.units |= {"t": axis} if is_stated(axis) else {}
+    if all(burst.clock == bursts[0].clock for burst in bursts):
+        # one after the other, whatever their lengths
+        bursts = [Burst(size, bursts[0].properties)] if bursts else []
     parts, begin, before, end = [], None, None, 0.0
     for burst in bursts:
         told = burst.properties
-        step = float(told.get(_STEP, 0.0))
+        step = float(told.get(STEP, 0.0))
         if not step > 0:
-            raise SeparatrixError(f"{path}: {_STEP} of '{name}' is {step:g} s, expected more than 0")
-        start = told.get(_START)
+            raise SeparatrixError(f"{path}: {STEP} of '{name}' is {step:g} s, expected more than 0")
+        start = told.get(START)
         begin = start if begin is None else begin
-        first = float(told.get(_OFFSET, 0.0))
+        first = float(told.get(OFFSET, 0.0))
         if start is not None:
             seconds, fractions = (a - b for a, b in zip(start, begin, strict=True))
             first += seconds + fractions / 2.0**64
-        stated, before = before, (start, told.get(_OFFSET))
+        before, stated = burst.clock, before
         if parts and (before == stated or abs(first - end) <= _BESIDE * step):
             first = end
         elif parts:

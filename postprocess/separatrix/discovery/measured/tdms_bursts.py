@@ -12,6 +12,8 @@ from typing import BinaryIO
 
 from separatrix.errors import SeparatrixError
 
+START, STEP, OFFSET = "wf_start_time", "wf_increment", "wf_start_offset"
+"""Properties of a waveform."""
 _LEAD = 28
 _META, _RAW, _NEW_LIST, _BIG = 1 << 1, 1 << 3, 1 << 2, 1 << 6
 _NO_DATA, _AS_BEFORE = 0xFFFFFFFF, 0
@@ -29,6 +31,11 @@ class Burst:
 
     samples: int
     properties: dict[str, object]
+
+    @property
+    def clock(self) -> tuple:
+        """What says the times of the samples."""
+        return tuple(self.properties.get(key) for key in (START, STEP, OFFSET))
 
 
 @dataclass
