@@ -282,6 +282,24 @@ def test_what_is_not_read_is_answered_with_what_is(tmp_path):
 # ---- damage
 
 
+def test_files_that_are_cut_off_are_told(tmp_path):
+    whole = uff(tmp_path / "a.uff", function(), function(3 + T, ordinate_spec_data_type=13)).read_bytes()
+    (tmp_path / "cut.uff").write_bytes(whole[:-400])
+    with pytest.raises(SeparatrixError, match="cut.uff: is cut off: its last data set has no end"):
+        read_record(tmp_path / "cut.uff")
+    whole = tdms(tmp_path / "a.tdms", [("x", X, wave(0.0))]).read_bytes()
+    (tmp_path / "cut.tdms").write_bytes(whole[:-400])
+    record = read_record(tmp_path / "cut.tdms")
+    assert record.t.size == 250
+    assert said(record, "the file is cut off in its last segment")
+    samples = np.round(1e4 * np.sin(5 * T)).astype("i2")
+    wavfile.write(tmp_path / "a.wav", 200, samples)
+    (tmp_path / "cut.wav").write_bytes((tmp_path / "a.wav").read_bytes()[:-100])
+    keys(tmp_path / "cut.wav", "units: t s, x 2.5 mm")
+    with pytest.raises(SeparatrixError, match=r"cut\.wav: .*(cut|damaged|WAV)"):
+        read_record(tmp_path / "cut.wav")
+
+
 def test_damaged_files_of_any_kind_are_refused_or_read(tmp_path):
     """No traceback, no crash, no end of this process, whatever bytes are changed."""
     whole = {"npz": tmp_path / "a.npz", "mat": tmp_path / "a.mat", "wav": tmp_path / "a.wav"}

@@ -25,7 +25,7 @@ def read_tdms(path: Path, names: Mapping[str, str]) -> Found:
     logging.getLogger("nptdms").setLevel(logging.CRITICAL)
     file = nptdms.TdmsFile.read(path, raw_timestamps=True)
     found, waves = Found(), {}
-    bursts = bursts_of(path)
+    bursts = bursts_of(path, found.notes)
     for properties in (file.properties, *(group.properties for group in file.groups())):
         for key, value in properties.items():
             found.key(key, value)

@@ -22,7 +22,6 @@ _DAQMX = {0x1269: 20, 0x126A: 17}
 _TEXT, _TIME = 0x20, 0x44
 _NUMBERS = {1: "b", 2: "h", 3: "i", 4: "q", 5: "B", 6: "H", 7: "I", 8: "Q", 9: "f", 10: "d"}
 _NUMBERS |= {0x19: "f", 0x1A: "d", 0x21: "?", 0x08000C: "2f", 0x10000D: "2d"}
-_OPEN_END = 0xFFFFFFFFFFFFFFFF
 
 
 @dataclass
@@ -50,7 +49,7 @@ class _Channel:
     properties: dict[str, object] = field(default_factory=dict)
 
 
-def bursts_of(path: Path) -> dict[str, list[Burst]]:
+def bursts_of(path: Path, notes: list[str]) -> dict[str, list[Burst]]:
     """The segments of each channel in order, by the path of the channel in the file."""
     found: dict[str, list[Burst]] = {}
     channels: dict[str, _Channel] = {}
@@ -65,7 +64,9 @@ def bursts_of(path: Path) -> dict[str, list[Burst]]:
             (mask,) = struct.unpack("<I", file.read(4))
             reader = _Reader(file, ">" if mask & _BIG else "<")
             _, following, raw = reader.numbers("IQQ")
-            end = whole if following == _OPEN_END else min(whole, at + _LEAD + following)
+            end = min(whole, at + _LEAD + following)
+            if at + _LEAD + following > whole:
+                notes.append("the file is cut off in its last segment")
             if mask & _META:
                 order = _metadata(reader, channels, [] if mask & _NEW_LIST else order)
             if mask & _RAW:

@@ -17,6 +17,8 @@ _OF_TYPE = {8: "x", 11: "v", 9: "force", 13: "force"}
 # types of function and abscissa of a time record: time response over time or what is not said; what is not
 # said over time
 _OVER_TIME = {(1, 17), (1, 0), (0, 17)}
+# of a data set
+_END = b"-1"
 _ROTATIONS = (4, 5, 6)
 # digits of the times of an uneven function in text; of a step, what one more digit would show
 _DIGITS, _COARSE = 6, 0.1
@@ -24,6 +26,10 @@ _DIGITS, _COARSE = 6, 0.1
 
 def read_uff(path: Path, names: Mapping[str, str]) -> Found:
     """Functions over time; displacement is x, velocity v, force force, or as `id1` says."""
+    # behind binary data there is no new line
+    if not path.read_bytes().rstrip().endswith(_END):
+        # pyuff leaves out what has no end
+        raise SeparatrixError(f"{path}: is cut off: its last data set has no end")
     sets = library("pyuff", path, "formats").UFF(str(path)).read_sets()
     sets = [sets] if isinstance(sets, dict) else sets
     found, times, others = Found(), {}, 0
