@@ -47,6 +47,7 @@ def read_tdms(path: Path, names: Mapping[str, str]) -> Found:
     if "t" not in found.values and waves:
         begin = min(start for start, _ in waves.values())
         found.values["t"] = common_times(path, {name: t + (s - begin) for name, (s, t) in waves.items()})
+        found.units.setdefault("t", "s")
     return found
 
 

@@ -63,6 +63,9 @@ def read_uff(path: Path, names: Mapping[str, str]) -> Found:
     found.notes = list(dict.fromkeys(found.notes))
     if times and "t" not in found.values:
         found.values["t"] = common_times(path, times)
+        if "units" not in found.values:
+            # by the standard, but it is not stated
+            found.units.setdefault("t", "s")
     return found
 
 
