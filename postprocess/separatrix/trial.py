@@ -1,16 +1,28 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading first in a process of its own, because HDF5 loops or crashes in some damaged files."""
+"""Reading in a process of its own, because libraries loop or crash in some damaged files."""
 
 import os
+import pickle
+import re
 import resource
+import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from separatrix.errors import SeparatrixError
 
 # Processor time of a loop [s]; what is tried takes milliseconds.
 _LONGEST = 2
+# the same of a whole file: at least, and per byte
+_LONGEST_WHOLE, _PER_BYTE = 20, 1e-5
+# memory of a reader beside what it has at its beginning [bytes]: at least, and over the size of the file
+_MOST_MEMORY, _MEMORY_OVER_FILE = 4 << 30, 40
+# characters of what a library says
+_LONGEST_REASON = 200
+
+Result = TypeVar("Result")
 
 
 def try_first(path: str | Path, read: Callable[[], object]) -> None:
@@ -28,3 +40,74 @@ def try_first(path: str | Path, read: Callable[[], object]) -> None:
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         raise SeparatrixError(f"{path}: is damaged (HDF5 does not come to an end in it)")
+
+
+def read_apart(path: str | Path, kind: str, read: Callable[[], Result]) -> Result:
+    """Return what `read` does in a process of its own; a file in which it fails, crashes or loops is refused.
+
+    `kind`: of file, for the message.
+    """
+    source, sink = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.close(source)
+            _answer(path, kind, read, sink)
+        finally:
+            os._exit(0)
+    os.close(sink)
+    try:
+        with os.fdopen(source, "rb") as answer:
+            told = answer.read()
+    except BaseException:
+        os.kill(child, signal.SIGKILL)
+        raise
+    finally:
+        _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status) or not told:
+        loops = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU
+        why = "does not come to an end" if loops else "crashes"
+        raise SeparatrixError(f"{path}: is damaged (the reader of {kind} files {why} in it)")
+    try:
+        result = pickle.loads(told)
+    except (EOFError, pickle.UnpicklingError):
+        raise SeparatrixError(f"{path}: not enough memory for what its reader found") from None
+    if isinstance(result, SeparatrixError):
+        raise result
+    return result
+
+
+def _answer(path: str | Path, kind: str, read: Callable[[], object], sink: int) -> None:
+    """Send what `read` returns, or why it fails, within limits of time and memory."""
+    # an interrupt ends it at once; libraries print what they find
+    for one in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(one, signal.SIG_DFL)
+    for stream in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    size = Path(path).stat().st_size
+    longest = int(_LONGEST_WHOLE + _PER_BYTE * size)
+    resource.setrlimit(resource.RLIMIT_CPU, (longest, longest + 1))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    used = _used_memory()
+    if used:
+        most = used + max(_MOST_MEMORY, _MEMORY_OVER_FILE * size)
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+    try:
+        answer = read()
+    except SeparatrixError as error:
+        answer = error
+    except Exception as error:
+        # what a library raises in a damaged file may be anything
+        said = re.sub(r"[^ -~]+", " ", str(error))[:_LONGEST_REASON].strip()
+        why = f"{type(error).__name__}: {said}" if said else type(error).__name__
+        answer = SeparatrixError(f"{path}: not a {kind} file that can be read: {why}")
+    with os.fdopen(sink, "wb") as file:
+        pickle.dump(answer, file, protocol=pickle.HIGHEST_PROTOCOL)
+
+
+def _used_memory() -> int:
+    """Address space of this process [bytes]; 0 where the system does not say."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    except (OSError, ValueError):
+        return 0

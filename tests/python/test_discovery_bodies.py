@@ -151,6 +151,10 @@ def place_and_speed(motion: np.ndarray) -> dict[str, np.ndarray]:
     return {"x.second": motion[:, 1], "v.first": motion[:, 2]}
 
 
+def speed(motion: np.ndarray) -> dict[str, np.ndarray]:
+    return {"v.slide": motion[:, 1]}
+
+
 def drag_of_chain(v: np.ndarray) -> np.ndarray:
     """Between b and c; the last axis is that of the bodies."""
     u = v[..., 2] - v[..., 1]
@@ -209,6 +213,12 @@ CASES = {
         CHAIN, lambda w: chain(w, lambda q, v: drag_of_chain(v) * np.array([0, 1, -1])), three_kinds,
         "quadratic_drag@b-c", {"drag": 0.3}, noise=5e-3, frequencies=(4.0, 6.5, 8.0),
     ),
+    # masses and forces are told by their ratio alone
+    "a speed alone": Hidden(
+        ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), speed, "quadratic_drag@slide",
+        {"drag": 0.408}, noise=1e-3,
+        others={"spring.frame.stiffness": 40.8, "contact.buffer.upper": 0.08},
+    ),
     "place and forces": Hidden(
         ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), place_and_forces,
         "quadratic_drag@slide", {"drag": 0.4}, ("backlash", "quadratic_drag", "cubic_spring"),
@@ -217,6 +227,7 @@ CASES = {
 }  # fmt: skip
 
 REPEATED = {
+    "a speed alone",
     "place and forces",
     "a stop",
     "a pair",
@@ -332,6 +343,47 @@ def test_columns_that_mean_nothing_are_refused(columns, why, tmp_path: Path) -> 
     path = tmp_path / "record.csv"
     head = ",".join(["t", *columns])
     np.savetxt(path, rows, delimiter=",", header=f"# units: t s, x m\n{head}", comments="")
+    with pytest.raises(SeparatrixError, match=why):
+        discover(base, [path])
+
+
+@pytest.mark.usefixtures("library")
+def test_a_speed_alone_tells_the_machine(tmp_path: Path) -> None:
+    """x'' + c x' + k x = f cos(w t) from x = 0 in closed form, of which the case is off."""
+    base, made, random = tmp_path / "base.toml", [], np.random.default_rng(5)
+    base.write_text(ONE.partition("[contact")[0].replace("mass = 1.02", "mass = 1"))
+    for w in (5.5, 7.0, 8.0):
+        t = np.arange(500) * 2 * np.pi / w / 50
+        steady = 4.9 / (40 - w**2 + 0.6j * w)
+        free = -0.3 + 1j * np.sqrt(40 - 0.3**2)
+        # Re(begun) = -Re(steady), Re(free begun) = -Re(i w steady)
+        x0, v0 = -np.real(steady), -np.real(1j * w * steady)
+        begun = x0 + 1j * (free.real * x0 - v0) / free.imag
+        v = np.real(1j * w * steady * np.exp(1j * w * t) + free * begun * np.exp(free * t))
+        v += 2e-3 * np.std(v) * random.standard_normal(t.size)
+        made.append(tmp_path / f"record_{w:g}.csv")
+        head = f"# drive_frequency_rad_s: {w}\n# phase: 0\n# units: t s, v mm/s\nt,v"
+        np.savetxt(made[-1], np.column_stack([t, 1e3 * v]), delimiter=",", header=head, comments="")
+    verdict = discover(base, made[:2], made[2:], Options(seed=1, quick=True, candidates=("quadratic_drag",)))
+    assert (verdict["outcome"], verdict["effects"]) == ("none", [])
+    wanted = {"spring.frame.stiffness": 40, "spring.frame.damping": 0.6, "nuisance:drive_scale": 0.98}
+    for path, value in wanted.items():
+        found = verdict["parameters"][path]
+        assert abs(found["value"] - value) < 4 * found["standard_error"] < 0.15 * value, path
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(("case", "name", "why"), [
+    (TWO, "v.first", "found speeds and no place of a machine with impacts \\(contact.stop\\), allowed"),
+    (None, "v", "found a speed and no x, allowed where the machine is written joint by joint"),
+])  # fmt: skip
+def test_speeds_alone_are_refused_where_they_tell_too_little(case, name, why, tmp_path: Path) -> None:
+    base = tmp_path / "base.toml"
+    base.write_text(case or (Path(__file__).parents[2] / "examples/measured_pendulum.toml").read_text())
+    t = np.linspace(0, 20, 1001)
+    rows = np.column_stack([t, 0.1 * np.sin(7 * t)])
+    path = tmp_path / "record.csv"
+    np.savetxt(path, rows, delimiter=",", header=f"t,{name}", comments="")
     with pytest.raises(SeparatrixError, match=why):
         discover(base, [path])
 

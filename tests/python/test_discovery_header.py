@@ -174,3 +174,67 @@ def test_units_of_datasets_are_their_own_whatever_lies_between(tmp_path):
             file[name] = IN_BETWEEN[name]
         file["t"].attrs["units"], file["x"].attrs["units"] = "s", "mm"
     assert np.allclose(read_record(tmp_path / "record.h5").x, 1e-3 * COLUMNS["x"])
+
+
+def stated(path, columns, units, header):
+    with h5py.File(path, "w") as file:
+        for name, column in columns.items():
+            file[name] = column
+        for name, unit in units.items():
+            file[name].attrs["unit" if name == "phi" else "units"] = unit
+        file.attrs.update(header)
+    return read_record(path)
+
+
+def test_units_of_every_dataset_count(tmp_path):
+    columns = {"t": 1e3 * T, "x": COLUMNS["x"], "v": 0.5 * np.cos(5 * T), "force": 3 + T, "phi": T}
+    units = {"t": "ms", "x": "millimeters", "v": "mm s-1", "force": "kN", "phi": "degrees"}
+    record = stated(tmp_path / "a.h5", columns, units, {})
+    assert np.allclose(record.t, T)
+    assert np.allclose(record.x, 1e-3 * COLUMNS["x"])
+    assert np.allclose(record.v, 0.5e-3 * np.cos(5 * T))
+    assert np.allclose(record.force, 1e3 * (3 + T))
+    assert np.allclose(record.phi, np.pi / 180 * T)
+
+
+def test_a_unit_of_one_dataset_counts_and_the_others_are_told(tmp_path):
+    record = stated(tmp_path / "a.h5", COLUMNS | {"force": T}, {"x": "mm"}, {})
+    assert np.allclose(record.x, 1e-3 * COLUMNS["x"])
+    assert any("no unit of force, t: read in SI units" in one for one in record.notes)
+
+
+@pytest.mark.parametrize("unit", ["V", "1", "full scale", "m/s"])
+def test_units_that_are_none_of_the_column_are_refused(unit, tmp_path):
+    with pytest.raises(SeparatrixError, match=f"'x' is in '{unit}', expected one of m, cm, mm"):
+        stated(tmp_path / "a.h5", COLUMNS, {"x": unit}, {})
+
+
+def test_units_that_contradict_each_other_are_refused(tmp_path):
+    why = "'units' says 'm' of 'x', which itself says 'mm'"
+    with pytest.raises(SeparatrixError, match=why):
+        stated(tmp_path / "a.h5", COLUMNS, {"x": "mm"}, {"units": "t s, x m"})
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{a},{b}\n" for a, b in zip(T, COLUMNS["x"], strict=True))
+    path.write_text(f"# units: s, m\nt,x [mm]\n{rows}")
+    with pytest.raises(SeparatrixError, match=why):
+        read_record(path)
+    # the user has the last word
+    path.write_text(f"t,x [mm]\n{rows}")
+    path.with_name("a.csv.keys").write_text("units: t s, x um\n")
+    record = read_record(path)
+    assert np.allclose(record.x, 1e-6 * COLUMNS["x"])
+    assert any("x is in 'um' as the user says, not in 'mm'" in one for one in record.notes)
+
+
+def test_packed_datasets_are_unpacked(tmp_path):
+    """As the CF conventions have it: scale, offset, and a number for what is missing."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"] = T
+        file["x"] = np.round(1e5 * COLUMNS["x"]).astype("i2")
+        file["x"].attrs.update({"scale_factor": 1e-5, "add_offset": 0.5, "_FillValue": np.int16(-999)})
+        file["t"].attrs["units"] = "seconds since 2026-01-01"
+    assert np.allclose(read_record(tmp_path / "a.h5").x, 0.5 + COLUMNS["x"], atol=1e-5)
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file["x"][7] = -999
+    with pytest.raises(SeparatrixError, match="row 8: 'x' is nan"):
+        read_record(tmp_path / "a.h5")

@@ -178,7 +178,7 @@ def _parser() -> Parser:
         metavar="RECORD",
         nargs="+",
         type=Path,
-        help="record to fit (CSV, HDF5, .mat, .npz, UFF 58, TDMS)",
+        help="record to fit (CSV, HDF5, .mat, .npz, UFF 58, TDMS, MDF, LVM, WAV)",
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results")
     parser.add_argument(

@@ -140,6 +140,12 @@ def _prepared(record: Record, model, rest: Record | None, options: Options) -> P
         raise SeparatrixError(
             f"{record.file}: found columns {found}, allowed for a base machine of one body x, v"
         )
+    for one in (record, rest):
+        if one is not None and not one.has_place:
+            raise SeparatrixError(
+                f"{one.file}: found a speed and no x, allowed where the machine is written joint by joint "
+                "(body.NAME, spring.NAME, also of one body), without impacts: there each start is fitted"
+            )
     return prepare_force(record, model, rest) if options.compare == "force" else prepare(record, model, rest)
 
 

@@ -254,7 +254,8 @@ def _notes(findings: Findings) -> list[str]:
     for _, data, fitted in fits:
         notes += unused(data, fitted.fit)
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
-    if contact and not any(one.impacts.size for one in bench.training.smoothed):
+    placed = any(one.record.has_place for one in bench.training.prepared)
+    if contact and placed and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
         why = (
             ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][2].fit) else ""

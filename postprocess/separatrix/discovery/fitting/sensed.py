@@ -173,7 +173,7 @@ class SensedData(Data):
     def _observed(self, prepared: SensedPrepared, known: np.ndarray, unseen: np.ndarray) -> np.ndarray:
         """The motion of the machine of the case that is told what was measured."""
         model, t = self.model, prepared.record.t
-        period = prepared.period_samples or swing_samples(prepared.record.x)
+        period = prepared.period_samples or swing_samples(_moving(prepared))
         every = max(1, round(period / _TOLD))
         values, active = np.zeros(0), []
         if prepared.frequency is not None:
@@ -213,7 +213,7 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
     bodies, calm, lengths = [], [], []
     for one in prepared:
         record = one.record
-        swing = swing_samples(record.x)
+        swing = swing_samples(_moving(one))
         seen = {
             sensor.name: smooth(record.t, sensor.values, sensor.sigma, one.period_samples or swing)
             for sensor in one.sensors
@@ -235,6 +235,13 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
     return SensedData(prepared, calm, stages, model=model, bodies=bodies)
 
 
+def _moving(one: SensedPrepared) -> np.ndarray:
+    """A signal that swings as the machine does: the first place, else the first speed."""
+    if one.record.has_place:
+        return one.record.x
+    return next(sensor.values for sensor in one.sensors if sensor.kind == "v")
+
+
 def _calm(structure: Structure, t: np.ndarray, seen: dict[str, Smoothed]) -> Smoothed:
     """A motion that is slow where any speed along a joint is: there friction switches."""
     speeds = {name[2:]: one.state[:, 1 if name[0] == "x" else 0] for name, one in seen.items()}
@@ -246,7 +253,10 @@ def _calm(structure: Structure, t: np.ndarray, seen: dict[str, Smoothed]) -> Smo
             pairs = zip(structure.names, row, strict=True)
             speed = sum(share * speeds[name] for name, share in pairs if share)
             slowest = np.minimum(slowest, np.abs(speed) / max(float(np.sqrt(np.mean(speed**2))), 1e-300))
-    impacts = np.unique(np.concatenate([one.impacts for name, one in seen.items() if name[0] == "x"]))
+    impacts = np.concatenate(
+        [np.zeros(0, int), *(one.impacts for name, one in seen.items() if name[0] == "x")]
+    )
+    impacts = np.unique(impacts)
     state = np.zeros((t.size, 3))
     state[:, 1] = slowest
     return Smoothed(t, state, np.zeros((t.size, 3, 3)), impacts)

@@ -8,14 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.tables import CHANNELS, KEYS, NUMBERS, SAME, Table, is_noise, is_sensor
+from separatrix.discovery.measured.tables import (
+    CHANNELS,
+    KEYS,
+    NUMBERS,
+    SAME,
+    Table,
+    has_place,
+    is_noise,
+    is_sensor,
+    kind_of,
+)
 from separatrix.errors import SeparatrixError
 
 _TURN = 2 * np.pi
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
-_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048}
 _ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180, "turn": _TURN}
-_FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "N m": 1.0}
+_FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": 9.80665, "lbf": 4.4482216152605, "N m": 1.0}
 _FREQUENCY = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6}
 _RATE = {"rad/s": 1.0, "Hz": _TURN, "rpm": _TURN / 60}
 _SPEED = {f"{unit}/s": size for unit, size in (_LENGTH | _ANGLE).items()}
@@ -42,11 +52,27 @@ _SAME |= {
     "radians": "rad",
     "turns": "turn",
     "Nm": "N m",
+    "N*m": "N m",
+    "N.m": "N m",
     "hz": "Hz",
+    "inch": "in",
+    "newton": "N",
+    "newtons": "N",
+    "kilonewtons": "kN",
+    "micrometres": "um",
+    "micrometers": "um",
+    "radian": "rad",
+    "degree": "deg",
 }
+# what files say that say nothing
+_UNSTATED = ("", "none", "n/a", "na", "-", "unknown", "not applicable")
 _EXAMPLES = {"units": "units: s, mm", "phase": "phase: 0.35, or phase: 20 deg at t = 0 s"}
 _AT = re.compile(r"\s*(?:at|@)\s*t\s*=\s*(.*)")
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\w*)\s*(.*)", re.IGNORECASE)
+# longest symbol of a unit; longer ones are words
+_SYMBOL = 3
+# characters of a unit in a message
+_LONGEST_UNIT = 60
 # likeness of a header key to a known one that makes it a misspelling
 _NEAR = 0.7
 _POSITIVE = ("sampling_rate_hz", "drive_ratio", "drive_frequency_rad_s", "drive_scale")
@@ -95,7 +121,7 @@ def _quantity(
 ) -> float:
     """A number with a unit, or in the `usual` one, in the unit of the key."""
     found = _NUMBER.fullmatch(text.strip())
-    unit = "" if found is None else _SAME.get(found.group(2).strip(), found.group(2).strip())
+    unit = "" if found is None else _plain(found.group(2))
     if found is None or (unit and unit not in units):
         example = _EXAMPLES.get(
             key, f"{key}: {'0.5' if not units else f'0.5, or {key}: 0.5 {list(units)[-1]}'}"
@@ -114,42 +140,118 @@ def _doubt(header: dict[str, str], numbers: dict[str, float], notes: list[str]) 
         notes.append(f"phase is {numbers['phase']:g} rad, more than a turn: degrees?")
 
 
+def is_stated(unit: str) -> bool:
+    """Whether a file says a unit, and not that there is none."""
+    return unit.strip().lower() not in _UNSTATED
+
+
+def same_unit(kind: str, one: str, other: str) -> bool:
+    """Whether two units of a kind of column are the same."""
+    sizes = [_size(kind, unit) for unit in (one, other)]
+    return (
+        None not in sizes
+        and bool(np.isclose(*sizes, rtol=1e-6, atol=0))
+        and _is_angle(one) == _is_angle(other)
+    )
+
+
 def to_si(path: Path, table: Table, notes: list[str]) -> tuple[dict[str, np.ndarray], str, float]:
     """The columns in SI, the unit of x, m or rad, and the unit of time [s]."""
-    if "units" not in table.header:
+    notes += table.notes
+    units = _all_units(path, table, notes)
+    if not units:
         notes.append("no 'units': read as s and m (rad of an angle)")
         return dict(table.columns), "m", 1.0
-    units, columns = _units(path, table), {}
+    silent = [name for name in table.columns if name not in units]
+    if silent:
+        notes.append(f"no unit of {', '.join(silent)}: read in SI units")
+    columns = {}
     for name, column in table.columns.items():
-        unit = units.get(name, units.get(_kind(name)))
-        columns[name] = column if unit is None else column * UNITS[_kind(name)][unit]
-    place = next(units[name] for name in units if _kind(name) == "x")
-    return columns, "rad" if place in _ANGLE else "m", _TIME[units["t"]]
+        with np.errstate(invalid="ignore", over="ignore"):
+            # values that are no numbers are refused with their row
+            columns[name] = column * _size(kind_of(name), units[name]) if name in units else column
+    # of an angle alone without a place, too
+    kind = "x" if has_place(table.columns) else "v"
+    place = next((units[name] for name in units if kind_of(name) == kind), "m")
+    return columns, "rad" if _is_angle(place) else "m", _size("t", units.get("t", "s"))
 
 
-def _kind(name: str) -> str:
-    """What a column is: `x` of `x.BODY`, `force` of `F.JOINT`."""
-    kind = name.partition(".")[0] if is_sensor(name) else name
-    return SAME.get(kind, kind)
+def _all_units(path: Path, table: Table, notes: list[str]) -> dict[str, str]:
+    """Units of the columns by the header and by what the file states beside them, which must agree."""
+    stated = {name: unit for name, unit in table.units.items() if name in table.columns and is_stated(unit)}
+    told = _units(path, table) if "units" in table.header else {}
+    by_header = {name: told.get(name, told.get(kind_of(name), "")) for name in table.columns}
+    by_header = {name: unit for name, unit in by_header.items() if unit}
+    for name, unit in stated.items():
+        own = by_header.get(name)
+        if own is not None and table.own_units:
+            if not same_unit(kind_of(name), own, unit):
+                notes.append(f"{name} is in '{own}' as the user says, not in '{unit}' as the file states")
+        elif _size(kind_of(name), unit) is None:
+            allowed = ", ".join(UNITS[kind_of(name)])
+            raise SeparatrixError(
+                f"{path}: '{name}' is in '{_shown(unit)}', expected one of {allowed}; where the file "
+                f"is wrong, say it in {path.name}.keys, as in 'units: t s, x 2.5 mm'"
+            )
+        elif own is not None and not same_unit(kind_of(name), own, unit):
+            raise SeparatrixError(f"{path}: 'units' says '{own}' of '{name}', which itself says '{unit}'")
+    return stated | by_header
+
+
+def _shown(unit: str) -> str:
+    """What a damaged file says, in a message."""
+    return "".join(one if one.isprintable() else "?" for one in unit[:_LONGEST_UNIT])
+
+
+def _size(kind: str, unit: str) -> float | None:
+    """Size of a unit, as `mm` or `2.5 mm`, over the SI unit; None of what is no unit of such a column."""
+    found = _NUMBER.fullmatch(unit.strip())
+    times = 1.0
+    if found and found.group(2):
+        times, unit = float(found.group(1)), found.group(2)
+    size = UNITS.get(kind, {}).get(_plain(unit))
+    return None if size is None or not np.isfinite(times) or times == 0 else times * size
+
+
+def _is_angle(unit: str) -> bool:
+    """Whether a unit is of an angle, or one over time."""
+    found = _NUMBER.fullmatch(unit.strip())
+    return _plain(found.group(2) if found else unit).partition("/")[0] in _ANGLE
+
+
+def _plain(unit: str) -> str:
+    """A unit in the way it is written here: `m s-2`, `m/s\u00b2` and `Meters/sec/sec` are `m/s^2`."""
+    unit = re.sub(r"\s+since\s.*", "", unit.strip()).strip("[]()")
+    unit = unit.replace("\u00b2", "^2").replace("**", "^").replace("\u00b7", " ")
+    unit = re.sub(r"/s(ec)?/s(ec)?$", "/s^2", unit)
+    unit = re.sub(r"[ *.]s\^?-1$", "/s", unit)
+    unit = re.sub(r"[ *.]s\^?-2$", "/s^2", unit)
+    unit = re.sub(r"/sec$", "/s", unit)
+    unit = re.sub(r"/(s|sec)\^?2$", "/s^2", unit)
+    above, over, below = unit.partition("/")
+    above = above.strip()
+    if above not in _SAME and len(above) > _SYMBOL:
+        above = above.lower()
+    return _SAME.get(above, above) + over + below.strip()
 
 
 def _units(path: Path, table: Table) -> dict[str, str]:
     """Unit of each column: `s, mm`, in the order of the columns, or by name, as in `t s, x mm`."""
     text, columns = table.header["units"], table.columns
     entries = [entry.strip() for entry in re.split(r"[,;]", text) if entry.strip()]
-    told = [_entry(entry, [one for one in columns if is_sensor(one)]) for entry in entries]
-    _check_order(path, table, sum(not name for name, _ in told))
+    said = [_entry(entry, [one for one in columns if is_sensor(one)]) for entry in entries]
+    _check_order(path, table, sum(not name for name, _ in said))
     found, order = {}, iter(table.names)
-    for name, unit in told:
+    for name, unit in said:
         if not name:
             name = next(order, "")
             if name not in columns:
                 continue
-        unit = _SAME.get(unit, unit)
-        if unit not in UNITS.get(_kind(name), ()) or name in found:
+        if _size(kind_of(name), unit) is None or name in found:
             _refuse(path, text)
         found[name] = unit
-    if not {"t", "x"} <= {_kind(name) for name in found if name in columns or name in UNITS}:
+    known = {kind_of(name) for name in [*found, *table.units] if name in columns or name in UNITS}
+    if "t" not in known or not known & ({"x"} if has_place(columns) else {"x", "v"}):
         _refuse(path, text)
     return found
 

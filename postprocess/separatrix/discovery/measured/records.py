@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured records: columns t, x [, v, force, phi] from CSV or HDF5, in SI units, checked row by row."""
+"""Measured records: columns t, x [, v, force, phi] of any file, in SI units, checked row by row."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -8,6 +8,7 @@ from itertools import count
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from separatrix.discovery.measured.clock import pieces_of
 from separatrix.discovery.measured.formats import read_table
@@ -17,6 +18,8 @@ from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_
 from separatrix.errors import SeparatrixError
 
 _FEWEST_SAMPLES = 60
+# beyond which squares overflow: no measured value [SI]
+_LARGEST = 1e100
 
 
 @dataclass
@@ -31,7 +34,7 @@ class Record:
     phi: np.ndarray | None = None
     # of several bodies: columns by what they are of, as `x.BODY`
     sensors: dict[str, np.ndarray] = field(default_factory=dict)
-    # whether x is a column itself, and not the first place among the sensors
+    # whether x is a column itself, and not the first place among the sensors or the integral of a speed
     own_x: bool = True
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
@@ -40,6 +43,11 @@ class Record:
     file: str = ""
     # which of its rows, for messages
     part: str = ""
+
+    @property
+    def has_place(self) -> bool:
+        """Whether a place was measured: else x is the integral of a speed."""
+        return self.own_x or any(name[0] == "x" for name in self.sensors)
 
     @property
     def interval(self) -> float:
@@ -82,7 +90,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     columns, unit, of_time = to_si(path, table, notes)
     numbers = numbers_of(path, header, of_time, notes)
     for name, column in columns.items():
-        bad = np.flatnonzero(~np.isfinite(column))
+        bad = np.flatnonzero(~(np.abs(column) < _LARGEST))
         if bad.size:
             raise SeparatrixError(f"{where(bad[0])}: '{name}' is {column[bad[0]]}; {bad.size} such values")
     sensors = [name for name in columns if is_sensor(name)]
@@ -90,8 +98,12 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     own_x = "x" in columns
     if own_x:
         places.insert(0, "x")
-    else:
+    elif places:
         columns["x"] = columns[places[0]]
+    else:
+        speed = next(name for name in ("v", *sensors) if name in columns and name[0] == "v")
+        columns["x"] = cumulative_trapezoid(columns[speed], columns["t"], initial=0)
+        notes.append(f"no place: x is the integral of {speed} from 0 and is not compared")
     t, x = columns["t"], columns["x"]
     if t.size < _FEWEST_SAMPLES:
         raise SeparatrixError(f"{path}: {t.size} samples, at least {_FEWEST_SAMPLES} are needed")
@@ -105,7 +117,8 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     if not at_rest:
         if np.ptp(x) == 0:
             raise SeparatrixError(f"{path}: 'x' is constant")
-        kept = np.delete(kept, left_out(t, x, unit, where, notes))
+        if places:
+            kept = np.delete(kept, left_out(t, x, unit, where, notes))
         columns = {name: column[kept] for name, column in columns.items()}
         x = columns["x"]
     t, pieces = pieces_of(columns["t"], x, _FEWEST_SAMPLES, where, notes)

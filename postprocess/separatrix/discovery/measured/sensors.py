@@ -43,8 +43,8 @@ class SensedPrepared(Prepared):
 
     @property
     def place(self) -> str:
-        """The body whose place the record has as x."""
-        return next(one.of for one in self.sensors if one.kind == "x")
+        """The body whose place the record has as x, or whose speed it has first."""
+        return min((one for one in self.sensors if one.kind in "xv"), key=lambda one: one.kind != "x").of
 
     @property
     def signal(self) -> np.ndarray:
@@ -87,6 +87,8 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
             "bodies: keep a part "
             f"of it, or every {-(-record.t.size // _MOST_SAMPLES)}th row"
         )
+    if not record.has_place:
+        _check_impacts(record, structure)
     columns = _by_body(record, structure.watched)
     sensors = [_sensor(record, name, values, structure, notes) for name, values in columns.items()]
     first = sensors[0]
@@ -103,6 +105,16 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
     _find_drive(prepared, model)
     return prepared
+
+
+def _check_impacts(record: Record, structure: Structure) -> None:
+    """Speeds alone do not tell where a stop is, nor on which side of an impact a sample lies."""
+    hard = [one.path for one in structure.joints if one.path.startswith("contact.") and one.law not in FORCES]
+    if hard:
+        raise SeparatrixError(
+            f"{record.file}: found speeds and no place of a machine with impacts "
+            f"({', '.join(hard)}), allowed with x or x.BODY"
+        )
 
 
 def _by_body(record: Record, watched: str) -> dict[str, np.ndarray]:
@@ -156,10 +168,11 @@ def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure,
     sigma = max(sigma, QUIET * float(np.std(values)))
     if not stated:
         notes.append(f"noise of {name}: {sigma:.3g}, from fourth differences")
-    if kind == "x" and np.std(values) < 5 * sigma:
+    unit = "m/s" if kind == "v" else "m"
+    if (kind == "x" or not record.has_place) and kind in "xv" and np.std(values) < 5 * sigma:
         raise SeparatrixError(
-            f"{record.file}: {name} scatters by {np.std(values):.3g} m at a noise of {sigma:.3g} m: "
-            "nothing but noise"
+            f"{record.file}: {name} scatters by {np.std(values):.3g} {unit} at a noise of {sigma:.3g} "
+            f"{unit}: nothing but noise"
         )
     return Sensor(name, kind, of, values, sigma, bool(stated))
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of numbers with a header of keys, from CSV or HDF5."""
+"""Tables of numbers with a header of keys, and those of text: CSV."""
 
 import codecs
 import re
@@ -8,14 +8,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from separatrix.errors import SeparatrixError
-from separatrix.trial import try_first
 
 CHANNELS = ("x", "v", "force", "phi")
 """Columns that are used, next to `t`."""
+READ = (
+    "CSV (text in UTF-8), HDF5 and netCDF-4, MATLAB .mat, NumPy .npz, LabVIEW .lvm, WAV; UFF 58 and TDMS "
+    "with pip install 'separatrix[formats]'; MDF with pip install 'separatrix[mdf]'"
+)
+"""What is read, for messages."""
 SAME = {"F": "force"}
 """Other names of columns."""
 NUMBERS = {
@@ -54,9 +57,20 @@ def is_column(name: str) -> bool:
     return name in ("t", *CHANNELS) or is_sensor(name)
 
 
+def kind_of(name: str) -> str:
+    """What a column is: `x` of `x.BODY`, `force` of `F.JOINT`."""
+    kind = name.partition(".")[0] if is_sensor(name) else name
+    return SAME.get(kind, kind)
+
+
 def has_place(names: Iterable[str]) -> bool:
     """Whether a place is among the columns."""
-    return any(name == "x" or (is_sensor(name) and name[0] == "x") for name in names)
+    return any(kind_of(name) == "x" for name in names)
+
+
+def has_motion(names: Iterable[str]) -> bool:
+    """Whether a place or a speed is among the columns."""
+    return any(kind_of(name) in ("x", "v") for name in names)
 
 
 def is_noise(key: str) -> bool:
@@ -66,7 +80,11 @@ def is_noise(key: str) -> bool:
 
 @dataclass
 class Table:
-    """Texts of the header, columns by name, and the line of each row where the file has lines."""
+    """Texts of the header, columns by name, and the line of each row where the file has lines.
+
+    `units`: of columns, as the file states them beside these; `own_units`: whether those of the header are
+    the user's word on a file that states others.
+    """
 
     header: dict[str, str]
     columns: dict[str, np.ndarray]
@@ -74,6 +92,16 @@ class Table:
     unused: list[str] = field(default_factory=list)
     # of all columns in the order of the file; without those not used where a file has no such order
     names: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    own_units: bool = False
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file may be text of any encoding: bytes of zero are in UTF-16 alone."""
+    with path.open("rb") as file:
+        begin = file.read(_CHUNK)
+    return begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" not in begin
 
 
 def read_csv(path: Path) -> Table:
@@ -108,7 +136,7 @@ def _read_plain(path: Path, count: int) -> Table | None:
                 return None
         first = file.readline()
     names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
-    if "t" not in names or not has_place(names) or not first.strip():
+    if "t" not in names or not has_motion(names) or not first.strip():
         return None
     used = [name for name in names if is_column(name)]
     try:
@@ -123,7 +151,8 @@ def _read_plain(path: Path, count: int) -> Table | None:
     if count != lines[-1]:
         return None
     columns = {name: table[:, names.index(name)].copy() for name in used}
-    return Table(head.header, columns, lines, [name for name in names if name not in used], names)
+    unused = [name for name in names if name not in used]
+    return Table(head.header, columns, lines, unused, names, head.units)
 
 
 def check_length(path: Path, samples: int) -> None:
@@ -142,6 +171,7 @@ def _read_by_lines(path: Path) -> Table:
 def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
     """Header, names and (of a `whole` file) rows, line by line."""
     header: dict[str, str] = {}
+    units: dict[str, str] = {}
     stands: dict[str, int] = {}
     names: list[str] | None = None
     separator = ","
@@ -163,20 +193,21 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
             continue
         _check_encoding(path, number, text)
         if names is None:
-            separator = next((mark for mark in ";,\t" if _has_t_and_x(text, mark)), ",")
+            separator = next((mark for mark in ";,\t" if _has_t_and_motion(text, mark)), ",")
             names = _names(path, number, text, separator)
             used = [name for name in names if is_column(name)]
-            _units_of_names(header, text, separator, used)
+            units = _units_of_names(text, separator, used)
         else:
             lines.append(number)
             rows.append(_numbers(path, number, text, separator, names, used))
     if not whole:
-        return Table(header, {})
+        return Table(header, {}, units=units)
     if names is None or not rows:
         raise SeparatrixError(f"{path}: no samples; expected a header row 't,x' and rows of numbers")
     table = np.array(rows)
     columns = {name: table[:, i].copy() for i, name in enumerate(used)}
-    return Table(header, columns, np.array(lines), [name for name in names if name not in used], names)
+    unused = [name for name in names if name not in used]
+    return Table(header, columns, np.array(lines), unused, names, units)
 
 
 def _lines(path: Path) -> list[str]:
@@ -192,7 +223,7 @@ def _check_encoding(path: Path, number: int, text: str) -> None:
     try:
         text.encode()
     except UnicodeEncodeError:
-        raise SeparatrixError(f"{path}:{number}: neither HDF5 nor text in UTF-8") from None
+        raise SeparatrixError(f"{path}:{number}: no text in UTF-8; read are {READ}") from None
 
 
 def _check_place(path: Path, number: int, key: str, stands: dict[str, int], below: bool) -> None:
@@ -203,9 +234,9 @@ def _check_place(path: Path, number: int, key: str, stands: dict[str, int], belo
         raise SeparatrixError(f"{path}:{number}: '{key}' is given again, first in line {stands[key]}")
 
 
-def _has_t_and_x(text: str, separator: str) -> bool:
+def _has_t_and_motion(text: str, separator: str) -> bool:
     names = {_named(name)[0] for name in text.split(separator)}
-    return "t" in names and has_place(names)
+    return "t" in names and has_motion(names)
 
 
 def _named(text: str) -> tuple[str, str]:
@@ -215,17 +246,15 @@ def _named(text: str) -> tuple[str, str]:
     return SAME.get(name, name), unit
 
 
-def _units_of_names(header: dict[str, str], text: str, separator: str, used: list[str]) -> None:
-    """Units beside the names of columns count as if the header had them."""
+def _units_of_names(text: str, separator: str, used: list[str]) -> dict[str, str]:
+    """Units beside the names of columns."""
     units = [_named(name) for name in text.split(separator)]
-    told = [f"{name} {unit}" for name, unit in units if unit and name in used]
-    if told:
-        header.setdefault("units", ", ".join(told))
+    return {name: unit for name, unit in units if unit and name in used}
 
 
 def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
     names = [_named(name)[0] for name in text.split(separator)]
-    if "t" not in names or not has_place(names):
+    if "t" not in names or not has_motion(names):
         raise SeparatrixError(
             f"{path}:{number}: found the header row '{text}', expected 't,x[,v,force,phi]' or, of "
             "several bodies, "
@@ -250,41 +279,3 @@ def _numbers(
         return [float(word) for word in words]
     except ValueError:
         raise SeparatrixError(f"{path}:{number}: '{text}' is not a row of numbers") from None
-
-
-def read_hdf5(path: Path) -> Table:
-    """Read datasets with the names of the columns; keys are attributes."""
-    try_first(path, lambda: _texts(h5py.File(path)))
-    try:
-        with h5py.File(path) as file:
-            header, units = _texts(file)
-            if isinstance(file.get("t"), h5py.Dataset):
-                check_length(path, file["t"].size)
-            columns = {
-                name: np.asarray(file[name][()], float)
-                for name in file
-                if is_column(name) and isinstance(file[name], h5py.Dataset)
-            }
-            unused = sorted(set(file) - columns.keys())
-    except (ArithmeticError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
-        raise SeparatrixError(f"{path}: not a record that can be read: {error}") from None
-    missing = [] if "t" in columns else ["t"]
-    missing += [] if has_place(columns) else ["x"]
-    if missing:
-        raise SeparatrixError(f"{path}: dataset '{missing[0]}' is missing")
-    if len({column.shape for column in columns.values()}) != 1 or columns["t"].ndim != 1:
-        raise SeparatrixError(f"{path}: the datasets are not equally long lists")
-    if len(units) == 2:
-        header.setdefault("units", ", ".join(units))
-    return Table(header, columns, unused=unused, names=list(columns))
-
-
-def _texts(file: h5py.File) -> tuple[dict[str, str], list[str]]:
-    """Keys of the header, and the units of t and x by name where the datasets have them."""
-    header = {key: _text(value) for key, value in file.attrs.items()}
-    found = {name: file[name].attrs for name in ("t", "x") if name in file}
-    return header, [f"{name} {_text(one['units'])}" for name, one in found.items() if "units" in one]
-
-
-def _text(value: object) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)

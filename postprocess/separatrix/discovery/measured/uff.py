@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records in universal files: functions over time (data set 58) and the units of the file (164)."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from separatrix.discovery.measured.arrays import Found, column_of, common_times, library
+from separatrix.discovery.measured.header import is_stated, same_unit
+from separatrix.discovery.measured.tables import is_column, kind_of
+from separatrix.errors import SeparatrixError
+
+# specific data types of UFF 58 (displacement, velocity, force) and the columns that they are
+_OF_TYPE = {8: "x", 11: "v", 9: "force", 13: "force"}
+# types of function and abscissa of a time record: time response over time or what is not said; what is not
+# said over time
+_OVER_TIME = {(1, 17), (1, 0), (0, 17)}
+# of a data set
+_END = b"-1"
+_ROTATIONS = (4, 5, 6)
+# digits of the times of an uneven function in text; of a step, what one more digit would show
+_DIGITS, _COARSE = 6, 0.1
+
+
+def read_uff(path: Path, names: Mapping[str, str]) -> Found:
+    """Functions over time; displacement is x, velocity v, force force, or as `id1` says."""
+    # behind binary data there is no new line
+    if not path.read_bytes().rstrip().endswith(_END):
+        # pyuff leaves out what has no end
+        raise SeparatrixError(f"{path}: is cut off: its last data set has no end")
+    sets = library("pyuff", path, "formats").UFF(str(path)).read_sets()
+    sets = [sets] if isinstance(sets, dict) else sets
+    found, times, others = Found(), {}, 0
+    factors = _factors(path, sets)
+    for one in (one for one in sets if one.get("type") == 58):
+        if (one.get("func_type"), one.get("abscissa_spec_data_type")) not in _OVER_TIME:
+            others += 1
+            continue
+        for line in (str(one.get(f"id{k}", "")) for k in range(1, 6)):
+            key, colon, value = (word.strip() for word in line.partition(":"))
+            if colon:
+                found.key(key, value)
+        said = str(one.get("id1", "")).strip()
+        name = column_of(said, names)
+        if not is_column(name) and not names:
+            name = _OF_TYPE.get(one.get("ordinate_spec_data_type"), "")
+        if not is_column(name):
+            found.unused.append(said or "NONE")
+            continue
+        if name in found.values:
+            raise SeparatrixError(f"{path}: two functions are '{name}': say which in their first line (id1)")
+        found.values[name] = np.asarray(one["data"])
+        times[name] = np.asarray(one["x"], float)
+        unit = _unit(name, one, factors)
+        found.units |= {name: unit} if unit else {}
+        unit = str(one.get("abscissa_axis_units_lab", ""))
+        found.units |= {"t": unit} if is_stated(unit) else {}
+        _check_times(path, name, one, times[name], found.notes)
+    if others:
+        found.notes.append(f"{others} functions that are not over time (spectra, FRF) are left out")
+    found.notes = list(dict.fromkeys(found.notes))
+    if times and "t" not in found.values:
+        found.values["t"] = common_times(path, times)
+        if "units" not in found.values:
+            # by the standard, but it is not stated
+            found.units.setdefault("t", "s")
+    return found
+
+
+def _factors(path: Path, sets: list[dict]) -> tuple[float, float] | None:
+    """Length and force of the file over m and N, None where it has no data set 164."""
+    stated = {(one["length"], one["force"]) for one in sets if one.get("type") == 164}
+    if len(stated) > 1:
+        raise SeparatrixError(f"{path}: found data sets 164 of several units, expected one")
+    if not stated:
+        return None
+    factors = stated.pop()
+    if not all(np.isfinite(one) and one > 0 for one in factors):
+        raise SeparatrixError(f"{path}: data set 164: factors {factors}, expected more than 0")
+    return factors
+
+
+def _unit(name: str, one: dict, factors: tuple[float, float] | None) -> str:
+    """The unit of a function, by its label and by data set 164; '' where the file says nothing."""
+    label = str(one.get("ordinate_axis_units_lab", "")).strip()
+    label = label if is_stated(label) else ""
+    kind = kind_of(name)
+    if factors is None or kind == "phi":
+        return label
+    length, force = factors
+    turns = abs(one.get("rsp_dir") or 0) in _ROTATIONS
+    if kind == "force":
+        unit = f"{1 / (force * length)!r} N m" if turns else f"{1 / force!r} N"
+    else:
+        over = {"x": "", "v": "/s", "a": "/s^2"}[kind]
+        unit = f"rad{over}" if turns else f"{1 / length!r} m{over}"
+    if label and not same_unit(kind, label, unit):
+        # no unit: refused, or the user says which
+        return f"{label} by its label, {unit} by data set 164"
+    return label or unit
+
+
+def _check_times(path: Path, name: str, one: dict, t: np.ndarray, notes: list[str]) -> None:
+    """Tell the rate of even times, and refuse uneven ones whose digits hide the steps."""
+    if one.get("abscissa_spacing"):
+        step = float(one.get("abscissa_inc") or 0.0)
+        if step > 0:
+            notes.append(f"t has even steps of {step:.9g} s as the file states, {1 / step:.9g} Hz")
+        return
+    if t.size < 2:
+        return
+    last = float(np.max(np.abs(t)))
+    steps = np.diff(t)
+    usual = float(np.ptp(t)) / steps.size
+    finest = 10.0 ** (np.floor(np.log10(last)) - _DIGITS + 1) if last > 0 else 0.0
+    if not finest > _COARSE * usual or np.ptp(steps) < 1e-3 * usual:
+        return
+    rounded = np.array([float(f"{value:.{_DIGITS - 1}e}") for value in t])
+    if np.allclose(rounded, t, rtol=1e-9, atol=0):
+        raise SeparatrixError(
+            f"{path}: the times of '{name}' have six digits ({t[-2]:.6g} and {t[-1]:.6g} s at the end), too "
+            f"few for steps of {usual:.3g} s: write even times (abscissa_spacing 1), or begin at 0"
+        )
