@@ -13,8 +13,18 @@ from separatrix.arguments import Parser, positive, whole_number
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.structures.content import Matrices, Modes, add_points
 from separatrix.structures.files import write
-from separatrix.structures.readers import read_matrices, read_modes
-from separatrix.structures.reduction import checks, condense, craig_bampton, hold, modal, undamped_modes
+from separatrix.structures.readers import read_matrices
+from separatrix.structures.reduction import (
+    NO_MASS,
+    checks,
+    condense,
+    craig_bampton,
+    hold,
+    modal,
+    smallest_share,
+    undamped_modes,
+)
+from separatrix.structures.universal import read_modes
 from separatrix.version import __version__
 
 # Most coordinates of a machine.
@@ -49,8 +59,11 @@ def run(options: argparse.Namespace) -> list[str]:
             "with --modes",
             USAGE,
         )
-    if isinstance(reduced, Matrices) and np.linalg.eigvalsh(reduced.mass.toarray())[0] <= 0:
-        raise SeparatrixError("mass: found a singular or indefinite matrix, allowed a positive definite one")
+    if isinstance(reduced, Matrices) and not smallest_share(reduced.mass.toarray()) > NO_MASS:
+        raise SeparatrixError(
+            "mass: found a singular or indefinite matrix, allowed a positive definite one "
+            "(--reduce modal leaves out what has no mass)"
+        )
     if options.damping_ratio is not None:
         reduced = _damped(reduced, options.damping_ratio)
     write(reduced, options.output, options.title, options.reduce)
@@ -144,11 +157,14 @@ def _parser() -> Parser:
         "input",
         nargs="?",
         type=Path,
-        help="a file with all matrices (.mat, .npz, .op4) or with modes (.uff, .unv)",
+        help="a file with all matrices (.mat, .npz, .op4; of CalculiX .sti) or with modes (.uff, .unv)",
     )
     for role in ("mass", "stiffness", "damping"):
         parser.add_argument(
-            f"--{role}", type=Path, metavar="FILE", help=f"the {role} matrix: .mtx, .hb, .mat, .npy, .op4"
+            f"--{role}",
+            type=Path,
+            metavar="FILE",
+            help=f"the {role} matrix: .mtx, .hb, .sti, .mas, .mat, .npy, .npz, .op4",
         )
     parser.add_argument(
         "--names", type=_named, action="append", default=[], metavar="ROLE=NAME",

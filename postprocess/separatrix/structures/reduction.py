@@ -15,6 +15,8 @@ from separatrix.structures.content import Matrices, Modes
 _DENSE = 1500
 # A squared frequency below this share of the largest, and a mass below it, are none.
 _NONE = 1e-12
+# The same for the masses of motions; the rounding of 14 digits stays below it.
+NO_MASS = 1e-12
 
 
 @dataclass
@@ -80,10 +82,10 @@ def undamped_modes(structure: Matrices, count: int | None = None) -> tuple[np.nd
     size = structure.size
     count = size if count is None else min(count, size)
     try:
+        if np.any(structure.mass.diagonal() <= 0):
+            raise SeparatrixError("mass: found an indefinite matrix, allowed a positive semidefinite one")
         if size <= _DENSE or count > size // 2:
-            squares, shapes = linalg.eigh(
-                structure.stiffness.toarray(), structure.mass.toarray(), subset_by_index=(0, count - 1)
-            )
+            squares, shapes = _dense_modes(structure.stiffness.toarray(), structure.mass.toarray(), count)
         else:
             # a small negative shift: a structure that floats has a singular stiffness
             shift = -1e-6 * abs(structure.stiffness.diagonal()).max() / abs(structure.mass.diagonal()).max()
@@ -100,6 +102,43 @@ def undamped_modes(structure: Matrices, count: int | None = None) -> tuple[np.nd
     # the sign of a shape is free: largest entry positive, so that two runs give one file
     signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
     return squares, shapes * np.where(signs == 0, 1, signs)
+
+
+def smallest_share(mass: np.ndarray) -> float:
+    """Return the smallest eigenvalue of a mass matrix, with ones on its diagonal, over the largest."""
+    diagonal = np.diagonal(mass)
+    if np.any(diagonal <= 0):
+        return 0.0
+    shares = linalg.eigvalsh(mass / np.sqrt(np.outer(diagonal, diagonal)))
+    return float(shares[0] / shares[-1])
+
+
+def _dense_modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest modes, no more than there are motions with mass.
+
+    Elements of reduced integration leave motions without mass that are no coordinates: these follow the
+    others at rest, as coordinates without mass do.
+    """
+    if smallest_share(mass) > NO_MASS:
+        return linalg.eigh(stiffness, mass, subset_by_index=(0, count - 1))
+    scale = 1 / np.sqrt(np.diagonal(mass))
+    shares, axes = linalg.eigh(mass * np.outer(scale, scale))
+    if shares[0] < -NO_MASS * shares[-1]:
+        raise SeparatrixError(
+            f"mass: found an indefinite matrix (smallest share {shares[0] / shares[-1]:.2g}), "
+            "allowed a positive semidefinite one"
+        )
+    moving = shares > NO_MASS * shares[-1]
+    heavy = scale[:, None] * axes[:, moving] / np.sqrt(shares[moving])
+    light = scale[:, None] * axes[:, ~moving]
+    try:
+        follow = linalg.solve(light.T @ stiffness @ light, light.T @ stiffness @ heavy, assume_a="pos")
+    except linalg.LinAlgError:
+        raise SeparatrixError("mass: found motions with neither mass nor stiffness") from None
+    heavy -= light @ follow
+    count = min(count, heavy.shape[1])
+    squares, shapes = linalg.eigh(heavy.T @ stiffness @ heavy, subset_by_index=(0, count - 1))
+    return squares, heavy @ shapes
 
 
 def modal(structure: Matrices, count: int) -> Modes:
@@ -127,7 +166,7 @@ def craig_bampton(structure: Matrices, count: int) -> Matrices:
     if not boundary:
         raise SeparatrixError("--reduce craig-bampton: give the points of joints: --point NAME=PLACE")
     inner = np.array([number for number in range(structure.size) if number not in set(boundary)], dtype=int)
-    change = np.zeros((structure.size, len(boundary) + min(count, len(inner))))
+    change = np.zeros((structure.size, len(boundary)))
     change[boundary, np.arange(len(boundary))] = 1
     if len(inner):
         try:
@@ -137,9 +176,11 @@ def craig_bampton(structure: Matrices, count: int) -> Matrices:
             raise SeparatrixError(
                 "--reduce craig-bampton: the structure moves freely with its points held; give more points"
             ) from None
-        change[inner, : len(boundary)] = follow
+        change[inner] = follow
         rest = Matrices(structure.mass, structure.stiffness, None, structure.labels).without(boundary)
-        change[inner, len(boundary) :] = undamped_modes(rest, count)[1][:, : min(count, len(inner))]
+        shapes = undamped_modes(rest, count)[1] if count else np.zeros((len(inner), 0))
+        change = np.hstack([change, np.zeros((structure.size, shapes.shape[1]))])
+        change[inner, len(boundary) :] = shapes
     labels = [structure.labels[number] for number in boundary]
     labels += [f"mode{number + 1}" for number in range(change.shape[1] - len(boundary))]
     return _changed(structure, change, labels)
