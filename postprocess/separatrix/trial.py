@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading in a process of its own, because HDF5, SciPy and others loop or crash in some damaged files."""
 
+import faulthandler
 import os
 import pickle
 import resource
@@ -46,6 +47,7 @@ def read_apart(path: str | Path, read: Callable[[], Content]) -> Content:
     if child == 0:
         try:
             os.close(receive)
+            faulthandler.disable()
             longest = _READING * (1 + Path(path).stat().st_size // _BYTES)
             resource.setrlimit(resource.RLIMIT_CPU, (longest, longest))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

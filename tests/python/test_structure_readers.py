@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files of structures as real packages write them: read as they stand, or refused with what is allowed."""
 
+import os
+import signal
+
 import h5py
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from separatrix.structures import read_matrices, read_modes
 from separatrix.structures.cli import main
 from separatrix.structures.harwell_boeing import read_harwell_boeing
 from separatrix.structures.matrix_market import read_matrix_market
+from separatrix.trial import read_apart
 
 HEAD = "%%MatrixMarket matrix "
 MASS, STIFFNESS = cantilever(4)
@@ -181,9 +185,7 @@ def test_sparse_files_of_scipy(tmp_path):
 def _calculix(folder, labels):
     """job.sti, job.mas and job.dof: one triangle, column by column."""
     for end, matrix in (("sti", STIFFNESS), ("mas", MASS)):
-        rows = [
-            f"{i + 1} {j + 1} {matrix[i, j]:20.13e}\n" for j in range(len(matrix)) for i in range(j + 1)
-        ]
+        rows = [f"{i + 1} {j + 1} {matrix[i, j]:20.13e}\n" for j in range(len(matrix)) for i in range(j + 1)]
         (folder / f"job.{end}").write_text("".join(rows))
     (folder / "job.dof").write_text("".join(f"{label}\n" for label in labels))
     return folder / "job.sti"
@@ -210,6 +212,45 @@ def test_calculix(tmp_path, capsys):
         read_matrices({}, both=path)
 
 
+def test_one_matrix_is_not_taken_for_two(tmp_path, capsys):
+    """A file of one matrix says nothing of the others; what is wrong with it names the file."""
+    io.mmwrite(tmp_path / "k.mtx", STIFFNESS)
+    sparse.save_npz(tmp_path / "k.npz", sparse.csr_array(STIFFNESS))
+    for name in ("k.mtx", "k.npz"):
+        with pytest.raises(SeparatrixError, match=f"{name}: holds one matrix, allowed with --mass"):
+            read_matrices({}, both=tmp_path / name)
+    np.savez(tmp_path / "s.npz", M=MASS, K=np.triu(STIFFNESS))
+    words = ["--point", "tip=1", "-o", str(tmp_path / "o.h5")]
+    assert main([str(tmp_path / "s.npz"), *words]) == 65
+    assert f"{tmp_path / 's.npz'}: stiffness: found a matrix that is not symmetric" in capsys.readouterr().err
+    np.savez(tmp_path / "s.npz", M=np.zeros((0, 0)), K=np.zeros((0, 0)))
+    assert main([str(tmp_path / "s.npz"), *words]) == 65
+    np.savez(tmp_path / "s.npz", M=1e200 * MASS, K=STIFFNESS)
+    assert main([str(tmp_path / "s.npz"), *words]) == 65
+
+
+def test_damaged_files_are_refused_with_their_name(tmp_path, capsys):
+    """Changed bytes in every place: read, or code 65 with the file; readers that crash do so elsewhere."""
+    path = tmp_path / "s.mat"
+    io.savemat(path, {"M": MASS, "K": sparse.csc_array(STIFFNESS)})
+    whole = path.read_bytes()
+    words = ["--point", "tip=1", "-o", str(tmp_path / "o.h5"), "--force"]
+    for place in range(128, 160 + len(whole) // 2, len(whole) // 12):
+        path.write_bytes(whole[:place] + bytes([255, 0, 7]) + whole[place + 3 :])
+        assert main([str(path), *words]) in (0, 65)
+        said = capsys.readouterr().err
+        assert not said or str(path) in said
+    with pytest.raises(SeparatrixError, match="does not come to an end"):
+        read_apart(path, lambda: os.kill(os.getpid(), signal.SIGSEGV))
+    with pytest.raises(SeparatrixError, match=r"s.mat: cannot be read: no list"):
+        read_apart(path, lambda: _raise(IndexError("no list")))
+    assert read_apart(path, lambda: {"a": 1}) == {"a": 1}
+
+
+def _raise(error):
+    raise error
+
+
 def test_what_is_not_read_is_answered_with_what_is(tmp_path):
     """The list of formats, for an ending and for a content of another kind."""
     (tmp_path / "k.full").write_bytes(b"\0" * 100)
@@ -230,7 +271,7 @@ def _modes(path, units=None, **changes):
         code, length, force = units
         sets.append(
             pyuff.prepare_164(
-                units_code=code, units_description="as the code says", temp_mode=1, length=length, force=force,
+                units_code=code, units_description="stated", temp_mode=1, length=length, force=force,
                 temp=1.0, temp_offset=0.0,
             )
         )  # fmt: skip

@@ -11,7 +11,7 @@ from separatrix.structures.cli import main
 
 
 def _membrane(side, held=True):
-    """A membrane of square elements, masses by one point of integration: those of four corners are one sum."""
+    """A membrane of square elements, whose masses have one point of integration."""
     count = side + 1
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     stiffness, mass = np.zeros((2, count**2, count**2))
@@ -61,7 +61,7 @@ def test_craig_bampton_of_masses_of_low_rank():
 
 
 def test_masses_that_are_none(tmp_path, capsys):
-    """An indefinite mass is refused, and a singular one without a reduction; rounding of 14 digits is none."""
+    """An indefinite mass is refused, and a singular one without reduction; rounded to 14 digits too."""
     structure = _membrane(2)
     mass = np.array([[float(f"{value:.13e}") for value in row] for row in structure.mass.toarray()])
     rounded = Matrices(mass, structure.stiffness, points=structure.points)

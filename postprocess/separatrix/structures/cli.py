@@ -13,7 +13,7 @@ from separatrix.arguments import Parser, positive, whole_number
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.structures.content import Matrices, Modes, add_points
 from separatrix.structures.files import write
-from separatrix.structures.readers import read_matrices
+from separatrix.structures.readers import ROLES, read_matrices
 from separatrix.structures.reduction import (
     NO_MASS,
     checks,
@@ -46,6 +46,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run(options: argparse.Namespace) -> list[str]:
     """Read, reduce, write; return what is to be said."""
+    try:
+        return _run(options)
+    except SeparatrixError as error:
+        # What is wrong with a matrix is known before its file is.
+        role = str(error).partition(":")[0]
+        path = getattr(options, role) or options.input if role in ROLES else None
+        raise (SeparatrixError(f"{path}: {error}", error.code) if path else error) from None
+
+
+def _run(options: argparse.Namespace) -> list[str]:
     if options.output.exists() and not options.force:
         raise SeparatrixError(f"{options.output} exists; --force replaces it", CANNOT_CREATE)
     full = _read(options)
@@ -71,9 +81,7 @@ def run(options: argparse.Namespace) -> list[str]:
 
 
 def _read(options: argparse.Namespace) -> Matrices | Modes:
-    given = {
-        role: getattr(options, role) for role in ("mass", "stiffness", "damping") if getattr(options, role)
-    }
+    given = {role: getattr(options, role) for role in ROLES if getattr(options, role)}
     if options.input and options.input.suffix.lower() in _UNIVERSAL:
         if given:
             raise SeparatrixError(
@@ -159,7 +167,7 @@ def _parser() -> Parser:
         type=Path,
         help="a file with all matrices (.mat, .npz, .op4; of CalculiX .sti) or with modes (.uff, .unv)",
     )
-    for role in ("mass", "stiffness", "damping"):
+    for role in ROLES:
         parser.add_argument(
             f"--{role}",
             type=Path,

@@ -38,7 +38,7 @@ def find_matrix(
     content: Mapping[str, sparse.coo_array], path: Path, role: str, name: str | None, required: bool
 ) -> sparse.csr_array | None:
     """Return the matrix of a role, None if there is none and none is required."""
-    if ALONE in content and (required or name):
+    if ALONE in content:
         return sparse.csr_array(content[ALONE])
     wanted = [name] if name else _USUAL[role]
     for key in wanted:

@@ -16,6 +16,9 @@ from separatrix.structures.lines import number
 _DIRECTIONS = {"x": "1", "y": "2", "z": "3", "rx": "4", "ry": "5", "rz": "6"}
 _NAME = re.compile(r"[A-Za-z0-9_-]*[A-Za-z_-][A-Za-z0-9_-]*")
 
+# Largest number of a matrix: what is computed with it stays finite.
+_LARGEST = 1e100
+
 Row = np.ndarray
 
 
@@ -40,6 +43,8 @@ class Matrices:
                 raise SeparatrixError(f"{name}: found complex numbers, allowed real ones")
             matrix = matrix.real.astype(float)
             setattr(self, name, matrix)
+            if size == 0:
+                raise SeparatrixError(f"{name}: found no coordinate, allowed a matrix of at least one")
             if matrix.shape != (size, size):
                 raise SeparatrixError(
                     f"{name}: found a matrix of {matrix.shape[0]} x {matrix.shape[1]}, "
@@ -48,6 +53,8 @@ class Matrices:
             if not np.isfinite(matrix.data).all():
                 raise SeparatrixError(f"{name}: found a number that is not finite")
             largest = abs(matrix).max() if matrix.nnz else 0.0
+            if largest > _LARGEST:
+                raise SeparatrixError(f"{name}: found {largest:g}, allowed at most {_LARGEST:g}")
             if name != "damping" and abs(matrix - matrix.T).max() > 1e-10 * largest:
                 raise SeparatrixError(f"{name}: found a matrix that is not symmetric")
         if not self.labels:

@@ -2,18 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Matrices out of the files that engineers' tools write, by the ends of their names."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
-from separatrix.structures.containers import CONTAINERS, find_matrix, read_containers
+from separatrix.structures.containers import ALONE, CONTAINERS, find_matrix, read_containers
 from separatrix.structures.content import Matrices
 from separatrix.structures.harwell_boeing import read_harwell_boeing
 from separatrix.structures.matrix_market import is_matrix_market, read_matrix_market
 from separatrix.structures.solvers import CALCULIX, read_abaqus, read_calculix
+
+Reader = Callable[[Path], Mapping[str, sparse.coo_array]]
 
 ROLES = ("mass", "stiffness", "damping")
 _MATRIX_MARKET = (".mtx", ".mm")
@@ -35,12 +38,15 @@ def read_matrices(
     `names` says how a matrix is called in a file with several.
     """
     found, labels = {}, []
+    read = cache(read_containers)
+    if both is not None and _holds_one(Path(both), read):
+        raise SeparatrixError(f"{both}: holds one matrix, allowed with --mass, --stiffness or --damping")
     for role in ROLES:
         path = files.get(role) or _file_of(role, both)
         if path is None:
             continue
         name, required = (names or {}).get(role), role != "damping" or role in files
-        matrix, own = _matrix(Path(path), role, name, required)
+        matrix, own = _matrix(Path(path), read, role, name, required)
         if matrix is None:
             continue
         if labels and own and own != labels:
@@ -54,6 +60,14 @@ def read_matrices(
     structure = Matrices(**found, labels=labels)
     # Abaqus holds by a very large stiffness.
     return structure.without(np.flatnonzero(structure.stiffness.diagonal() >= _HELD))
+
+
+def _holds_one(path: Path, read: Reader) -> bool:
+    """Whether a file cannot hold several matrices, or does not."""
+    suffix = path.suffix.lower()
+    if suffix in CONTAINERS and path.is_file():
+        return ALONE in read(path)
+    return suffix in (*_MATRIX_MARKET, *_HARWELL_BOEING)
 
 
 def _file_of(role: str, both: str | Path | None) -> Path | None:
@@ -83,7 +97,7 @@ def _placed(matrix: sparse.csr_array, labels: list[str], wanted: list[str]) -> s
 
 
 def _matrix(
-    path: Path, role: str, name: str | None, required: bool
+    path: Path, read: Reader, role: str, name: str | None, required: bool
 ) -> tuple[sparse.csr_array | None, list[str]]:
     """Return a matrix and the labels of its coordinates, none where the file has no names."""
     if not path.is_file():
@@ -97,7 +111,7 @@ def _matrix(
         if suffix in CALCULIX.values():
             return read_calculix(path)
         if suffix in CONTAINERS:
-            return find_matrix(read_containers(path), path, role, name, required), []
+            return find_matrix(read(path), path, role, name, required), []
     except SeparatrixError:
         raise
     except DAMAGE as error:
