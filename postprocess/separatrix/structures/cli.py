@@ -112,8 +112,8 @@ def _reduce(full: Matrices | Modes, options: argparse.Namespace) -> Matrices | M
                 raise SeparatrixError(f"--hold: the point {name} is held")
     if options.reduce == "none":
         return condense(full)
-    if options.modes is None:
-        raise SeparatrixError(f"--reduce {options.reduce} needs --modes COUNT", USAGE)
+    if options.modes is None or (options.modes == 0 and options.reduce == "modal"):
+        raise SeparatrixError(f"--reduce {options.reduce} needs --modes COUNT, of modal 1 or more", USAGE)
     return modal(full, options.modes) if options.reduce == "modal" else craig_bampton(full, options.modes)
 
 
