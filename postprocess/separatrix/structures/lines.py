@@ -85,11 +85,11 @@ class Rows:
 
     def refuse(self, row: int, why: str) -> None:
         """Refuse a row, counted from 0."""
-        for place, line in enumerate(self._text.split(b"\n"), self._first):
+        for line_number, line in enumerate(self._text.split(b"\n"), self._first):
             if not line.strip() or line.strip().startswith(self._style.comment):
                 continue
             if row == 0:
-                raise SeparatrixError(f"{self.path}:{place}: found {shown(line)}, {why}")
+                raise SeparatrixError(f"{self.path}:{line_number}: found {shown(line)}, {why}")
             row -= 1
 
 

@@ -85,15 +85,15 @@ def _modes(sets: Sequence[Mapping], factors: tuple[float, float]) -> Modes:
     shapes: dict[str, list[float]] = {}
     for place, number in enumerate(order):
         one, mass = sets[number], numbers[number, 1]
-        said = f"mode {place + 1}"
+        mode = f"mode {place + 1}"
         if not mass > 0:
-            raise SeparatrixError(f"{said}: found the modal mass {mass}, allowed above 0")
+            raise SeparatrixError(f"{mode}: found the modal mass {mass}, allowed above 0")
         if one.get("spec_data_type", 0) not in _DISPLACEMENT:
             raise SeparatrixError(
-                f"{said}: found shapes of the specific data type {one['spec_data_type']}, "
+                f"{mode}: found shapes of the specific data type {one['spec_data_type']}, "
                 "allowed displacement (8)"
             )
-        for key, value in _shape(one, mass, factors, said).items():
+        for key, value in _shape(one, mass, factors, mode).items():
             column = shapes.setdefault(key, [])
             # A place that a mode lacks is left out of all.
             if len(column) == place:
@@ -102,7 +102,7 @@ def _modes(sets: Sequence[Mapping], factors: tuple[float, float]) -> Modes:
     return Modes(numbers[order, 0], numbers[order, 2] + numbers[order, 3] / 2, shapes=rows)
 
 
-def _shape(one: Mapping, mass: float, factors: tuple[float, float], said: str) -> dict[str, float]:
+def _shape(one: Mapping, mass: float, factors: tuple[float, float], mode: str) -> dict[str, float]:
     """Return the mass-normalised displacements of a mode, by "NODE:DIRECTION", in SI units.
 
     The energy of a mode is half its modal mass times the squared rate of its amplitude, so that mass goes
@@ -111,7 +111,7 @@ def _shape(one: Mapping, mass: float, factors: tuple[float, float], said: str) -
     length, force = factors
     nodes = [int(node) for node in one["node_nums"]]
     if len(set(nodes)) != len(nodes):
-        raise SeparatrixError(f"{said}: found a node twice, allowed once")
+        raise SeparatrixError(f"{mode}: found a node twice, allowed once")
     found = {}
     for direction in "123456":
         values = one.get(f"r{direction}")
@@ -120,12 +120,12 @@ def _shape(one: Mapping, mass: float, factors: tuple[float, float], said: str) -
         values = np.asarray(values)
         if len(values) != len(nodes) or not np.isfinite(values).all():
             raise SeparatrixError(
-                f"{said}: found {len(values)} numbers in direction {direction}, "
+                f"{mode}: found {len(values)} numbers in direction {direction}, "
                 f"allowed {len(nodes)} finite ones"
             )
         if np.iscomplexobj(values):
             if np.abs(values.imag).max() > 1e-3 * np.abs(values).max():
-                raise SeparatrixError(f"{said} is complex, allowed real normal modes")
+                raise SeparatrixError(f"{mode} is complex, allowed real normal modes")
             values = values.real
         unit = np.sqrt(force / length if direction in "123" else force * length)
         row = values * unit / np.sqrt(mass)
