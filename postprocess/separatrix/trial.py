@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading in a process of its own, because libraries loop or crash in some damaged files."""
 
+import faulthandler
 import os
 import pickle
 import re
@@ -52,6 +53,7 @@ def read_apart(path: str | Path, kind: str, read: Callable[[], Result]) -> Resul
     if child == 0:
         try:
             os.close(source)
+            faulthandler.disable()
             _answer(path, kind, read, sink)
         finally:
             os._exit(0)
@@ -73,6 +75,8 @@ def read_apart(path: str | Path, kind: str, read: Callable[[], Result]) -> Resul
     except (EOFError, pickle.UnpicklingError):
         raise SeparatrixError(f"{path}: not enough memory for what its reader found") from None
     if isinstance(result, SeparatrixError):
+        if str(path) not in str(result):
+            raise SeparatrixError(f"{path}: {result}", result.code)
         raise result
     return result
 

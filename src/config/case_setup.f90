@@ -11,6 +11,7 @@ module case_setup
   use lane_types, only: widest_lanes
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
   use refinement, only: refine_t
+  use text, only: parse_integer
   use trajectory, only: span_t
   implicit none
   private
@@ -52,7 +53,7 @@ contains
     lane_width = widest_lanes()
     call get_environment_variable(width_variable, text, status=status)
     if (status /= 0) return
-    read (text, *, iostat=status) asked
+    call parse_integer(trim(text), asked, status)
     if (status == 0 .and. asked > 0) lane_width = min(lane_width, asked)
   end function lane_width
 

@@ -136,7 +136,8 @@ contains
     if (len(problem) > 0) call report(source, path, problem)
   end subroutine take_real
 
-  !> A list of at least one number; problems are noted under their element.
+  !> A list of at least one number; problems are noted under their element. Without default and key, or with something else in
+  !> the place of the list, `values` is empty.
   subroutine take_reals(source, path, bounds, values, required)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path
@@ -145,6 +146,7 @@ contains
     logical, intent(in), optional :: required
     character(len=:), allocatable :: element, problem
     integer :: at, i
+    if (.not. allocated(values)) allocate (values(0))
     call look_up(source, path, required, at)
     if (at == 0) return
     if (list_size(source, path) == 0) then

@@ -6,7 +6,7 @@
 module force_record
   use errors, only: error_t
   use kinds, only: int64, wp
-  use text, only: number_length, replace_all, starts_with, to_text
+  use text, only: parse_number, replace_all, starts_with, to_text
   use toml_bindings, only: first_bad_byte, read_text_file
   implicit none
   private
@@ -28,7 +28,7 @@ contains
     character(len=:), allocatable :: text, line
     type(error_t), allocatable :: error
     real(wp), allocatable :: rows(:, :)
-    integer :: number, count, columns(2)
+    integer :: number, count, width, columns(2)
     integer(int64) :: from, length
     interval = 0
     allocate (force(0), rows(2, 1024))
@@ -41,6 +41,7 @@ contains
     if (allocated(problem)) return
     number = 0
     count = 0
+    width = 0
     columns = 0
     from = 1
     do while (from <= len(text, int64))
@@ -52,7 +53,11 @@ contains
       if (len(line) == 0 .or. starts_with(line, '#')) cycle
       if (columns(1) == 0) then
         columns = [column_of(line, 't'), column_of(line, 'force')]
+        width = 1 + commas(line)
         if (any(columns == 0)) problem = 'found the header '''//line//''', allowed one with columns t and force'
+      else if (1 + commas(line) /= width) then
+        problem = 'found '//to_text(1 + commas(line))//' values in '''//line//''', allowed '//to_text(width)// &
+                  ' like the header, with decimal points'
       else
         if (count == size(rows, 2)) rows = reshape(rows, [2, 2*count], pad=[0.0_wp])
         count = count + 1
@@ -88,9 +93,8 @@ contains
     integer :: i, status
     do i = 1, 2
       word = field(line, columns(i))
-      status = 1
-      if (len(word) > 0 .and. number_length(word) == len(word)) read (word, *, iostat=status) row(i)
-      if (status /= 0 .or. .not. abs(row(i)) <= huge(row)) problem = 'found '''//word//''', allowed a number'
+      call parse_number(word, row(i), status)
+      if (status /= 0) problem = 'found '''//word//''', allowed a finite number with a decimal point'
     end do
   end subroutine read_row
 

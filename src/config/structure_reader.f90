@@ -163,6 +163,8 @@ contains
     if (n > 0 .and. source%entries(at)%entry%kind == toml_array) then
       do i = 1, n
         call take_reals(source, key//'['//to_text(i)//']', any_number('1'), row)
+        if (size(row) /= n) call report(source, key//'['//to_text(i)//']', 'found '//to_text(size(row))// &
+          ' numbers, allowed '//to_text(n)//': as many rows as columns')
         values = [values, row]
       end do
     else

@@ -7,7 +7,8 @@ module text
   implicit none
   private
 
-  public :: to_text, interval_text, read_number, join, number_length, replace_all, starts_with, number_in
+  public :: to_text, interval_text, read_number, parse_number, parse_integer, split, join, number_length, replace_all, &
+    starts_with, number_in
 
   !> Shortest common form of a number: integers plain, reals with up to 17 significant digits so
   !> that reading them back gives the same bits.
@@ -121,6 +122,65 @@ contains
     ! With a flag up the return to the halting mode of before would stop the program.
     call ieee_set_flag(ieee_usual, .false.)
   end subroutine read_number
+
+  !> Reads a word of a user that is one finite number and nothing else: decimal digits with a point, and an exponent behind E or,
+  !> of Fortran programs, D. A list-directed read takes more: '2,75' as 2, '/' as the number before, '2*5', '1-5' and 'inf'.
+  pure subroutine parse_number(word, value, status)
+    character(len=*), intent(in) :: word
+    real(real64), intent(out) :: value
+    integer, intent(out) :: status
+    character(len=len(word)) :: plain
+    integer :: exponent
+    value = 0
+    status = 1
+    if (len(word) == 0) return
+    plain = word
+    exponent = scan(plain, 'dD')
+    if (exponent > 0) plain(exponent:exponent) = 'e'
+    if (number_length(plain) /= len(word)) return
+    call read_number(plain, value, status)
+    if (status == 0 .and. abs(value) <= huge(value)) return
+    value = 0
+    status = 1
+  end subroutine parse_number
+
+  !> Reads a word of a user that is one whole number and nothing else.
+  pure subroutine parse_integer(word, value, status)
+    character(len=*), intent(in) :: word
+    integer, intent(out) :: value
+    integer, intent(out) :: status
+    integer :: first
+    value = 0
+    status = 1
+    first = 1
+    if (len(word) > 1) first = 1 + min(1, scan(word(1:1), '+-'))
+    if (len(word) == 0 .or. verify(word(first:), '0123456789') > 0) return
+    read (word, *, iostat=status) value
+    if (status /= 0) value = 0
+  end subroutine parse_integer
+
+  !> The words of a line between blanks and tabs: the first ones in `words`, `count` of them in all.
+  pure subroutine split(line, words, count)
+    character(len=*), intent(in) :: line
+    ! The caller knows how long words are.
+    ! allow(C072)
+    character(len=*), intent(out) :: words(:)
+    integer, intent(out) :: count
+    character(len=*), parameter :: gaps = ' '//achar(9)
+    integer :: from, length
+    words = ''
+    count = 0
+    from = 1
+    do
+      length = verify(line(from:), gaps)
+      if (length == 0) exit
+      from = from + length - 1
+      length = scan(line(from:)//' ', gaps) - 1
+      count = count + 1
+      if (count <= size(words)) words(count) = line(from:from + length - 1)
+      from = from + length
+    end do
+  end subroutine split
 
   pure function logical_to_text(value) result(text)
     logical, intent(in) :: value

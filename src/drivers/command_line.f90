@@ -7,7 +7,7 @@ module command_line
   use errors, only: error_t, fail
   use kinds, only: wp
   use status, only: exit_usage
-  use text, only: join, read_number, starts_with, to_text
+  use text, only: join, parse_integer, parse_number, starts_with, to_text
   implicit none
   private
 
@@ -355,9 +355,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: range
     integer :: status
-    number = 0
-    status = verify(value, '0123456789.eE+-')
-    if (status == 0) call read_number(value, number, status)
+    call parse_number(value, number, status)
     if (status == 0 .and. number >= lowest .and. number <= highest) return
     range = ' from '//to_text(lowest)//' to '//to_text(highest)
     if (highest >= huge(highest)) range = ' above 0'
@@ -379,9 +377,7 @@ contains
       largest = most
       range = range//' to '//to_text(most)
     end if
-    number = least - 1
-    status = verify(value, '0123456789')
-    if (status == 0) read (value, *, iostat=status) number
+    call parse_integer(value, number, status)
     if (status /= 0 .or. number < least .or. number > largest) then
       call fail(error, exit_usage, name//": found '"//value//"', allowed is a whole number"//range)
     end if

@@ -19,7 +19,7 @@ module device_choice
   use status, only: exit_usage
   use system, only: host_name, may_use_core, online_cores
   use team, only: host_length, team_t
-  use text, only: join, to_text
+  use text, only: join, parse_integer, to_text
   implicit none
   private
 
@@ -83,7 +83,7 @@ contains
     number = usual
     call get_environment_variable(variable, text, status=status)
     if (status /= 0) return
-    read (text, *, iostat=status) asked
+    call parse_integer(trim(text), asked, status)
     if (status == 0) number = max(1, asked)
   end function asked_number
 

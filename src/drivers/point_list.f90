@@ -13,7 +13,7 @@ module point_list
   use law_table, only: is_start_parameter, law_choice_t
   use output_check, only: is_folder
   use status, only: exit_bad_case, exit_no_input
-  use text, only: number_length, read_number, replace_all, starts_with, to_text
+  use text, only: parse_number, replace_all, starts_with, to_text
   use toml_bindings, only: first_bad_byte, read_text_file
   implicit none
   private
@@ -180,9 +180,8 @@ contains
     do k = 1, size(columns)
       if (columns(k) == 0) cycle
       word = field(line, columns(k))
-      status = 1
-      if (len(word) > 0 .and. number_length(word) == len(word)) call read_number(word, row(k), status)
-      if (status /= 0 .or. .not. abs(row(k)) <= huge(1.0_wp)) then
+      call parse_number(word, row(k), status)
+      if (status /= 0) then
         call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed is a finite number")
         return
       end if

@@ -297,6 +297,7 @@ def test_a_table_that_cannot_be_created(separatrix, tmp_path, name, csv, force):
         (["basin", "case.toml", "--force", "--resume"], ["--force", "--resume"]),
         (["basin", "case.toml", "--time-limit", "0"], ["--time-limit", "0", "above 0"]),
         (["basin", "case.toml", "--time-limit", "1h"], ["--time-limit", "1h", "seconds"]),
+        (["basin", "case.toml", "--time-limit", "1-5"], ["--time-limit", "1-5", "seconds"]),
         (["basin", "case.toml", "--ranks-per-node", "0"], ["--ranks-per-node", "0", "from 1"]),
         (["basin", "case.toml", "--list", "starts.csv"], ["--list", "points"]),
         (["basin", "case.toml", "--csv", "o.csv"], ["--csv", "points"]),

@@ -74,5 +74,15 @@ def test_what_is_refused(separatrix, tmp_path):
     )
     assert "'drive.shaker.mean': found beside a record" in said('record = "force.csv"\nmean = 1')
     assert "nowhere.csv" in said('record = "nowhere.csv"')
+    # decimal commas make more columns, which were read as other numbers
+    for row, expected in (
+        ("1,1,5", "found 3 values in '1,1,5', allowed 2 like the header"),
+        ("1", "found 1 values in '1', allowed 2"),
+        ("1,nan", "found 'nan', allowed a finite number"),
+        ("1,1-5", "found '1-5', allowed a finite number"),
+    ):
+        (tmp_path / "force.csv").write_text(f"t,force\n0,0\n{row}\n2,2\n")
+        assert f"force.csv:3: {expected}" in said('record = "force.csv"')
+    _write(tmp_path, np.where(np.arange(SAMPLES) == 3, 1.0, 0.0))
     (tmp_path / "case.toml").write_text(CASE.format(drive='record = "force.csv"\nharmonics = 8'))
     succeed(separatrix, "trajectory", "case.toml", "--force", folder=tmp_path)

@@ -4,7 +4,8 @@
 
 from separatrix.structures.content import Matrices, Modes
 from separatrix.structures.files import write
-from separatrix.structures.readers import read_matrices, read_modes
+from separatrix.structures.readers import read_matrices
 from separatrix.structures.reduction import condense, craig_bampton, modal
+from separatrix.structures.universal import read_modes
 
 __all__ = ["Matrices", "Modes", "condense", "craig_bampton", "modal", "read_matrices", "read_modes", "write"]

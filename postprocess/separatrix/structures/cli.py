@@ -13,8 +13,18 @@ from separatrix.arguments import Parser, positive, whole_number
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.structures.content import Matrices, Modes, add_points
 from separatrix.structures.files import write
-from separatrix.structures.readers import read_matrices, read_modes
-from separatrix.structures.reduction import checks, condense, craig_bampton, hold, modal, undamped_modes
+from separatrix.structures.readers import ROLES, read_matrices
+from separatrix.structures.reduction import (
+    NO_MASS,
+    checks,
+    condense,
+    craig_bampton,
+    hold,
+    modal,
+    smallest_share,
+    undamped_modes,
+)
+from separatrix.structures.universal import read_modes
 from separatrix.version import __version__
 
 # Most coordinates of a machine.
@@ -36,6 +46,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run(options: argparse.Namespace) -> list[str]:
     """Read, reduce, write; return what is to be said."""
+    try:
+        return _run(options)
+    except SeparatrixError as error:
+        # What is wrong with a matrix is known before its file is.
+        role = str(error).partition(":")[0]
+        path = getattr(options, role) or options.input if role in ROLES else None
+        raise (SeparatrixError(f"{path}: {error}", error.code) if path else error) from None
+
+
+def _run(options: argparse.Namespace) -> list[str]:
     if options.output.exists() and not options.force:
         raise SeparatrixError(f"{options.output} exists; --force replaces it", CANNOT_CREATE)
     full = _read(options)
@@ -49,8 +69,11 @@ def run(options: argparse.Namespace) -> list[str]:
             "with --modes",
             USAGE,
         )
-    if isinstance(reduced, Matrices) and np.linalg.eigvalsh(reduced.mass.toarray())[0] <= 0:
-        raise SeparatrixError("mass: found a singular or indefinite matrix, allowed a positive definite one")
+    if isinstance(reduced, Matrices) and not smallest_share(reduced.mass.toarray()) > NO_MASS:
+        raise SeparatrixError(
+            "mass: found a singular or indefinite matrix, allowed a positive definite one "
+            "(--reduce modal leaves out what has no mass)"
+        )
     if options.damping_ratio is not None:
         reduced = _damped(reduced, options.damping_ratio)
     write(reduced, options.output, options.title, options.reduce)
@@ -58,9 +81,7 @@ def run(options: argparse.Namespace) -> list[str]:
 
 
 def _read(options: argparse.Namespace) -> Matrices | Modes:
-    given = {
-        role: getattr(options, role) for role in ("mass", "stiffness", "damping") if getattr(options, role)
-    }
+    given = {role: getattr(options, role) for role in ROLES if getattr(options, role)}
     if options.input and options.input.suffix.lower() in _UNIVERSAL:
         if given:
             raise SeparatrixError(
@@ -91,8 +112,8 @@ def _reduce(full: Matrices | Modes, options: argparse.Namespace) -> Matrices | M
                 raise SeparatrixError(f"--hold: the point {name} is held")
     if options.reduce == "none":
         return condense(full)
-    if options.modes is None:
-        raise SeparatrixError(f"--reduce {options.reduce} needs --modes COUNT", USAGE)
+    if options.modes is None or (options.modes == 0 and options.reduce == "modal"):
+        raise SeparatrixError(f"--reduce {options.reduce} needs --modes COUNT, of modal 1 or more", USAGE)
     return modal(full, options.modes) if options.reduce == "modal" else craig_bampton(full, options.modes)
 
 
@@ -144,11 +165,14 @@ def _parser() -> Parser:
         "input",
         nargs="?",
         type=Path,
-        help="a file with all matrices (.mat, .npz, .op4) or with modes (.uff, .unv)",
+        help="a file with all matrices (.mat, .npz, .op4; of CalculiX .sti) or with modes (.uff, .unv)",
     )
-    for role in ("mass", "stiffness", "damping"):
+    for role in ROLES:
         parser.add_argument(
-            f"--{role}", type=Path, metavar="FILE", help=f"the {role} matrix: .mtx, .hb, .mat, .npy, .op4"
+            f"--{role}",
+            type=Path,
+            metavar="FILE",
+            help=f"the {role} matrix: .mtx, .hb, .sti, .mas, .mat, .npy, .npz, .op4",
         )
     parser.add_argument(
         "--names", type=_named, action="append", default=[], metavar="ROLE=NAME",

@@ -3,17 +3,21 @@
 """A structure as matrices or as modes, with the names of its coordinates and of its points."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
 
 from separatrix.errors import SeparatrixError
+from separatrix.structures.lines import number
 
 # Directions of a node as tools number them.
 _DIRECTIONS = {"x": "1", "y": "2", "z": "3", "rx": "4", "ry": "5", "rz": "6"}
 _NAME = re.compile(r"[A-Za-z0-9_-]*[A-Za-z_-][A-Za-z0-9_-]*")
+
+# Largest number of a matrix: what is computed with it stays finite.
+_LARGEST = 1e100
 
 Row = np.ndarray
 
@@ -30,14 +34,17 @@ class Matrices:
 
     def __post_init__(self) -> None:
         """Sparse, square, of one size, symmetric."""
-        self.mass, self.stiffness = sparse.csr_array(self.mass), sparse.csr_array(self.stiffness)
-        if self.damping is not None:
-            self.damping = sparse.csr_array(self.damping)
         size = self.mass.shape[0]
         for name in ("mass", "stiffness", "damping"):
-            matrix = getattr(self, name)
-            if matrix is None:
+            if getattr(self, name) is None:
                 continue
+            matrix = sparse.csr_array(getattr(self, name))
+            if np.iscomplexobj(matrix.data) and matrix.data.imag.any():
+                raise SeparatrixError(f"{name}: found complex numbers, allowed real ones")
+            matrix = matrix.real.astype(float)
+            setattr(self, name, matrix)
+            if size == 0:
+                raise SeparatrixError(f"{name}: found no coordinate, allowed a matrix of at least one")
             if matrix.shape != (size, size):
                 raise SeparatrixError(
                     f"{name}: found a matrix of {matrix.shape[0]} x {matrix.shape[1]}, "
@@ -46,6 +53,8 @@ class Matrices:
             if not np.isfinite(matrix.data).all():
                 raise SeparatrixError(f"{name}: found a number that is not finite")
             largest = abs(matrix).max() if matrix.nnz else 0.0
+            if largest > _LARGEST:
+                raise SeparatrixError(f"{name}: found {largest:g}, allowed at most {_LARGEST:g}")
             if name != "damping" and abs(matrix - matrix.T).max() > 1e-10 * largest:
                 raise SeparatrixError(f"{name}: found a matrix that is not symmetric")
         if not self.labels:
@@ -70,7 +79,7 @@ class Matrices:
 
     def row_of(self, place: str) -> Row:
         """Return the row of a place: a coordinate, or a weighted sum "0.5*12:y+0.5*13:y"."""
-        return _row(place, {label: number for number, label in enumerate(self.labels)}, np.eye, self.size)
+        return _row(place, self.labels, lambda number: _unit(number, self.size), self.size)
 
 
 @dataclass
@@ -91,8 +100,7 @@ class Modes:
     def row_of(self, place: str) -> Row:
         """Return the displacement of a place in each mode."""
         names = list(self.shapes)
-        rows = np.array([self.shapes[name] for name in names]).reshape(len(names), self.size)
-        return _row(place, {name: number for number, name in enumerate(names)}, lambda _: rows, self.size)
+        return _row(place, names, lambda number: self.shapes[names[number]], self.size)
 
 
 def add_points(structure: Matrices | Modes, places: Mapping[str, str]) -> None:
@@ -106,22 +114,38 @@ def add_points(structure: Matrices | Modes, places: Mapping[str, str]) -> None:
         structure.points[name] = structure.row_of(place)
 
 
-def _row(place: str, known: Mapping[str, int], rows_of, size: int) -> Row:
+def _unit(number: int, size: int) -> Row:
+    row = np.zeros(size)
+    row[number] = 1
+    return row
+
+
+def _row(place: str, labels: Sequence[str], row_of: Callable[[int], Row], size: int) -> Row:
     """Sum the terms of a place."""
-    total, rows = np.zeros(size), None
-    for term in re.findall(r"[+-]?[^+-]+(?:[eE][+-]\d+[^+-]*)?", place.replace(" ", "")):
+    total = np.zeros(size)
+    words = place.replace(" ", "")
+    terms = re.findall(r"[+-]?[^+-]+(?:[eE][+-]\d+[^+-]*)?", words)
+    if "".join(terms) != words:
+        raise SeparatrixError(f"'{place}': found a sign without a term, allowed a sum like 0.5*12:y-0.5*13:y")
+    for term in terms:
         factor, star, label = term.rpartition("*")
         sign = -1.0 if not star and label.startswith("-") else 1.0
         label = _in_numbers(label.lstrip("+-"))
-        try:
-            weight = float(factor) if star else sign
-        except ValueError:
-            raise SeparatrixError(f"'{place}': '{factor}' is not a number") from None
-        if label not in known:
-            near = ", ".join(list(known)[:6]) + (", ..." if len(known) > 6 else "")
+        weight = number(factor) if star else sign
+        if weight is None:
+            raise SeparatrixError(
+                f"'{place}': found '{factor}', allowed a finite number with a decimal point"
+            )
+        times = labels.count(label)
+        if times == 0:
+            near = ", ".join(labels[:6]) + (", ..." if len(labels) > 6 else "")
             raise SeparatrixError(f"'{place}': there is no coordinate '{label}', allowed {near}")
-        rows = rows_of(size) if rows is None else rows
-        total += weight * rows[known[label]]
+        if times > 1:
+            raise SeparatrixError(
+                f"'{place}': found {times} coordinates with the label '{label}', allowed a label of one: the "
+                "inner motions of an element, or a beam as a solid"
+            )
+        total += weight * row_of(labels.index(label))
     if not np.any(total):
         raise SeparatrixError(f"'{place}': a place that no coordinate moves")
     return total

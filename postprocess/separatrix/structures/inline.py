@@ -5,12 +5,14 @@
 import json
 import tomllib
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from separatrix.errors import BAD_DATA, NO_INPUT, CaseError
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, CaseError, SeparatrixError
+from separatrix.trial import read_apart
 
 # numbers of a structure: in the case or in its file
 _NUMBERS = ("mass", "stiffness", "damping", "frequency", "damping_ratios")
@@ -100,20 +102,32 @@ def _read(path: Path, at: str) -> tuple[dict, dict]:
     if not path.is_file():
         raise CaseError(f"{at}: {path}: no such file", NO_INPUT)
     try:
+        state = path.stat()
+        return _content(path, state.st_mtime_ns, state.st_size)
+    except SeparatrixError as error:
+        raise CaseError(f"{at}: {error}", error.code) from None
+
+
+@lru_cache(maxsize=8)
+def _content(path: Path, _time: int, _size: int) -> tuple[dict, dict]:
+    """Read a file as it is at a time; HDF5 may crash in a damaged one."""
+    return read_apart(path, "structure", lambda: _of_file(path))
+
+
+def _of_file(path: Path) -> tuple[dict, dict]:
+    try:
         with h5py.File(path) as file:
             if "structure" not in file:
-                raise CaseError(
-                    f"{at}: {path}: found no group /structure, allowed a file of separatrix-structure",
-                    BAD_DATA,
+                raise SeparatrixError(
+                    f"{path}: found no group /structure, allowed a file of separatrix-structure"
                 )
             group = file["structure"]
             if "frequency" in group:
                 units = group["frequency"].attrs.get("units", "Hz")
                 units = units.decode() if isinstance(units, bytes) else units
                 if units not in ("Hz", "rad/s"):
-                    raise CaseError(
-                        f"{at}: {path}: /structure/frequency: found the units '{units}', allowed Hz, rad/s",
-                        BAD_DATA,
+                    raise SeparatrixError(
+                        f"{path}: /structure/frequency: found the units '{units}', allowed Hz, rad/s"
                     )
                 content = {"frequency": group["frequency"][:] * (2 * np.pi if units == "Hz" else 1)}
                 if "damping_ratio" in group:
@@ -121,13 +135,13 @@ def _read(path: Path, at: str) -> tuple[dict, dict]:
             else:
                 missing = [matrix for matrix in ("mass", "stiffness") if matrix not in group]
                 if missing:
-                    raise CaseError(f"{at}: {path}: /structure/{missing[0]}: missing", BAD_DATA)
+                    raise SeparatrixError(f"{path}: /structure/{missing[0]}: missing")
                 content = {matrix: group[matrix][:] for matrix in ("mass", "stiffness")}
             if "damping" in group:
                 content["damping"] = group["damping"][:]
             points = {point: row[:] for point, row in group.get("point", {}).items()}
-    except (OSError, TypeError, ValueError) as error:
-        raise CaseError(f"{at}: {path}: found what is no structure file ({error})", BAD_DATA) from None
+    except DAMAGE as error:
+        raise SeparatrixError(f"{path}: found what is no structure file ({error})") from None
     return content, points
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fewer coordinates: coordinates without mass condensed, modes, Craig and Bampton's substructures."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,12 @@ from separatrix.structures.content import Matrices, Modes
 
 # Above it only the wanted modes are computed, by shift and invert.
 _DENSE = 1500
-# A squared frequency below this share of the largest, and a mass below it, are none.
+# A mass of a coordinate below this share of the largest is none.
 _NONE = 1e-12
+# A squared frequency below this share of the largest of those asked for is that of a rigid motion.
+_RIGID = 1e-9
+# A mass of a motion below this share of the largest is none; the rounding of 14 digits stays below it.
+NO_MASS = 1e-12
 
 
 @dataclass
@@ -47,8 +52,10 @@ def condense(structure: Matrices) -> Matrices:
     masters, slaves = np.flatnonzero(~light), np.flatnonzero(light)
     try:
         block = structure.stiffness[slaves][:, slaves].toarray()
-        follow = -linalg.solve(block, structure.stiffness[slaves][:, masters].toarray(), assume_a="sym")
-    except linalg.LinAlgError:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", linalg.LinAlgWarning)
+            follow = -linalg.solve(block, structure.stiffness[slaves][:, masters].toarray(), assume_a="sym")
+    except (linalg.LinAlgError, linalg.LinAlgWarning):
         names = ", ".join(structure.labels[number] for number in slaves[:6])
         raise SeparatrixError(
             f"mass: found coordinates with neither mass nor stiffness of their own: {names}"
@@ -80,10 +87,10 @@ def undamped_modes(structure: Matrices, count: int | None = None) -> tuple[np.nd
     size = structure.size
     count = size if count is None else min(count, size)
     try:
+        if np.any(structure.mass.diagonal() <= 0):
+            raise SeparatrixError("mass: found an indefinite matrix, allowed a positive semidefinite one")
         if size <= _DENSE or count > size // 2:
-            squares, shapes = linalg.eigh(
-                structure.stiffness.toarray(), structure.mass.toarray(), subset_by_index=(0, count - 1)
-            )
+            squares, shapes = _dense_modes(structure.stiffness.toarray(), structure.mass.toarray(), count)
         else:
             # a small negative shift: a structure that floats has a singular stiffness
             shift = -1e-6 * abs(structure.stiffness.diagonal()).max() / abs(structure.mass.diagonal()).max()
@@ -94,12 +101,51 @@ def undamped_modes(structure: Matrices, count: int | None = None) -> tuple[np.nd
             squares, shapes = squares[order], shapes[:, order]
     except (linalg.LinAlgError, RuntimeError) as error:
         raise SeparatrixError(f"mass: found a singular or indefinite matrix: {error}") from None
-    squares = np.where(np.abs(squares) <= 1e-9 * np.abs(squares).max(), 0.0, squares)
+    squares = np.where(np.abs(squares) <= _RIGID * np.abs(squares).max(), 0.0, squares)
     if squares[0] < 0:
         raise SeparatrixError("stiffness: found an indefinite matrix, allowed a positive semidefinite one")
     # the sign of a shape is free: largest entry positive, so that two runs give one file
     signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
     return squares, shapes * np.where(signs == 0, 1, signs)
+
+
+def smallest_share(mass: np.ndarray) -> float:
+    """Return the smallest eigenvalue of a mass matrix, with ones on its diagonal, over the largest."""
+    diagonal = np.diagonal(mass)
+    if np.any(diagonal <= 0):
+        return 0.0
+    shares = linalg.eigvalsh(mass / np.sqrt(np.outer(diagonal, diagonal)))
+    return float(shares[0] / shares[-1])
+
+
+def _dense_modes(stiffness: np.ndarray, mass: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest modes, no more than there are motions with mass.
+
+    Elements of reduced integration leave motions without mass that are no coordinates. With them
+    M u = m (K + s M) u is solved for K u = w^2 M u; w^2 = 1/m - s is most accurate about the shift s.
+    """
+    if smallest_share(mass) > NO_MASS:
+        return linalg.eigh(stiffness, mass, subset_by_index=(0, count - 1))
+    scale = 1 / np.sqrt(np.diagonal(mass))
+    shares = linalg.eigvalsh(mass * np.outer(scale, scale))
+    if shares[0] < -NO_MASS * shares[-1]:
+        raise SeparatrixError(
+            f"mass: found an indefinite matrix (smallest share {shares[0] / shares[-1]:.2g}), "
+            "allowed a positive semidefinite one"
+        )
+    size = len(mass)
+    count = min(count, int(np.sum(shares > NO_MASS * shares[-1])))
+    shift = 1e-6 * np.diagonal(stiffness).max() / np.diagonal(mass).max()
+    if smallest_share(stiffness + shift * mass) <= np.finfo(float).eps:
+        raise SeparatrixError("mass: found motions with neither mass nor stiffness, or a stiffness below 0")
+    for _ in range(2):
+        wanted = (size - count, size - 1)
+        inverse, shapes = linalg.eigh(mass, stiffness + shift * mass, subset_by_index=wanted)
+        squares, shapes = 1 / inverse[::-1] - shift, (shapes / np.sqrt(inverse))[:, ::-1]
+        # again about the lowest that is not rigid
+        elastic = squares[squares > _RIGID * squares[-1]]
+        shift = elastic[0] if len(elastic) else shift
+    return squares, shapes
 
 
 def modal(structure: Matrices, count: int) -> Modes:
@@ -127,7 +173,7 @@ def craig_bampton(structure: Matrices, count: int) -> Matrices:
     if not boundary:
         raise SeparatrixError("--reduce craig-bampton: give the points of joints: --point NAME=PLACE")
     inner = np.array([number for number in range(structure.size) if number not in set(boundary)], dtype=int)
-    change = np.zeros((structure.size, len(boundary) + min(count, len(inner))))
+    change = np.zeros((structure.size, len(boundary)))
     change[boundary, np.arange(len(boundary))] = 1
     if len(inner):
         try:
@@ -137,9 +183,11 @@ def craig_bampton(structure: Matrices, count: int) -> Matrices:
             raise SeparatrixError(
                 "--reduce craig-bampton: the structure moves freely with its points held; give more points"
             ) from None
-        change[inner, : len(boundary)] = follow
+        change[inner] = follow
         rest = Matrices(structure.mass, structure.stiffness, None, structure.labels).without(boundary)
-        change[inner, len(boundary) :] = undamped_modes(rest, count)[1][:, : min(count, len(inner))]
+        shapes = undamped_modes(rest, count)[1] if count else np.zeros((len(inner), 0))
+        change = np.hstack([change, np.zeros((structure.size, shapes.shape[1]))])
+        change[inner, len(boundary) :] = shapes
     labels = [structure.labels[number] for number in boundary]
     labels += [f"mode{number + 1}" for number in range(change.shape[1] - len(boundary))]
     return _changed(structure, change, labels)

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Normal modes out of universal files: data sets 55, in the units of data set 164 (with pyuff)."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from separatrix.errors import BAD_DATA, NO_INPUT, SeparatrixError
+from separatrix.structures.content import Modes
+from separatrix.trial import read_apart
+
+_MODES, _UNITS = 55, 164
+# Numbers of units of length and force in one metre and one newton, by the units codes of data set 164.
+_POUND_FORCE, _KILOGRAM_FORCE = 1 / 4.4482216152605, 1 / 9.80665
+_OF_CODE = {
+    1: (1.0, 1.0),
+    2: (1 / 0.3048, _POUND_FORCE),
+    3: (1.0, _KILOGRAM_FORCE),
+    4: (1 / 0.3048, 1 / 0.138254954376),
+    5: (1000.0, 1000.0),
+    6: (100.0, 100.0),
+    7: (1 / 0.0254, _POUND_FORCE),
+    8: (1000.0, _KILOGRAM_FORCE),
+    10: (1000.0, 1.0),
+}
+_NORMAL_MODE = 2
+# Specific data types of shapes that are displacements: not stated, general, displacement.
+_DISPLACEMENT = (0, 1, 8)
+
+
+def read_modes(path: str | Path) -> Modes:
+    """Read the normal modes of a universal file; modal masses normalise the shapes.
+
+    Data set 164 states the units; without it they are SI.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SeparatrixError(f"{path}: there is no such file", NO_INPUT)
+    try:
+        import pyuff
+    except ImportError:
+        raise SeparatrixError(f"{path}: universal files need pyuff: pip install pyuff", BAD_DATA) from None
+
+    def read() -> Modes:
+        file = pyuff.UFF(str(path))
+        kinds = np.asarray(file.get_set_types())
+        return _modes(
+            [file.read_sets(int(number)) for number in np.flatnonzero(kinds == _MODES)],
+            _factors([file.read_sets(int(number)) for number in np.flatnonzero(kinds == _UNITS)]),
+        )
+
+    return read_apart(path, "structure", read)
+
+
+def _factors(sets: Sequence[Mapping]) -> tuple[float, float]:
+    """Return the divisors that lead from the units of the file to m and N."""
+    found = {(int(one["units_code"]), float(one["length"]), float(one["force"])) for one in sets}
+    if len(found) > 1:
+        raise SeparatrixError(f"found {len(found)} data sets 164 with units that differ, allowed one")
+    code, length, force = found.pop() if found else (1, 1.0, 1.0)
+    stated = f"data set 164: found the factors {length:g} of length and {force:g} of force"
+    if not (0 < length < np.inf and 0 < force < np.inf):
+        raise SeparatrixError(f"{stated}, allowed ones above 0")
+    of_code = _OF_CODE.get(code, (length, force))
+    if not np.allclose((length, force), of_code, rtol=1e-3, atol=0):
+        raise SeparatrixError(
+            f"{stated} with the units code {code}, allowed {of_code[0]:g} and {of_code[1]:g}, "
+            "or the code 9 of other units"
+        )
+    return length, force
+
+
+def _modes(sets: Sequence[Mapping], factors: tuple[float, float]) -> Modes:
+    sets = [one for one in sets if one["analysis_type"] == _NORMAL_MODE]
+    if not sets:
+        raise SeparatrixError("found no data set 55 with a normal mode (analysis type 2)")
+    numbers = np.array(
+        [[one[key] for key in ("freq", "modal_m", "modal_damp_vis", "modal_damp_his")] for one in sets], float
+    )
+    if not np.isfinite(numbers).all() or np.any(numbers[:, [0, 2, 3]] < 0):
+        raise SeparatrixError("found a frequency or a damping ratio below 0 or not finite, allowed from 0 on")
+    order = np.argsort(numbers[:, 0], kind="stable")
+    shapes: dict[str, list[float]] = {}
+    for place, number in enumerate(order):
+        one, mass = sets[number], numbers[number, 1]
+        mode = f"mode {place + 1}"
+        if not mass > 0:
+            raise SeparatrixError(f"{mode}: found the modal mass {mass}, allowed above 0")
+        if one.get("spec_data_type", 0) not in _DISPLACEMENT:
+            raise SeparatrixError(
+                f"{mode}: found shapes of the specific data type {one['spec_data_type']}, "
+                "allowed displacement (8)"
+            )
+        for key, value in _shape(one, mass, factors, mode).items():
+            column = shapes.setdefault(key, [])
+            # A place that a mode lacks is left out of all.
+            if len(column) == place:
+                column.append(value)
+    rows = {key: np.array(values) for key, values in shapes.items() if len(values) == len(sets)}
+    return Modes(numbers[order, 0], numbers[order, 2] + numbers[order, 3] / 2, shapes=rows)
+
+
+def _shape(one: Mapping, mass: float, factors: tuple[float, float], mode: str) -> dict[str, float]:
+    """Return the mass-normalised displacements of a mode, by "NODE:DIRECTION", in SI units.
+
+    The energy of a mode is half its modal mass times the squared rate of its amplitude, so that mass goes
+    with length times force; rotations have no unit of their own.
+    """
+    length, force = factors
+    nodes = [int(node) for node in one["node_nums"]]
+    if len(set(nodes)) != len(nodes):
+        raise SeparatrixError(f"{mode}: found a node twice, allowed once")
+    found = {}
+    for direction in "123456":
+        values = one.get(f"r{direction}")
+        if values is None:
+            continue
+        values = np.asarray(values)
+        if len(values) != len(nodes) or not np.isfinite(values).all():
+            raise SeparatrixError(
+                f"{mode}: found {len(values)} numbers in direction {direction}, "
+                f"allowed {len(nodes)} finite ones"
+            )
+        if np.iscomplexobj(values):
+            if np.abs(values.imag).max() > 1e-3 * np.abs(values).max():
+                raise SeparatrixError(f"{mode} is complex, allowed real normal modes")
+            values = values.real
+        unit = np.sqrt(force / length if direction in "123" else force * length)
+        row = values * unit / np.sqrt(mass)
+        found |= {f"{node}:{direction}": float(value) for node, value in zip(nodes, row, strict=True)}
+    return found
