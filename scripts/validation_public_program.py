@@ -53,12 +53,12 @@ def series(
 ) -> list[Number]:
     """A number of each pair; what is missing differs."""
     found = [*map(float, ours), *[float("nan")] * len(theirs)]
-    return [
-        Number(source, f"{what} {k + 1}", value, found[k], bar) for k, value in enumerate(theirs)
-    ]
+    return [Number(source, f"{what} {k + 1}", value, found[k], bar) for k, value in enumerate(theirs)]
 
 
-def largest(source: str, what: str, theirs: Sequence[float], ours: Sequence[float] | np.ndarray, bar: float) -> Number:
+def largest(
+    source: str, what: str, theirs: Sequence[float], ours: Sequence[float] | np.ndarray, bar: float
+) -> Number:
     """The largest difference of two lists, infinite where one is longer."""
     apart = np.inf
     if len(theirs) == len(ours):

@@ -19,10 +19,12 @@ TURN = 2 * pi / 50
 
 
 def by_steps(source: str, what: str, machine: Structure, program: Program, case: str, until: float) -> Number:
-    """The largest difference in time of the events of a motion; starts are those of the case, already run by `machine`."""
+    """The largest difference in time of the events of a motion that `machine` has run."""
     theirs = sorted({round(at, 9): at for _, _, at in machine.events}.values())
     ours = sorted({round(at, 9): at for _, at in times(program, case, run__duration=until)}.values())
-    return largest(f"{source}, by `tests/referee/structures.py`", f"{what}: times of events (s)", theirs, ours, 1e-8)
+    return largest(
+        f"{source}, by `tests/referee/structures.py`", f"{what}: times of events (s)", theirs, ours, 1e-8
+    )
 
 
 def belt(program: Program) -> list[Number]:
@@ -48,7 +50,11 @@ def moving_belt(program: Program) -> list[Number]:
 
     machine = Structure([20], force, [Friction([1], lambda u: 294.3, 294.3)])
     machine.run([2 / TURN], [0], 100)
-    return [by_steps("PathSim, stick slip", "box on a belt to and fro", machine, program, "belt_back_and_forth", 100)]
+    return [
+        by_steps(
+            "PathSim, stick slip", "box on a belt to and fro", machine, program, "belt_back_and_forth", 100
+        )
+    ]
 
 
 def modelica(program: Program) -> list[Number]:
@@ -70,13 +76,26 @@ def modelica(program: Program) -> list[Number]:
     place, rate = ends(program, "stribeck_force", "x", "v")
     angle, speed = ends(program, "clutch", "motor_x", "motor_v")
     own = f"{source}, by `tests/referee/structures.py`"
+    rotational = "Modelica Standard Library, Rotational.Examples.Friction"
     return [
         by_steps(source, "driven mass", driven, program, "stribeck_force", 5),
         Number(own, "the same: place after 5 s (m)", end[0], place, 1e-8),
         Number(own, "the same: velocity after 5 s (m/s)", end[1], rate, 1e-8),
-        by_steps("Modelica Standard Library, Rotational.Examples.Friction", "clutch", clutch, program, "clutch", 0.5),
-        Number(own, "the same: angle of the motor after 0.5 s (rad)", last[0], angle, 1e-7),
-        Number(own, "the same: speed of the motor (rad/s)", last[3], speed, 1e-7),
+        by_steps(rotational, "clutch", clutch, program, "clutch", 0.5),
+        Number(
+            f"{rotational}, by `tests/referee/structures.py`",
+            "the same: angle of the motor after 0.5 s (rad)",
+            last[0],
+            angle,
+            1e-7,
+        ),
+        Number(
+            f"{rotational}, by `tests/referee/structures.py`",
+            "the same: speed of the motor (rad/s)",
+            last[3],
+            speed,
+            1e-7,
+        ),
     ]
 
 
