@@ -16,6 +16,7 @@ from pathlib import Path
 
 import validation_curves
 import validation_measures
+import validation_public
 import validation_rows as rows
 import validation_structures
 from markdown import table
@@ -46,7 +47,9 @@ def section(source: str, found: list[Row]) -> str:
     return f"### {source}\n\n{table(head, [line(row) for row in found])}\n\nHow ours were computed:\n\n{told}"
 
 
-def page(found: list[Row], structures: list, measures: list, report: dict, version: dict[str, str]) -> str:
+def page(
+    found: list[Row], structures: list, public: list, measures: list, report: dict, version: dict[str, str]
+) -> str:
     """The text of docs/validation.md."""
     order = list(THEIRS)
     found = sorted(found, key=lambda row: order.index(row.key))
@@ -62,6 +65,8 @@ def page(found: list[Row], structures: list, measures: list, report: dict, versi
             count=len(found),
             tables="\n\n".join(parts),
             structures=validation_structures.section(structures),
+            public=validation_public.section(public),
+            public_count=len(public),
             measures=validation_measures.section(measures),
             not_yet=table(["source", "what", "why"], [list(item) for item in NOT_YET]),
             referee=compare.summary_table(report),
@@ -96,13 +101,16 @@ def main() -> int:
         found += compute(program)
     print("validation: structures", flush=True)
     structures = validation_structures.numbers(validation_structures.Program(build, folder / "structures"))
-    print("validation: measures", flush=True)
     os.environ["SEPARATRIX_PROGRAM"] = str(build / "bin" / "separatrix")
+    print("validation: public problems", flush=True)
+    public = validation_public.numbers(validation_structures.Program(build, folder / "public"))
+    print("validation: measures", flush=True)
     measures = validation_measures.rows()
     report = compare.kept_report(build, folder / "referee")
-    (SOURCE / "docs" / "validation.md").write_text(page(found, structures, measures, report, version))
+    (SOURCE / "docs" / "validation.md").write_text(page(found, structures, public, measures, report, version))
     print("validation: wrote docs/validation.md", flush=True)
     bad = [row for row in [*found, *structures, *measures] if row.verdict != "agrees"]
+    bad += filter(validation_public.differs, public)
     return 1 if bad or compare.wrong_in(report) else 0
 
 

@@ -56,7 +56,7 @@ module exponents
     integer :: periods = 0
     real(wp) :: mean_period = 0
     logical :: known = .false.
-    !> Where it is not: sections that a structure passed before that, and whether it was all but at rest then.
+    !> Sections that a structure passed, and whether it was all but at rest then, or else comes to rest.
     integer :: passed = 0
     logical :: at_rest = .false.
   end type spectrum_t
@@ -275,15 +275,15 @@ contains
   end function period_of_section
 
   !> What a motion is, by the cycle that it is on, or else by its largest exponent and the 0-1 test `k`, at three standard errors;
-  !> not known where they do not agree. A neutral one must be so within the errors alone, and they must tell it from a cycle all of
-  !> whose directions contract alike.
+  !> not known where they do not agree, nor where it comes to rest. A neutral one must be so within the errors alone, and they must
+  !> tell it from a cycle all of whose directions contract alike.
   pure integer function type_of_motion(spectrum, k) result(motion)
     type(spectrum_t), intent(in) :: spectrum
     real(wp), intent(in) :: k
     !> Of a logarithm over a section; of a multiplier.
     real(wp), parameter :: rounding = 10*epsilon(1.0_wp), neutral = 1e-10_wp
     motion = motion_not_known
-    if (.not. spectrum%known) return
+    if (.not. spectrum%known .or. spectrum%at_rest) return
     associate (largest => spectrum%exponents(1), error => spectrum%errors(1), room => 3*spectrum%errors(1) + spectrum%memory)
       if (spectrum%cycle > 0 .and. spectrum%multiplier < 1 - neutral) then
         if (k < 0.2_wp) motion = motion_contracting

@@ -13,8 +13,8 @@ module structure_exponents
   use jointed_state, only: joint_motion, jointed_state_t, turning_at
   use kinds, only: int64, wp
   use motion, only: start_state
-  use motion_state, only: event_impact_lower, event_impact_upper, event_touch_lower, event_touch_upper, &
-    event_turning_point, state_t, tally_t
+  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_touch_lower, &
+    event_touch_upper, event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
   use structure, only: coordinates_of, mode_number, state_in, structure_t
   use structure_family, only: least_dimension, state_at_start, vary_section
@@ -95,7 +95,7 @@ contains
     integer, intent(in) :: transient, sections
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
-    real(wp) :: frame(structure%n, structure%n), batch(batches, structure%n), growth(structure%n), duration, lasted
+    real(wp) :: frame(structure%n, structure%n), batch(batches, structure%n), growth(structure%n), duration, lasted, pace(sections)
     type(event_t), allocatable :: events(:)
     integer :: i, k, part, mode, left
     series = 0
@@ -115,7 +115,8 @@ contains
       call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
       spectrum%passed = transient + i
-      spectrum%at_rest = is_at_rest(structure, mode, coordinates_of(structure, state))
+      pace(max(1, i)) = pace_of(structure, mode, coordinates_of(structure, state))
+      spectrum%at_rest = .not. structure%has_clock .and. pace(max(1, i)) < still
       call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%known)
       if (.not. spectrum%known) return
       if (i < 1) cycle
@@ -130,17 +131,36 @@ contains
     spectrum%periods = sections
     spectrum%mean_period = duration/sections
     call conclude(structure, batch*batches/duration, duration, left, spectrum)
+    spectrum%at_rest = .not. structure%has_clock .and. fades_away(pace, -spectrum%exponents(1)*duration/2)
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
 
-  !> Whether a structure without a clock all but rests at a point of its section, where the next section may be one of rounding.
-  pure logical function is_at_rest(structure, mode, point)
+  !> Whether a motion comes to rest: the paces at its sections fall from one half of them to the other as the largest exponent says,
+  !> by `decay` as a logarithm, while those of a motion that comes to a cycle stay.
+  pure logical function fades_away(pace, decay)
+    real(wp), intent(in) :: pace(:), decay
+    real(wp) :: fall
+    integer :: half
+    half = size(pace)/2
+    fall = mean_log(pace(:half)) - mean_log(pace(half + 1:))
+    fades_away = fall > decay/2 .or. (fall > 1 .and. pace(size(pace)) < still)
+    ! A direction that is lost says nothing of the pace.
+    fades_away = fades_away .and. decay > 0 .and. decay < sqrt(huge(1.0_wp))
+  end function fades_away
+
+  pure real(wp) function mean_log(values)
+    real(wp), intent(in) :: values(:)
+    mean_log = sum(log_of(max(tiny(values), values)))/size(values)
+  end function mean_log
+
+  !> Rate of change at a point of the section, in natural sizes. Where it is next to nothing the next section may be one of
+  !> rounding.
+  pure real(wp) function pace_of(structure, mode, point) result(pace)
     type(structure_t), intent(in) :: structure
     integer, intent(in) :: mode
     real(wp), intent(in) :: point(:)
-    is_at_rest = .not. structure%has_clock
-    if (is_at_rest) is_at_rest = norm2(structure%slope(mode, 0.0_wp, point)/structure%size_of)*structure%size_of_time() < still
-  end function is_at_rest
+    pace = norm2(structure%slope(mode, 0.0_wp, point)/structure%size_of)*structure%size_of_time()
+  end function pace_of
 
   !> Takes from a structure that nothing ties to the ground the drift of the whole, which would run out of its digits.
   pure subroutine bring_back(structure, state)
@@ -314,6 +334,10 @@ contains
           spectrum%has_sum = spectrum%has_sum .and. event%before == event%after
         case (event_touch_upper, event_touch_lower)
           spectrum%impacts = spectrum%impacts + 1
+        case (event_chatter_upper, event_chatter_lower)
+          ! The impact with which the contact closes.
+          spectrum%impacts = spectrum%impacts + 1
+          spectrum%has_sum = .false.
         case (event_turning_point)
           spectrum%sum_exact = spectrum%sum_exact &
             + logarithm(abs(slide_rate(structure, event, event%after, event%departure)/ &

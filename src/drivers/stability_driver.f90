@@ -97,7 +97,7 @@ contains
     type(spectrum_t), intent(in) :: spectrum
     logical, intent(in) :: has_clock
     real(wp), intent(in) :: k
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: name, what
     integer :: i
     do i = 1, size(spectrum%exponents)
       associate (value => spectrum%exponents(i), error => spectrum%errors(i))
@@ -120,9 +120,10 @@ contains
     end if
     call session%journal%line('zero_one', '0-1 test: '//to_text(k, 3)//' (0 regular, 1 chaotic)', '"value": '//json_number(k))
     name = trim(motion_names(type_of_motion(spectrum, k)))
-    call session%journal%line('motion', 'the motion is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')// &
-      ', by '//to_text(spectrum%periods)//trim(merge(' drive periods', ' returns      ', has_clock))//' with '// &
-      to_text(spectrum%impacts)//' impacts', &
+    what = 'is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')
+    if (spectrum%at_rest) what = 'comes to rest'
+    call session%journal%line('motion', 'the motion '//what//', by '//to_text(spectrum%periods)// &
+      trim(merge(' drive periods', ' returns      ', has_clock))//' with '//to_text(spectrum%impacts)//' impacts', &
       '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts))
   end subroutine report
 

@@ -196,7 +196,11 @@ contains
     do k = 1, size(machine%joints)
       call take_viscous(machine, k)
     end do
-    call merge_friction(machine)
+    call merge_friction(machine, i, k)
+    if (k > 0) call fail(error, exit_bad_case, trim(machine%joints(k)%name)//'.law: found friction on the surface of '// &
+                         trim(machine%joints(i)%name)//' that does not add up to one law with it, allowed the same law, or '// &
+                         'the sum in one of them')
+    if (allocated(error)) return
     call check(machine, error)
     if (allocated(error)) return
     allocate (squares(machine%n), shapes(machine%n, machine%n), machine%mobility(machine%n, machine%n))

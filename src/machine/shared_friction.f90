@@ -3,7 +3,7 @@
 
 !> Friction joints that are not to be told apart.
 module shared_friction
-  use friction_law, only: same_shape
+  use friction_law, only: falls, friction_t, same_shape
   use jointed, only: joint_friction, joint_t, jointed_t
   use kinds, only: wp
   implicit none
@@ -13,20 +13,28 @@ module shared_friction
 
 contains
 
-  !> Rigid friction on the same row against the same surface becomes one joint: what each holds is not to be told apart.
-  pure subroutine merge_friction(machine)
+  !> Rigid friction on the same row against the same surface becomes one joint: what each holds is not to be told apart. `first` and
+  !> `second` are joints whose laws do not add up to one, 0 without any.
+  pure subroutine merge_friction(machine, first, second)
     type(jointed_t), intent(inout) :: machine
+    integer, intent(out) :: first, second
     type(joint_t), allocatable :: joints(:)
     logical :: kept(size(machine%joints))
     integer :: i, k, count_kept
     kept = .true.
+    first = 0
+    second = 0
     do i = 1, size(machine%joints)
       do k = 1, i - 1
         if (.not. kept(i) .or. .not. kept(k) .or. .not. alike(machine%joints(i), machine%joints(k))) cycle
-        machine%joints(k)%friction%kinetic = machine%joints(k)%friction%kinetic + machine%joints(i)%friction%kinetic
-        machine%joints(k)%friction%break_away = machine%joints(k)%friction%break_away &
-          + machine%joints(i)%friction%break_away
-        kept(i) = .false.
+        if (adds_up(machine%joints(k)%friction, machine%joints(i)%friction)) then
+          machine%joints(k)%friction = total(machine%joints(k)%friction, machine%joints(i)%friction)
+          kept(i) = .false.
+        else
+          first = k
+          second = i
+          return
+        end if
       end do
     end do
     if (all(kept)) return
@@ -40,14 +48,86 @@ contains
     call move_alloc(joints, machine%joints)
   end subroutine merge_friction
 
+  !> Both rub on the same surface along the same row.
   pure logical function alike(a, b)
     type(joint_t), intent(in) :: a, b
-    alike = a%kind == joint_friction .and. b%kind == joint_friction
-    if (alike) alike = same(sum(abs(a%row - b%row))) .or. same(sum(abs(a%row + b%row)))
-    if (alike) alike = same(a%offset%rate) .and. same(b%offset%rate) .and. .not. allocated(a%offset%harmonic) .and. &
-                       .not. allocated(b%offset%harmonic)
-    if (alike) alike = same_shape(a%friction, b%friction)
+    integer :: way
+    alike = .false.
+    if (a%kind /= joint_friction .or. b%kind /= joint_friction) return
+    do way = -1, 1, 2
+      if (.not. same(sum(abs(a%row - way*b%row)))) cycle
+      alike = same(a%offset%rate - way*b%offset%rate) .and. same_waves(a, b, way)
+      return
+    end do
   end function alike
+
+  pure logical function same_waves(a, b, way) result(are)
+    type(joint_t), intent(in) :: a, b
+    integer, intent(in) :: way
+    are = allocated(a%offset%harmonic) .eqv. allocated(b%offset%harmonic)
+    if (.not. are .or. .not. allocated(a%offset%harmonic)) return
+    are = size(a%offset%harmonic) == size(b%offset%harmonic)
+    if (are) are = same(sum(abs(a%offset%harmonic - way*b%offset%harmonic)))
+  end function same_waves
+
+  !> Whether the forces of two laws add up to one law. What fades does so by its break-away force, which a law with one of its own
+  !> would change.
+  pure logical function adds_up(a, b)
+    type(friction_t), intent(in) :: a, b
+    adds_up = same_shape(a, b)
+    if (adds_up) return
+    if (fades(a) .and. fades(b)) then
+      adds_up = same(a%fading_speed - b%fading_speed)
+    else if (fades(a) .or. fades(b)) then
+      adds_up = even(a) .or. even(b)
+    else
+      adds_up = .not. (a%excess > 0 .and. b%excess > 0) .or. same_decay(a, b) &
+                .or. .not. (a%second_excess > 0 .or. b%second_excess > 0)
+    end if
+  end function adds_up
+
+  pure logical function fades(law)
+    type(friction_t), intent(in) :: law
+    fades = law%fading_speed > 0
+  end function fades
+
+  !> The same force at break-away as while sliding, at any speed.
+  pure logical function even(law)
+    type(friction_t), intent(in) :: law
+    even = .not. falls(law) .and. same(law%break_away - law%kinetic)
+  end function even
+
+  !> Whether both excesses fall alike with the speed.
+  pure logical function same_decay(a, b)
+    type(friction_t), intent(in) :: a, b
+    same_decay = same(a%stribeck_velocity - b%stribeck_velocity) .and. same(a%stribeck_exponent - b%stribeck_exponent) &
+                 .and. .not. b%second_excess > 0
+  end function same_decay
+
+  !> The law whose forces are the sum of those of two that add up.
+  pure type(friction_t) function total(a, b) result(law)
+    type(friction_t), intent(in) :: a, b
+    law = a
+    law%kinetic = a%kinetic + b%kinetic
+    law%break_away = a%break_away + b%break_away
+    law%drag = a%drag + b%drag
+    law%fading_speed = max(a%fading_speed, b%fading_speed)
+    if (.not. b%excess > 0) return
+    if (.not. a%excess > 0) then
+      law%excess = b%excess
+      law%stribeck_velocity = b%stribeck_velocity
+      law%stribeck_exponent = b%stribeck_exponent
+      law%second_excess = b%second_excess
+      law%second_velocity = b%second_velocity
+      law%second_exponent = b%second_exponent
+    else if (same_decay(a, b)) then
+      law%excess = a%excess + b%excess
+    else
+      law%second_excess = b%excess
+      law%second_velocity = b%stribeck_velocity
+      law%second_exponent = b%stribeck_exponent
+    end if
+  end function total
 
   pure logical function same(difference)
     real(wp), intent(in) :: difference

@@ -216,3 +216,52 @@ def test_touches_of_a_soft_stop_are_impacts(separatrix: Path, source_dir: Path, 
     said = succeed(separatrix, "stability", case, *more, "--periods", 200, "--json", folder=tmp_path).out
     motion = next(line for line in map(json.loads, said.splitlines()) if line["event"] == "motion")
     assert (motion["type"], motion["impacts"]) == ("periodic", 200)
+
+
+DECAY = """
+[body.block]
+mass = 1
+[spring.spring]
+between = ["block"]
+stiffness = 1
+damping = {damping}
+[contact.wall]
+between = ["block"]
+law = "newton"
+restitution = {loss}
+lower = {wall}
+[start]
+x0 = 1
+[run]
+duration = 20
+"""
+
+
+@pytest.mark.parametrize(
+    ("damping", "loss", "wall", "said"),
+    [
+        (0.2, 1, -9, "comes to rest"),
+        (0.0002, 1, -9, "comes to rest"),
+        (0, 0.9, 0, "comes to rest"),
+        (0, 1, -9, "is periodic"),
+        (0, 1, -0.5, "is periodic"),
+    ],
+)
+def test_a_motion_that_decays_is_not_periodic(separatrix, tmp_path, damping, loss, wall, said):
+    """Each turn is smaller than the one before by a share: a rest is what it comes to, not a cycle."""
+    case = tmp_path / "case.toml"
+    case.write_text(DECAY.format(damping=damping, loss=loss, wall=wall))
+    text = succeed(separatrix, "stability", case, "--periods", "200", folder=tmp_path).out
+    assert f"the motion {said}, by 200 returns" in text
+
+
+@pytest.mark.parametrize(("loss", "impacts"), [(0, 1), (0.1, 6)])
+def test_impacts_that_close_a_contact_count(separatrix, source_dir, tmp_path, loss, impacts):
+    """As many a period as the trajectory has."""
+    case = source_dir / "examples" / "validation" / "public" / "plastic_ball.toml"
+    loss = ("--set", f"contact.plate.restitution={loss}")
+    text = succeed(separatrix, "stability", case, "--periods", "200", *loss, folder=tmp_path).out
+    assert f"by 200 drive periods with {200 * impacts} impacts" in text
+    succeed(separatrix, "trajectory", case, *loss, "-o", "ball.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "ball.h5") as file:
+        assert file.attrs["impacts_per_period"] == impacts

@@ -8,7 +8,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from program import differences, succeed
+from program import differences, run, succeed
 
 SMALL = ["--set", "axis[1].count=9", "--set", "axis[2].count=9"]
 
@@ -151,6 +151,84 @@ def test_events_of_a_ring_of_friction_are_those_of_what_moves(separatrix, tmp_pa
             moved = abs(float(event["joint_x"]) - float(before["joint_x"]))
             assert event is before or (moved > 1e-9) == slides
             slides = event["kind"] != "stick"
+
+
+PULLED = """
+[body.box]
+mass = 1
+[friction.one]
+between = ["{surface}", "box"]
+{one}
+[friction.two]
+between = ["{surface}", "box"]
+{two}
+[run]
+duration = 3
+"""
+FORCE = """
+[drive.force]
+law = "force"
+body = "box"
+sine = [2]
+frequency = 1
+"""
+GIVEN = """
+[body.belt]
+mass = 1
+[drive.belt]
+law = "motion"
+body = "belt"
+sine = [-2]
+frequency = 1
+[start]
+v0 = -2
+[watch]
+body = "box"
+"""
+PLAIN = "force = 0\nstatic_force = {}"
+STRIBECK = 'law = "coulomb_stribeck"\nforce = 0.5\nstatic_force = {}\nstribeck_velocity = {}'
+FADING = 'law = "coulomb_hyperbolic"\nforce = 0.5\nstatic_force = {}\nfading_velocity = {}'
+DRAG = 'law = "coulomb_quadratic"\nforce = {}\ndrag = 2'
+
+
+@pytest.mark.parametrize(
+    ("one", "two"),
+    [
+        (STRIBECK.format(1, 0.3), PLAIN.format(0.5)),
+        (PLAIN.format(0.5), STRIBECK.format(1, 0.3)),
+        (STRIBECK.format(0.8, 0.3), STRIBECK.format(0.7, 0.4)),
+        (STRIBECK.format(0.8, 0.3), STRIBECK.format(0.7, 0.3)),
+        (FADING.format(0.8, 0.3), FADING.format(0.7, 0.3)),
+        (FADING.format(1, 0.3), "force = 0.5"),
+        (DRAG.format(1), STRIBECK.format(0.5, 0.3)),
+    ],
+)
+def test_friction_on_one_surface_adds_up(separatrix, tmp_path, one, two):
+    """A box lets go where its force reaches the sum of the break-away forces, whatever the laws."""
+    case, path = tmp_path / "case.toml", tmp_path / "a.h5"
+    case.write_text(PULLED.format(surface="ground", one=one, two=two) + FORCE)
+    succeed(separatrix, "trajectory", case, "-o", path, folder=tmp_path)
+    with h5py.File(path) as file:
+        assert file["event_time"][0] == pytest.approx(np.arcsin(0.75), abs=1e-12)
+
+
+def test_friction_on_one_moving_body_adds_up(separatrix, tmp_path):
+    """The same between a box and a belt whose motion is given, in either order of the two."""
+    case, path = tmp_path / "case.toml", tmp_path / "a.h5"
+    text = PULLED.format(surface="belt", one=PLAIN.format(1), two=PLAIN.format(0.5))
+    case.write_text(text.replace('["belt", "box"]', '["box", "belt"]', 1) + GIVEN)
+    succeed(separatrix, "trajectory", case, "-o", path, folder=tmp_path)
+    with h5py.File(path) as file:
+        assert file["event_time"][0] == pytest.approx(np.arcsin(0.75), abs=1e-12)
+
+
+def test_friction_that_does_not_add_up_is_refused(separatrix, tmp_path):
+    case = tmp_path / "case.toml"
+    text = PULLED.format(surface="ground", one=FADING.format(1, 0.3), two=PLAIN.format(0.5))
+    case.write_text(text + FORCE)
+    done = run(separatrix, "trajectory", case, "--validate", folder=tmp_path)
+    assert done.code == 65
+    assert "friction.two.law': found friction on the surface of friction.one" in done.err
 
 
 def test_a_chatter_is_told_when_it_is_over(separatrix, tmp_path):

@@ -50,6 +50,41 @@ def test_impact_by_impact(rows, separatrix, build_dir, tmp_path, name, count):
     assert [number for number in found if number.verdict != "agrees"] == []
 
 
+@pytest.fixture(scope="module")
+def public(rows):
+    return importlib.import_module("validation_public")
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("siconos", 7), ("modelica_force", 5), ("modelica_stop", 2), ("modelica_clutch", 5), ("rao", 3)]
+    + [("sciml", 1), ("pendulum", 2), ("hertz", 4), ("rocking", 2), ("springs", 2), ("stacked", 2)],
+)
+def test_public_problems_agree_and_stand_in_the_page(
+    public, separatrix, build_dir, tmp_path, source_dir, name, count
+):
+    page = public.between((source_dir / "docs" / "validation.md").read_text())
+    problems = {compute.__name__: compute for compute in public.COMPUTED}
+    found = problems[name](public.Program(build_dir, tmp_path))
+    assert len(found) == count
+    assert [number for number in found if number.verdict != "agrees"] == []
+    for number in found:
+        assert f"| {number.source} | {number.what} | {number.theirs:.12g} |" in page
+
+
+def test_what_is_off_is_settled_by_a_closed_form(public, separatrix, build_dir, tmp_path):
+    *found, rest = public.PRINTED[0](public.Program(build_dir, tmp_path))
+    assert [number.verdict.split(",")[0] for number in found] == ["theirs is off"] * 5
+    assert rest.verdict == "agrees"
+    assert not any(map(public.differs, found))
+
+
+def test_every_public_case_is_run(source_dir):
+    scripts = "".join(path.read_text() for path in (source_dir / "scripts").glob("validation_public_*.py"))
+    for path in (source_dir / "examples" / "validation" / "public").glob("*.toml"):
+        assert f'"{path.stem}"' in scripts or f'"{path.name}"' in scripts
+
+
 def test_the_quadratic_gives_orbits_that_come_back(rows):
     """The closed form, by steps of the other simulator: after a period the same state, but for the impact."""
     coupled, damping = np.array([[2, -1], [-1, 1]]), np.diag([0.5, 0.0])
