@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens result files with the readers of others that are installed, and prints what each of them reads as a table.
+"""Opens result files with the readers of others that are installed; prints what each reads as a table.
 
     scripts/readers_check.py [--python PYTHON]... FILE...
 
-Installs nothing. A reader has read a file if it gives every variable with values: of all groups, or of the root where it knows
-no groups. A reader in Python may be in another environment: --python names its interpreter. Exit code 1 if a reader lacks a
-variable of a file. Where the truth comes from, h5py, must be in the interpreter that runs the script.
+Installs nothing. A reader has read a file if it gives every variable with values: of all groups, or of the
+root where it knows no groups. A reader in Python may be in another environment: --python names its
+interpreter. Exit code 1 if a reader lacks a variable of a file. The interpreter that runs the script needs
+h5py, with which the others are compared.
 """
 
 import argparse
@@ -82,7 +83,9 @@ def _python_netcdf4(files: list[Path]) -> dict[str, list[str]]:
 
 def _tree(tree: object) -> list[str]:
     return [
-        f"{node.path}/{name}".lstrip("/") for node in tree.subtree for name in node.to_dataset(inherit=False).variables
+        f"{node.path}/{name}".lstrip("/")
+        for node in tree.subtree
+        for name in node.to_dataset(inherit=False).variables
     ]
 
 
@@ -142,7 +145,10 @@ def _python_vtk(files: list[Path]) -> dict[str, list[str]]:
     for path in files:
         found[str(path)] = names = []
         reader = _vtk_reader(vtk, path)
-        sets = [reader.GetAllDimensions().GetValue(i) for i in range(reader.GetAllDimensions().GetNumberOfValues())]
+        sets = [
+            reader.GetAllDimensions().GetValue(i)
+            for i in range(reader.GetAllDimensions().GetNumberOfValues())
+        ]
         for dimensions in sets:
             reader = _vtk_reader(vtk, path)
             reader.SetDimensions(dimensions)
@@ -171,7 +177,9 @@ def _vtk_reader(vtk: object, path: Path) -> object:
 def _run(*command: object) -> str:
     ended = subprocess.run([str(word) for word in command], capture_output=True, text=True, errors="replace")
     if ended.returncode != 0:
-        raise RuntimeError(f"{command[0]}: exit code {ended.returncode}: {(ended.stderr or ended.stdout)[-300:]}")
+        raise RuntimeError(
+            f"{command[0]}: exit code {ended.returncode}: {(ended.stderr or ended.stdout)[-300:]}"
+        )
     return ended.stdout
 
 
@@ -207,15 +215,19 @@ def _ncks(files: list[Path]) -> dict[str, list[str]]:
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "copy.nc"
             _run("ncks", path, copy)
-            found[str(path)] = _ncdump([copy])[str(copy)] if shutil.which("ncdump") else _python_h5py([copy])[str(copy)]
+            found[str(path)] = (
+                _ncdump([copy])[str(copy)] if shutil.which("ncdump") else _python_h5py([copy])[str(copy)]
+            )
     return found
 
 
 def _cdo(files: list[Path]) -> dict[str, list[str]]:
     found = {}
     for path in files:
-        _run("cdo", "-s", "infon", path)
-        found[str(path)] = _run("cdo", "-s", "showname", path).split()
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "copy.nc"
+            _run("cdo", "-s", "copy", path, copy)
+            found[str(path)] = _run("cdo", "-s", "showname", copy).split()
     return found
 
 
@@ -274,8 +286,10 @@ def _r(files: list[Path]) -> dict[str, list[str]]:
 
 READERS = (
     Reader("h5py", 'h5py.File("basin.h5")["regime"][()]', "h5py", _python_h5py),
-    Reader("xarray with h5netcdf", 'xr.open_datatree("basin.h5", engine="h5netcdf")', "h5netcdf", _python_h5netcdf),
-    Reader("xarray with netCDF4", 'xr.open_datatree("basin.h5", engine="netcdf4")', "netCDF4", _python_xarray_netcdf4),
+    Reader("xarray with h5netcdf", 'xr.open_datatree("basin.h5", engine="h5netcdf")', "h5netcdf",
+           _python_h5netcdf),
+    Reader("xarray with netCDF4", 'xr.open_datatree("basin.h5", engine="netcdf4")', "netCDF4",
+           _python_xarray_netcdf4),
     Reader("netCDF4", 'netCDF4.Dataset("basin.h5")["regime"][:]', "netCDF4", _python_netcdf4),
     Reader("h5dump", "h5dump -d /regime basin.h5", "h5dump", _h5dump),
     Reader("ncdump", "ncdump -v regime basin.h5", "ncdump", _ncdump, version=""),
@@ -283,11 +297,12 @@ READERS = (
     Reader("CDO", "cdo infon basin.h5", "cdo", _cdo, groups=False, coordinates=False),
     Reader("GNU Octave", 's = load("basin.h5"); imagesc(s.x0, s.v0, s.regime)', "octave-cli", _octave),
     Reader("R with ncdf4", 'ncdf4::ncvar_get(ncdf4::nc_open("basin.h5"), "regime")', "Rscript", _r),
-    Reader("VTK, ParaView", 'reader = vtk.vtkNetCDFCFReader(); reader.SetFileName("basin.h5")', "vtk", _python_vtk, groups=False),
-    Reader("VirtualiZarr", 'open_virtual_datatree(url, registry=registry, parser=HDFParser())', "virtualizarr",
-           _python_virtualizarr),
-    Reader("kerchunk", 'xr.open_dataset("reference://", engine="zarr", mask_and_scale=False, ...)', "kerchunk",
-           _python_kerchunk, groups=False),
+    Reader("VTK, ParaView", 'reader = vtk.vtkNetCDFCFReader(); reader.SetFileName("basin.h5")', "vtk",
+           _python_vtk, groups=False),
+    Reader("VirtualiZarr", "open_virtual_datatree(url, registry=registry, parser=HDFParser())",
+           "virtualizarr", _python_virtualizarr),
+    Reader("kerchunk", 'xr.open_dataset("reference://", engine="zarr", mask_and_scale=False, ...)',
+           "kerchunk", _python_kerchunk, groups=False),
 )  # fmt: skip
 
 
@@ -295,16 +310,22 @@ def version(reader: Reader, pythons: tuple[str, ...] = PYTHONS) -> tuple[str, st
     """What runs the reader and its version; None where it is not installed."""
     if reader.in_python:
         for python in pythons:
-            code = f"import {reader.needs} as m; print(getattr(m, '__version__', None) or m.vtkVersion().GetVTKVersion())"
+            said = "getattr(m, '__version__', None) or m.vtkVersion().GetVTKVersion()"
+            code = f"import {reader.needs} as m; print({said})"
             ended = subprocess.run([python, "-c", code], capture_output=True, text=True)
             if ended.returncode == 0:
                 return python, ended.stdout.split()[-1]
         return None
     if shutil.which(reader.needs) is None:
         return None
-    if reader.needs == "Rscript" and subprocess.run(["Rscript", "-e", "library(ncdf4)"], capture_output=True).returncode:
+    if (
+        reader.needs == "Rscript"
+        and subprocess.run(["Rscript", "-e", "library(ncdf4)"], capture_output=True).returncode
+    ):
         return None
-    said = subprocess.run([reader.needs, *([reader.version] if reader.version else [])], capture_output=True, text=True)
+    said = subprocess.run(
+        [reader.needs, *([reader.version] if reader.version else [])], capture_output=True, text=True
+    )
     number = re.search(r"\d+\.\d+(\.\d+)?", said.stdout + said.stderr)
     return reader.needs, number[0] if number else "?"
 
@@ -349,7 +370,9 @@ def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
-    parser.add_argument("--python", action="append", default=[], help="an interpreter that has further readers")
+    parser.add_argument(
+        "--python", action="append", default=[], help="an interpreter that has further readers"
+    )
     parser.add_argument("--inside", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.inside:

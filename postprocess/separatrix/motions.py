@@ -121,8 +121,8 @@ def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None
     # several bodies may have no drive at all
     ratio = float(resolved.get("drive", {}).get("ratio", 0.0))
     about: dict[str, object] = {
-        "format": "separatrix", "format_version": FORMAT_VERSION, "kind": "trajectory", "complete": 1, "title": case.title,
-        "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
+        "format": "separatrix", "format_version": FORMAT_VERSION, "kind": "trajectory", "complete": 1,
+        "title": case.title, "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
         "drive_period": summary["drive_period"], "drive_ratio": ratio,
         "window": _window(resolved["run"], summary["drive_period"]),
         "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],

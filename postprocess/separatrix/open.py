@@ -140,7 +140,8 @@ def _check_header(path: Path, attributes: dict) -> None:
     version = attributes.get("format_version")
     if not isinstance(version, int) or not _OLDEST <= version <= FORMAT_VERSION:
         raise SeparatrixError(
-            f"{path}: has format_version {version}; separatrix {__version__} reads {_OLDEST} to {FORMAT_VERSION}"
+            f"{path}: has format_version {version}; "
+            f"separatrix {__version__} reads {_OLDEST} to {FORMAT_VERSION}"
         )
     if attributes.get("kind") not in KINDS:
         raise SeparatrixError(

@@ -223,7 +223,7 @@ def _dataset(result: xr.Dataset, dim: str, rows: list[list[dict]]) -> xr.Dataset
     limits = {limit for row in rows for one in row for limit in one["limits"]}
     coordinates = {
         dim: result[dim].astype(float),
-        "basin": ("basin", numbers, {"long_name": "number of the attractor"}),
+        "basin": ("basin", np.array(numbers, np.int32), {"long_name": "number of the attractor"}),
     }
     about = {
         "Conventions": "CF-1.10",
@@ -253,8 +253,10 @@ def _existence(result: xr.Dataset, dim: str, numbers: list[int], count: int) -> 
             (dim, "basin"),
             exists,
             {
-                "units": "1", "long_name": "whether the attractor is in the catalogue",
-                "flag_values": np.array([0, 1], np.int8), "flag_meanings": "absent present",
+                "units": "1",
+                "long_name": "whether the attractor is in the catalogue",
+                "flag_values": np.array([0, 1], np.int8),
+                "flag_meanings": "absent present",
             },
         )
     }

@@ -54,7 +54,8 @@ class ResultFile:
             raise SeparatrixError(f"{self.path}: is not a file of Separatrix")
         if int(attributes["format_version"]) > FORMAT_VERSION:
             raise SeparatrixError(
-                f"{self.path}: has format {attributes['format_version']}; this viewer reads 1 to {FORMAT_VERSION}"
+                f"{self.path}: has format {attributes['format_version']}; "
+                f"this viewer reads 1 to {FORMAT_VERSION}"
             )
         if not int(attributes["complete"]):
             raise SeparatrixError(f"{self.path}: is not complete; finish it with --resume")
@@ -65,9 +66,7 @@ class ResultFile:
         provenance = file["provenance"]
         # in files of version 1 it is a dataset
         old = "resolved_case" in provenance
-        self.case_text = _plain(
-            provenance["resolved_case"][()] if old else provenance.attrs["resolved_case"]
-        )
+        self.case_text = _plain(provenance["resolved_case"][()] if old else provenance.attrs["resolved_case"])
         self.case = tomllib.loads(self.case_text)
         self.axes = self._read_axes(file) if self.kind == "basin" else []
         self.shape = tuple(axis["count"] for axis in self.axes)
