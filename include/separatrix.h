@@ -216,7 +216,7 @@ int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
  *     on the section
  *     at crank angle 0, of two bodies also those of the driving one; multiplier, capture radius, amplitude
  *     [m], largest and smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s],
- *     grazing margin [m] (1.8e308: none); 1 if it is the set of all positions of rest, 1 if it may be
+ *     grazing margin [m] (infinite: none); 1 if it is the set of all positions of rest, 1 if it may be
  * anywhere between stops, number of coordinates on the section, 1 if the machine has two bodies, kind (the
  * codes of docs/file-format.md), time of one cycle [s] (0: none), real parts of its multipliers [16],
  * imaginary parts [16], one for each coordinate point_capacity, point_count, points [point_capacity][16] room

@@ -46,7 +46,10 @@ class Accessor:
 
     @property
     def attractors(self) -> "pandas.DataFrame":
-        """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ..."""
+        """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ...
+
+        `grazing_margin` is NaN where no turning point missed a barrier.
+        """
         self._require("basin")
         catalogue = table(self._result, "catalogue")
         if "attractor" not in catalogue:
@@ -57,6 +60,9 @@ class Accessor:
             frame["kind"] = [KINDS[code - 1] for code in catalogue["kind"].values]
         frame["regime"] = [REGIMES[code] for code in catalogue["regime"].values]
         frame["event_word"] = decode_words(catalogue["event_word"]).values
+        # not a number where no turning point missed a barrier; files of version 1 have the largest number
+        margins = frame["grazing_margin"]
+        frame["grazing_margin"] = margins.where(margins < np.finfo(float).max)
         slices = np.unique(catalogue["slice"].values).size
         frame.insert(2, "share", frame["count"] * slices / self._result["attractor"].size)
         return frame.set_index(["slice", "attractor"] if slices > 1 else "attractor")
@@ -76,7 +82,8 @@ class Accessor:
         frame = pandas.DataFrame({name: found[name].values[chosen] for name in columns})
         frame.insert(1, "label", labels[chosen])
         frame["event_word"] = self.decoded("event_word").values[chosen]
-        multipliers = found["multiplier_real"].values + 1j * found["multiplier_imag"].values
+        multipliers = np.empty(found["multiplier_real"].shape, complex)
+        multipliers.real, multipliers.imag = found["multiplier_real"].values, found["multiplier_imag"].values
         for number, values in enumerate(multipliers[chosen].T, 1):
             frame[f"multiplier_{number}"] = values
         return frame.rename(columns={"parameter": str(found.attrs["parameter"])})

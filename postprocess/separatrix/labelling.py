@@ -15,7 +15,7 @@ from separatrix.cases import Case
 from separatrix.errors import BAD_DATA, CaseError, Interrupted
 from separatrix.progress import Progress, Report
 from separatrix.simulate import LABEL_VARIABLES, Attractor, Catalogue, StopFlag, StoppedError, search_slices
-from separatrix.variables import CATALOGUE, CYCLES, KINDS, MAP, STARTS, attributes
+from separatrix.variables import CATALOGUE, CYCLES, FORMAT_VERSION, KINDS, MAP, STARTS, attributes
 from separatrix.version import __version__
 
 # Starts of one call: enough for the lanes, few enough to be stopped soon.
@@ -145,7 +145,7 @@ class Labelling:
         }
         resolved = self.case.to_toml()
         about = {
-            "format": "separatrix", "format_version": 1, "kind": "basin", "complete": 1,
+            "format": "separatrix", "format_version": FORMAT_VERSION, "kind": "basin", "complete": 1,
             "title": self.case.title, "source": f"Separatrix {__version__}", "resolved_case": resolved,
         }  # fmt: skip
         return xr.Dataset({**data, **self._catalogue()}, coordinates, about)
@@ -163,19 +163,16 @@ class Labelling:
             captured = dict(zip(labels.tolist(), counts.tolist(), strict=True))
             for one in catalogue.attractors:
                 count = captured.get(int(one.numbers["attractor"]), 0)
-                margin = min(one.numbers["grazing_margin"], np.finfo(float).max)
-                rows.append({**one.numbers, "grazing_margin": margin, "slice": number, "count": count})
+                rows.append({**one.numbers, "slice": number, "count": count})
                 found.append(one)
         table = {
             f"catalogue_{name}": (
                 "entry",
                 np.array([row[name] for row in rows], kind),
-                {"units": unit, "long_name": meaning},
+                attributes(described),
             )
-            for name, (kind, unit, meaning) in CATALOGUE.items()
+            for name, (kind, *described) in CATALOGUE.items()
         }
-        flags = {"flag_values": np.arange(1, len(KINDS) + 1, dtype=np.int8), "flag_meanings": " ".join(KINDS)}
-        table["catalogue_kind"][2].update(flags)
         return table | _cycles(found)
 
 

@@ -11,7 +11,7 @@ import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
 from separatrix.cases import Case, as_case, number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.variables import EVENTS, KINDS, REASONS, REGIMES, SAMPLES, attributes
+from separatrix.variables import EVENTS, FORMAT_VERSION, KINDS, REASONS, REGIMES, SAMPLES, attributes
 from separatrix.version import __version__
 
 _BOOK = (
@@ -123,8 +123,8 @@ def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None
     # several bodies may have no drive at all
     ratio = float(resolved.get("drive", {}).get("ratio", 0.0))
     about: dict[str, object] = {
-        "format": "separatrix", "format_version": 1, "kind": "trajectory", "complete": 1, "title": case.title,
-        "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
+        "format": "separatrix", "format_version": FORMAT_VERSION, "kind": "trajectory", "complete": 1,
+        "title": case.title, "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
         "drive_period": summary["drive_period"], "drive_ratio": ratio,
         "window": _window(resolved["run"], summary["drive_period"]),
         "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],

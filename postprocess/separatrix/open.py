@@ -13,12 +13,15 @@ import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import try_first
+from separatrix.variables import FORMAT_VERSION
 from separatrix.version import __version__
 from separatrix.words import decode_word
 
 FORMAT = "separatrix"
-FORMAT_VERSION = 1
+# the oldest that is read
+_OLDEST = 1
 KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary", "measures")
+_TEXTS = ("case_text", "resolved_case")
 TABLES = ("catalogue", "limits", "saddles", "sets")
 
 
@@ -106,9 +109,15 @@ def _close(parts: list[xr.Dataset]) -> None:
 def _open_table(path: str | Path, name: str) -> xr.Dataset:
     group = xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False)
     for key, variable in list(group.variables.items()):
+        # in files of version 1 they are strings
         if variable.dtype.kind in "SO":
             group[key] = (variable.dims, np.array([_text(v) for v in variable.values], dtype=object))
+        elif name == "limits" and "flag_meanings" in variable.attrs:
+            text = decode_flags(group[key])
+            group[key] = (text.dims, text.values.astype(str), {"long_name": text.attrs["long_name"]})
     group = group.reset_coords()
+    if name == "sets" and "piece" in group.data_vars:
+        group = group.rename(piece="part")
     return group.rename({key: f"{name}_{key}" for key in group.data_vars})
 
 
@@ -132,9 +141,10 @@ def _check_header(path: Path, attributes: dict) -> None:
     if attributes.get("format") != FORMAT:
         raise SeparatrixError(f"{path}: not a Separatrix file (no attribute format = '{FORMAT}')")
     version = attributes.get("format_version")
-    if version != FORMAT_VERSION:
+    if not isinstance(version, int) or not _OLDEST <= version <= FORMAT_VERSION:
         raise SeparatrixError(
-            f"{path}: has format_version {version}; separatrix {__version__} reads {FORMAT_VERSION} only"
+            f"{path}: has format_version {version}; "
+            f"separatrix {__version__} reads {_OLDEST} to {FORMAT_VERSION}"
         )
     if attributes.get("kind") not in KINDS:
         raise SeparatrixError(
@@ -148,8 +158,11 @@ def _read_provenance(file: h5py.File) -> dict:
     group = file.get("provenance")
     if group is None:
         return {}
-    texts = {key: _text(group[key][()]) for key in ("case_text", "resolved_case") if key in group}
-    return texts | {f"provenance_{key}": _plain(value) for key, value in group.attrs.items()}
+    facts = {key: _plain(value) for key, value in group.attrs.items()}
+    # in files of version 1 they are datasets
+    texts = {key: _text(group[key][()]) for key in _TEXTS if key in group}
+    texts |= {key: facts.pop(key) for key in _TEXTS if key in facts}
+    return texts | {f"provenance_{key}": value for key, value in facts.items()}
 
 
 def _plain(value: object) -> object:

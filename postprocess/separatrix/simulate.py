@@ -215,8 +215,6 @@ class Catalogue:
                 break
             room = count.value
         named = _numbers(ATTRACTOR, numbers[: len(ATTRACTOR)])
-        if named["grazing_margin"] > 1e308:
-            named["grazing_margin"] = np.inf
         size = named["coordinates"]
         real, imaginary = numbers[len(ATTRACTOR) :].reshape(2, _COORDINATES)[:, :size]
         return Attractor(named, points[: count.value, :size], real + 1j * imaginary)

@@ -9,6 +9,9 @@ import re
 
 import numpy as np
 
+#: The version of the files that are written; older ones are read too (docs/file-format.md).
+FORMAT_VERSION = 2
+
 _REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
 _REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget"
 _EVENTS = (
@@ -38,7 +41,7 @@ MAP = {
     "attractor": (np.int32, "1", "label of the attractor in the catalogue, 0 = none", {}),
     "reason": (np.int8, "1", "why the trajectory ended", _flags(_REASONS)),
     "period": (np.int16, "1", "period in drive periods, 0 = not periodic", {}),
-    "event_word": (np.int64, "1", "events of one period of the motion, three bits each", {}),
+    "event_word": (np.float64, "1", "events of one period of the motion, three bits each", {}),
     "impacts_per_period": (np.float32, "1", "impacts per drive period", {}),
     "mean_impact_speed": (np.float32, "m/s", "mean speed just before impact", {}),
     "amplitude": (np.float32, "m", "half the range of the position", {}),
@@ -59,33 +62,34 @@ STARTS = {
     "v0": ("m/s", "initial velocity", {}),
     "crank_angle": ("rad", "initial crank angle", {}),
 }
-# name: type, unit, meaning
+KINDS = ("cycle", "rest", "chaotic", "not_known", "family")
+# name: type, unit, meaning, further attributes
 CATALOGUE = {
-    "slice": (np.int32, "1", "slice of the parameter axes, C order from 0"),
-    "attractor": (np.int32, "1", "label"),
-    "regime": (np.int8, "1", "regime, coded as in the map"),
-    "period": (np.int16, "1", "period in drive periods"),
-    "cycle_time": (np.float64, "s", "time that one cycle takes; 0 of what is none"),
-    "event_word": (np.int64, "1", "events of one period"),
-    "x": (np.float64, "m", "position at the section, crank angle 0"),
-    "v": (np.float64, "m/s", "velocity at the section, crank angle 0"),
-    "multiplier": (np.float64, "1", "largest modulus of the multipliers"),
-    "capture_radius": (np.float64, "1", "radius of the neighbourhood found to contract"),
-    "amplitude": (np.float64, "m", "half the range of the position"),
-    "x_max": (np.float64, "m", "largest position"),
-    "x_min": (np.float64, "m", "smallest position"),
-    "v_max": (np.float64, "m/s", "largest velocity"),
-    "impacts_per_period": (np.float64, "1", "impacts per drive period"),
-    "mean_impact_speed": (np.float64, "m/s", "mean speed before impact"),
-    "grazing_margin": (np.float64, "m", "smallest distance to a barrier missed"),
-    "count": (np.int64, "1", "points of the map captured"),
+    "slice": (np.int32, "1", "slice of the parameter axes, C order from 0", {}),
+    "attractor": (np.int32, "1", "label", {}),
+    "regime": (np.int8, "1", "regime of the motion", _flags(_REGIMES)),
+    "period": (np.int16, "1", "period in drive periods", {}),
+    "cycle_time": (np.float64, "s", "time that one cycle takes; 0 of what is none", {}),
+    "event_word": (np.float64, "1", "events of one period", {}),
+    "x": (np.float64, "m", "position at the section, crank angle 0", {}),
+    "v": (np.float64, "m/s", "velocity at the section, crank angle 0", {}),
+    "multiplier": (np.float64, "1", "largest modulus of the multipliers", {}),
+    "capture_radius": (np.float64, "1", "radius of the neighbourhood found to contract", {}),
+    "amplitude": (np.float64, "m", "half the range of the position", {}),
+    "x_max": (np.float64, "m", "largest position", {}),
+    "x_min": (np.float64, "m", "smallest position", {}),
+    "v_max": (np.float64, "m/s", "largest velocity", {}),
+    "impacts_per_period": (np.float64, "1", "impacts per drive period", {}),
+    "mean_impact_speed": (np.float64, "m/s", "mean speed before impact", {}),
+    "grazing_margin": (np.float64, "m", "smallest distance to a barrier missed", {}),
+    "count": (np.int64, "1", "points of the map captured", {}),
     "kind": (
         np.int8,
         "1",
         "whether it is a cycle, rest, chaotic, a family of cycles, or nothing of them is known",
+        _flags(" ".join(KINDS), 1),
     ),
 }
-KINDS = ("cycle", "rest", "chaotic", "not_known", "family")
 # name: dimensions, unit, meaning
 CYCLES = {
     "multiplier_real": (("entry", "coordinate"), "1", "real parts of the multipliers"),

@@ -14,7 +14,7 @@ module c_labels
   use kinds, only: int64, wp
   use machine_facts, only: has_driver
   use model_type, only: model_t
-  use point_columns, only: outcome_values, point_values
+  use point_columns, only: margin_or_infinite, outcome_values, point_values
   use status, only: exit_resumable, exit_usage
   use text, only: to_text
   use trajectories, only: block_size, run_trajectories
@@ -144,7 +144,7 @@ contains
       associate (one => self%attractors(index + 1), f => self%attractors(index + 1)%features)
         numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
                    one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
-                   f%grazing_margin, merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
+                   margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
                    real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, has_driver(self%prepared%journey%moving)), &
                    real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)

@@ -26,10 +26,10 @@ contains
     character(len=:), allocatable :: of_gpus
     real(wp), allocatable :: facts(:)
     real(wp) :: shares(team%size()), waiting
-    integer(int64) :: resident
+    integer(int64) :: resident, written
     call team%gather([100*busy/max(elapsed, tiny(elapsed)), real(resident_bytes(), wp), &
                       100*waited/max(elapsed, tiny(elapsed))], facts)
-    journal%written = total(team, journal%written)
+    written = total(team, journal%written)
     if (.not. team%is_root()) return
     shares = min(100.0_wp, facts(1::3))
     resident = nint(maxval(facts(2::3)), int64)
@@ -38,10 +38,10 @@ contains
     if (gpus > 0) of_gpus = ', waiting for a GPU '//to_text(waiting, 3)//' %'
     call journal%line('balance', 'ranks busy '//to_text(sum(shares)/size(shares), 3)//' % of the time ('// &
       to_text(minval(shares), 3)//' to '//to_text(maxval(shares), 3)//' %)'//of_gpus//', at most '//to_text(resident/2**20)// &
-      ' MiB each, '//to_text(journal%written)//' bytes written', &
+      ' MiB each, '//to_text(written)//' bytes written', &
       '"busy_percent_min": '//to_text(minval(shares), 6)//', "busy_percent_mean": '//to_text(sum(shares)/size(shares), 6)// &
       ', "busy_percent_max": '//to_text(maxval(shares), 6)//', "busy_percent": ['//to_text(shares(1), 4)//listed(shares(2:))// &
-      '], "resident_bytes_max": '//to_text(resident)//', "written_bytes": '//to_text(journal%written)// &
+      '], "resident_bytes_max": '//to_text(resident)//', "written_bytes": '//to_text(written)// &
       ', "gpu_wait_percent_mean": '//to_text(waiting, 6), plain=team%size() > 1 .or. gpus > 0)
   end subroutine report_balance
 

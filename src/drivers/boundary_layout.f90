@@ -165,7 +165,7 @@ contains
     along = 'orbit'
     call schema%add_variable('period', type_int16, along, units='1', long_name='period in drive periods', group=group, &
                              data=real(saddles%periods, wp))
-    call schema%add_variable('event_word', type_int64, along, units='1', group=group, data=real(saddles%word, wp), &
+    call schema%add_variable('event_word', type_float64, along, units='1', group=group, data=real(saddles%word, wp), &
                              long_name='events of one period of the orbit, three bits each')
     call schema%add_variable('boundary_points', type_int32, along, units='1', group=group, data=real(reached, wp), &
                              long_name='boundary points that lead to it; 0: it lies within one basin, or beyond the map')
@@ -191,7 +191,7 @@ contains
                              data=[(saddles(k)%watched(2, :), k=1, size(saddles))], long_name='velocity on the section')
     if (n == 2) return
     call schema%add_dimension('coordinate', int(n, int64))
-    call schema%add_variable('section', type_float64, [along, [character(len=name_length) :: 'coordinate']], units='1', &
+    call schema%add_variable('section', type_float64, [along, [character(len=name_length) :: 'coordinate']], units='SI', &
       long_name='coordinates on the section in SI units: places [m], then speeds [m/s] of all bodies', group=group, &
       data=[((saddles(k)%points(:, i), i=1, saddles(k)%periods), k=1, size(saddles))])
   end subroutine add_saddles
@@ -233,7 +233,7 @@ contains
       flag_meanings=join(end_names, ' '), group=set_group, long_name='why the curve is no longer', data=real(ending, wp))
     along = 'set_point'
     call add('curve', type_int32, '1', 'side that the point is of, from 0', real(curve, wp))
-    call add('piece', type_int32, '1', 'piece of that side between two cuts, from 1', real(piece, wp))
+    call add('part', type_int32, '1', 'part of that side between two cuts, from 1', real(piece, wp))
     call add('x', type_float64, 'm', 'position at crank angle 0', points(1, :))
     call add('v', type_float64, 'm/s', 'velocity at crank angle 0', points(2, :))
 
@@ -253,6 +253,7 @@ contains
     integer, intent(in) :: axes(2)
     type(line_point_t), intent(in) :: points(:)
     type(schema_t), intent(inout) :: schema
+    character(len=:), allocatable :: units
     integer :: k
     do k = 1, 2
       call schema%add_variable(axis_dimension(grid%axes(axes(k))%name), type_float64, ['point'], units=grid%axes(axes(k))%unit, &
@@ -263,7 +264,9 @@ contains
       data=real(points%along - 1, wp))
     call add_label('below', 'below the point along that axis', points%below)
     call add_label('above', 'above the point along that axis', points%above)
-    call schema%add_variable('error', type_float64, ['point'], units='1', data=points%error, long_name='half the width of '// &
+    units = trim(grid%axes(axes(1))%unit)
+    if (grid%axes(axes(2))%unit /= units) units = 'SI'
+    call schema%add_variable('error', type_float64, ['point'], units=units, data=points%error, long_name='half the width of '// &
       'the interval that holds the point, in the unit of that axis; at a junction half the cell')
 
   contains

@@ -15,12 +15,13 @@ module branches_driver
   use case_setup, only: output_path
   use case_values, only: bounds_t
   use command_line, only: command_t
+  use constants, only: unreachable
   use errors, only: error_t, fail
   use event_words, only: word_text
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_final, only: write_whole
-  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
+  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int8
   use motion_state, only: event_touch_lower, event_touch_upper
   use orbit_margins, only: is_impact
   use orbit_words, only: symmetry_text, word_of
@@ -29,6 +30,7 @@ module branches_driver
   use status, only: exit_bad_case, exit_done
   use text, only: join, replace_all, to_text
   use written_check, only: check_written
+  use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
   implicit none
   private
 
@@ -257,7 +259,7 @@ contains
     call schema%add_variable('impacts', type_int16, along, units='1', long_name='impacts, or touches of a soft contact, '// &
                              'in a period of the orbit', &
                              data=[(real(count_contacts(points(i)%orbit), wp), i=1, size(points))])
-    call schema%add_variable('event_word', type_int64, along, units='1', &
+    call schema%add_variable('event_word', type_float64, along, units='1', &
                              long_name='events of one period of the orbit, three bits each', &
                              data=[(real(word_of(points(i)%orbit, search), wp), i=1, size(points))])
     call schema%add_variable('stable', type_int8, along, units='1', long_name='all multipliers within the unit circle', &
@@ -296,12 +298,19 @@ contains
     character(len=name_length), parameter :: over(2) = [character(len=name_length) :: 'point', 'multiplier']
     integer :: i, k
     call schema%add_variable('multiplier_real', type_float64, over, units='1', &
-      long_name='multipliers over the period, real part', data=[((real(points(i)%orbit%multipliers(k), wp), k=1, shown), &
-                                                                 i=1, size(points))])
+      long_name='multipliers over the period, real part', data=[((written_part(real(points(i)%orbit%multipliers(k), wp)), &
+                                                                  k=1, shown), i=1, size(points))])
     call schema%add_variable('multiplier_imag', type_float64, over, units='1', &
       long_name='multipliers over the period, imaginary part', data=[((aimag(points(i)%orbit%multipliers(k)), k=1, shown), &
                                                                       i=1, size(points))])
   end subroutine describe_multipliers
+
+  !> The real part of a multiplier as a file has it: infinite where the derivative grows without bound.
+  elemental real(wp) function written_part(part)
+    real(wp), intent(in) :: part
+    written_part = part
+    if (abs(part) >= unreachable) written_part = sign(ieee_value(1.0_wp, ieee_positive_inf), part)
+  end function written_part
 
   !> Where the section points of orbits are.
   pure function section_text(has_clock) result(text)

@@ -9,7 +9,7 @@ module file_layout
   use kinds, only: int64, wp
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use motion_state, only: event_names
-  use point_columns, only: marks_of_attractor, point_table
+  use point_columns, only: margin_or_infinite, marks_of_attractor, point_table
   use status, only: last_reason, reason_names
   use refinement, only: last_origin, origin_names
   use text, only: join, replace_all
@@ -64,14 +64,16 @@ contains
   end function axis_meaning
 
   !> Regime with its codes.
-  subroutine add_regime(schema, name, dimensions, tiled)
+  subroutine add_regime(schema, name, dimensions, tiled, group, data)
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: name, dimensions(:)
     logical, intent(in) :: tiled
+    character(len=*), intent(in), optional :: group
+    real(wp), intent(in), optional :: data(:)
     integer :: i
     call schema%add_variable(name, type_int8, dimensions, units=coded_unit, &
       long_name='regime of the motion', flag_values=[(i, i=0, last_regime)], &
-      flag_meanings=join(regime_names, ' '), tiled=tiled)
+      flag_meanings=join(regime_names, ' '), tiled=tiled, data=data, group=group)
   end subroutine add_regime
 
   !> Why trajectories ended, with codes.
@@ -138,10 +140,10 @@ contains
     call schema%add_dimension('entry', size(all_of_them, kind=int64))
     call add('slice', type_int32, '1', 'slice of the parameter axes, C order from 0', real(slice, wp))
     call add('attractor', type_int32, '1', 'label', real(all_of_them%id, wp))
-    call add('regime', type_int8, '1', 'regime, coded as in the map', real(all_of_them%features%regime, wp))
+    call add_regime(schema, 'regime', ['entry'], .false., group='catalogue', data=real(all_of_them%features%regime, wp))
     call add('period', type_int16, '1', 'period in drive periods', real(all_of_them%period, wp))
     call add('cycle_time', type_float64, 's', 'time that one cycle takes; 0 of what is none', all_of_them%duration)
-    call add('event_word', type_int64, '1', 'events of one period', real(all_of_them%features%word, wp))
+    call add('event_word', type_float64, '1', 'events of one period', real(all_of_them%features%word, wp))
     call add('x', type_float64, 'm', 'position at the section, crank angle 0', all_of_them%section(1))
     call add('v', type_float64, 'm/s', 'velocity at the section, crank angle 0', all_of_them%section(2))
     if (two_bodies) call add('driver_x', type_float64, 'm', 'position of the driving body there', all_of_them%section(3))
@@ -158,7 +160,7 @@ contains
     call add('mean_impact_speed', type_float64, 'm/s', 'mean speed before impact', &
              all_of_them%features%mean_impact_speed)
     call add('grazing_margin', type_float64, 'm', 'smallest distance to a barrier missed', &
-             all_of_them%features%grazing_margin)
+             margin_or_infinite(all_of_them%features%grazing_margin))
     if (any(all_of_them%turn > 0)) call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', &
       merge(all_of_them%features%rotation, ieee_value(1.0_wp, ieee_quiet_nan), all_of_them%kind /= kind_chaotic .and. &
             all_of_them%kind /= kind_not_known))

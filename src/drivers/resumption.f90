@@ -5,11 +5,11 @@
 module resumption
   use case_difference, only: case_differences
   use errors, only: error_t, fail
-  use kinds, only: int64
+  use kinds, only: int64, wp
   use map_file, only: working_path
   use map_reader, only: open_final, reader_t
   use map_repair, only: restore_length
-  use map_schema, only: schema_t
+  use map_schema, only: format_version, schema_t
   use session, only: session_t
   use status, only: exit_other_case
   use text, only: to_text
@@ -50,9 +50,11 @@ contains
     type(error_t), allocatable :: ignored
     type(reader_t) :: reader
     character(len=:), allocatable :: resolved, keys, identity, version, builder
+    real(wp) :: format
     call open_final(part, reader, error)
     if (.not. allocated(error)) call reader%text_attribute('/provenance', 'case_identity', identity, error)
     if (.not. allocated(error)) call reader%text_attribute('/provenance', 'version', version, error)
+    if (.not. allocated(error)) call reader%number_attribute('/', 'format_version', format, error)
     if (.not. allocated(error)) call read_builder(reader, builder, error)
     if (.not. allocated(error)) call reader%read_text('/provenance/resolved_case', resolved, error)
     if (allocated(error)) then
@@ -66,6 +68,9 @@ contains
     else if (version /= session%provenance%version) then
       call fail(error, exit_other_case, ''''//part//''' was begun by version '//version//', this is '// &
                 session%provenance%version//'; --force begins again')
+    else if (nint(format) /= format_version) then
+      call fail(error, exit_other_case, ''''//part//''' was begun in format version '//to_text(nint(format))// &
+                ', this program writes '//to_text(format_version)//': the program that began it finishes it, --force begins again')
     else
       if (keys /= '') call session%journal%line('differs', 'the case differs in what does not matter: '//keys)
       if (builder /= builder_of(session)) call session%journal%line('build', 'begun by another build: '//builder// &

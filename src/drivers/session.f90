@@ -192,8 +192,8 @@ contains
     identity = identity_of(session%the_case, kind)
     if (present(inputs)) identity = identity//' '//inputs
     call schema%add_attribute('provenance', 'case_identity', identity)
-    call schema%add_text('provenance', 'case_text', session%the_case%raw_text)
-    call schema%add_text('provenance', 'resolved_case', session%the_case%resolved_text)
+    call schema%add_attribute('provenance', 'case_text', session%the_case%raw_text)
+    call schema%add_attribute('provenance', 'resolved_case', session%the_case%resolved_text)
   end subroutine describe_file
 
   !> What decides the results of the command `kind` for a case.

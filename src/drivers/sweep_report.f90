@@ -11,14 +11,14 @@ module sweep_report
   use journal, only: json_number
   use kinds, only: int64, wp
   use law_table, only: effect_family
-  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int64, type_string
+  use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int8
   use pair, only: is_pair
   use restoring_law, only: position_is_angle
   use session, only: session_t
   use status, only: reason_names, reason_time_over
   use sweep_chain, only: chains_t, hold_reason, limit_t
   use sweep_limits, only: limit_beyond_range, limit_bracketed, limit_outcomes
-  use text, only: interval_text, replace_all, to_text
+  use text, only: interval_text, join, replace_all, to_text
   implicit none
   private
 
@@ -43,7 +43,7 @@ contains
     call add_reason(schema, 'reason', dimensions, .false.)
     call fill(2)
     call add('period', type_int16, '1', 'period in drive periods of the cycle on which the motion settles, 0 = not known', 3)
-    call add('event_word', type_int64, '1', 'events of one period of the motion, three bits each', 4)
+    call add('event_word', type_float64, '1', 'events of one period of the motion, three bits each', 4)
     call add('impacts_per_period', type_float64, '1', 'impacts per drive period', 5)
     call add('mean_impact_speed', type_float64, 'm/s', 'mean speed just before impact', 6)
     call add('amplitude', type_float64, 'm', 'half the range of the position', 7)
@@ -102,18 +102,32 @@ contains
     type(schema_t), intent(inout) :: schema
     type(limit_t), intent(in) :: limits(:)
     character(len=40) :: names(size(limits))
-    character(len=:), allocatable :: unit
-    integer :: i
+    character(len=:), allocatable :: unit, meanings
+    real(wp) :: codes(size(limits))
+    integer :: i, kinds, earlier
     unit = trim(session%the_case%sweep%swept%unit)
     do i = 1, size(limits)
       names(i) = limit_name(session, limits(i))
     end do
+    kinds = 0
+    meanings = ''
+    do i = 1, size(limits)
+      earlier = findloc(names(:i - 1), names(i), 1)
+      if (earlier > 0) then
+        codes(i) = codes(earlier)
+        cycle
+      end if
+      codes(i) = kinds
+      kinds = kinds + 1
+      meanings = trim(meanings//' '//names(i))
+    end do
     call schema%add_dimension('limit', size(limits, kind=int64))
-    call schema%add_variable('name', type_string, ['limit'], strings=names, group='limits', &
-                             long_name='where impacts start or stop, or a regime of two bodies gives way')
-    names = limit_outcomes(limits%outcome)
-    call schema%add_variable('settled', type_string, ['limit'], strings=names, group='limits', &
-                             long_name='what is known of the end of the settled motion')
+    call schema%add_variable('name', type_int8, ['limit'], units='1', group='limits', data=codes, &
+                             long_name='where impacts start or stop, or a regime of two bodies gives way', &
+                             flag_values=[(i, i=0, kinds - 1)], flag_meanings=trim(adjustl(meanings)))
+    call schema%add_variable('settled', type_int8, ['limit'], units='1', group='limits', data=real(limits%outcome, wp), &
+                             long_name='what is known of the end of the settled motion', &
+                             flag_values=[(i, i=0, ubound(limit_outcomes, 1))], flag_meanings=join(limit_outcomes, ' '))
     call add('lower', 'lower end of the bracket in which the settled motion ends', limits%bracket(1))
     call add('upper', 'upper end of the bracket in which the settled motion ends', limits%bracket(2))
     call add('observed_lower', 'lower end of the bracket in which the change is seen in steps', limits%observed(1))

@@ -10,7 +10,7 @@ module h5
   use guard, only: end_guard
   use h5_access, only: set_parallel_access
   use h5_trap, only: trap
-  use h5_types, only: find_type, h5_string_type, h5_type
+  use h5_types, only: find_type, h5_type
   use hdf5, only: &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
     h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
@@ -23,12 +23,12 @@ module h5
     h5pset_cache_f, h5pset_sieve_buf_size_f, size_t, &
     h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
-    h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, hid_t, hsize_t
+    h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, hsize_t
   use kinds, only: int64, int8
   use status, only: exit_cannot_create, exit_io
   use team, only: team_t
   use text, only: to_text
-  use value_types, only: is_float, type_string
+  use value_types, only: is_float
   implicit none
   private
 
@@ -218,7 +218,7 @@ contains
     type(h5_storage_t), intent(in) :: storage
     type(h5_dataset_t), intent(out) :: dataset
     type(error_t), allocatable, intent(out) :: error
-    integer(hid_t) :: space, creation, type_id
+    integer(hid_t) :: space, creation
     integer :: status, ignored
     dataset%name = name
     dataset%path = file%path
@@ -226,11 +226,8 @@ contains
     dataset%lengths = lengths
     call storage_of(storage, type, creation, status)
     if (status >= 0) call space_of(lengths, space, status)
-    type_id = h5_type(type)
-    if (type == type_string .and. status >= 0) call h5_string_type(type_id, status)
-    if (status >= 0) call h5dcreate_f(file%id, name, type_id, space, dataset%id, status, creation)
+    if (status >= 0) call h5dcreate_f(file%id, name, h5_type(type), space, dataset%id, status, creation)
     if (h5_failed(status, 'create', name, file%path, error)) return
-    if (type == type_string) call h5tclose_f(type_id, ignored)
     call h5sclose_f(space, ignored)
     call h5pclose_f(creation, ignored)
   end subroutine h5_create_dataset

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Attributes, strings and dimension scales of HDF5 objects. Strings are UTF-8 of variable length,
-!> which every reader shows as text.
+!> Attributes, strings and dimension scales of HDF5 objects. A text is an attribute, UTF-8 of variable length: of that every
+!> reader shows all, however long it is, and those that cannot read it pass it by. Files of version 1 also have datasets of strings.
 module h5_attributes
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr
   use bindings, only: c_string_length
@@ -16,7 +16,7 @@ module h5_attributes
   use hdf5, only: &
     h5aclose_f, h5acreate_by_name_f, h5adelete_by_name_f, h5aexists_by_name_f, h5aget_space_f, &
     h5aopen_by_name_f, h5aread_f, h5awrite_f, h5dget_space_f, h5dread_f, h5dvlen_reclaim_f, &
-    h5dwrite_f, H5P_DEFAULT_F, H5S_SCALAR_F, h5sclose_f, h5screate_f, h5screate_simple_f, &
+    H5P_DEFAULT_F, H5S_SCALAR_F, h5sclose_f, h5screate_f, h5screate_simple_f, &
     h5sget_simple_extent_npoints_f, h5tclose_f, hid_t, hsize_t
   use kinds, only: int64, int8, real64
   use value_types, only: bytes_of, from_bytes, to_bytes, type_float64
@@ -24,7 +24,7 @@ module h5_attributes
   private
 
   public :: h5_put_text, h5_put_numbers, h5_get_text, h5_get_numbers, h5_has_attribute, &
-    h5_write_strings, h5_read_strings, h5_make_scale, h5_attach_scale
+    h5_read_strings, h5_make_scale, h5_attach_scale
 
 contains
 
@@ -156,31 +156,6 @@ contains
     call h5sclose_f(space, ignored)
     call h5aclose_f(attribute, ignored)
   end subroutine h5_get_numbers
-
-  !> Writes all strings of a dataset, without their trailing blanks unless there is only one.
-  subroutine h5_write_strings(dataset, strings, error)
-    type(h5_dataset_t), intent(in) :: dataset
-    character(len=*), intent(in) :: strings(:)
-    type(error_t), allocatable, intent(out) :: error
-    character(kind=c_char, len=len(strings) + 1), allocatable, target :: copies(:)
-    type(c_ptr), allocatable, target :: pointers(:)
-    integer(hid_t) :: type_id
-    integer :: status, i, ignored
-    if (size(strings) == 0) return
-    allocate (copies(size(strings)), pointers(size(strings)))
-    do i = 1, size(strings)
-      if (size(strings) == 1) then
-        copies(i) = strings(i)//c_null_char
-      else
-        copies(i) = trim(strings(i))//c_null_char
-      end if
-      pointers(i) = c_loc(copies(i))
-    end do
-    call h5_string_type(type_id, status)
-    if (status >= 0) call h5dwrite_f(dataset%id, type_id, c_loc(pointers), status)
-    if (h5_failed(status, 'write', dataset%name, dataset%path, error)) return
-    call h5tclose_f(type_id, ignored)
-  end subroutine h5_write_strings
 
   !> Reads all strings of a dataset.
   subroutine h5_read_strings(dataset, strings, error)

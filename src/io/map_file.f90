@@ -100,7 +100,8 @@ contains
     if (present(only_read)) file%writable = .not. only_read
     if (team%is_root()) then
       if (file%writable) call check_resume(path, error)
-      if (.not. allocated(error)) call check_layout(working_path(path), file%schema, file%tiling%shape, error)
+      if (.not. allocated(error)) call check_layout(working_path(path), file%schema, file%tiling%shape, &
+                                                      .not. file%writable, error)
     end if
     call team%agree(error)
     if (allocated(error)) return

@@ -8,12 +8,12 @@ module map_final
   use errors, only: error_t, fail
   use files, only: publish_file, remove_file
   use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read, h5_write
-  use h5_attributes, only: h5_put_numbers, h5_read_strings, h5_write_strings
+  use h5_attributes, only: h5_put_numbers
   use kinds, only: int64, int8, real64
   use map_file, only: map_file_t, working_path
   use map_layout, only: create_objects, is_compressed, path_of, write_data
   use map_packing, only: packing_t
-  use map_schema, only: schema_t, type_int64, type_string
+  use map_schema, only: schema_t, type_int64
   use map_verify, only: seal, verify_file
   use output_check, only: check_result
   use slabs, only: slab, slab_count
@@ -129,7 +129,8 @@ contains
         types(i) = variable%type
       end associate
     end do
-    picks = pack([(i, i=1, size(types))], [(is_compressed(types(i), file%tiling%lengths), i=1, size(types))])
+    allocate (picks(0))
+    if (is_compressed(file%tiling%lengths)) picks = [(i, i=1, size(types))]
     call packing%begin(names(picks), types(picks), file%tiling%lengths)
   end subroutine start_packing
 
@@ -215,10 +216,6 @@ contains
       if (packed == 0 .and. .not. allocated(error)) call seal(new, path, error)
       if (allocated(error)) return
     end do
-    do i = 1, size(schema%texts)
-      call seal(new, path_of(schema%texts(i)%group, schema%texts(i)%name), error)
-      if (allocated(error)) return
-    end do
   end subroutine fill
 
   !> Copies a dataset slab by slab.
@@ -237,13 +234,9 @@ contains
   subroutine copy_values(from, to, error)
     type(h5_dataset_t), intent(in) :: from, to
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: strings(:)
     integer(int8), allocatable :: bytes(:)
     integer(int64) :: lower(size(from%lengths)), extent(size(from%lengths)), k
-    if (from%type == type_string) then
-      call h5_read_strings(from, strings, error)
-      if (.not. allocated(error)) call h5_write_strings(to, strings, error)
-    else if (size(from%lengths) == 0) then
+    if (size(from%lengths) == 0) then
       allocate (bytes(bytes_of(from%type)))
       call h5_read(from, bytes, error)
       if (.not. allocated(error)) call h5_write(to, bytes, error)

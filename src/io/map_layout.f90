@@ -6,7 +6,7 @@ module map_layout
   use errors, only: error_t, fail
   use h5, only: h5_close_dataset, h5_create_dataset, h5_create_group, h5_dataset_t, h5_exists, h5_file_t, &
     h5_open_dataset, h5_storage_t, h5_write
-  use h5_attributes, only: h5_attach_scale, h5_make_scale, h5_put_numbers, h5_put_text, h5_write_strings
+  use h5_attributes, only: h5_attach_scale, h5_make_scale, h5_put_numbers, h5_put_text
   use kinds, only: int64, int8, real64
   use map_schema, only: name_length, schema_t, type_string, variable_t
   use slabs, only: final_chunk
@@ -34,7 +34,7 @@ contains
     if (group /= '') path = '/'//group//path
   end function path_of
 
-  !> Creates groups, dimensions, variables, attributes and texts. With a tile shape the file is a
+  !> Creates groups, dimensions, variables and attributes. With a tile shape the file is a
   !> working file: tiled variables have tiles as chunks, all space is allocated, and theirs is the last, so that a tail
   !> that is cut off costs tiles only. Otherwise it is a final file: compressed.
   subroutine create_objects(file, schema, error, tile_shape)
@@ -52,7 +52,7 @@ contains
       if (allocated(error)) return
     end do
     if (working) then
-      call write_attributes_and_texts(file, schema, error)
+      call write_attributes(file, schema, error)
       if (allocated(error)) return
       call create_variables(file, schema, schema%variables%tiled, error, tile_shape)
       if (allocated(error)) return
@@ -61,7 +61,7 @@ contains
       call attach_dimensions(file, schema, schema%variables(i), error)
       if (allocated(error)) return
     end do
-    if (.not. working) call write_attributes_and_texts(file, schema, error)
+    if (.not. working) call write_attributes(file, schema, error)
   end subroutine create_objects
 
   subroutine create_variables(file, schema, chosen, error, tile_shape)
@@ -82,14 +82,6 @@ contains
     end do
   end subroutine create_variables
 
-  subroutine write_attributes_and_texts(file, schema, error)
-    type(h5_file_t), intent(in) :: file
-    type(schema_t), intent(in) :: schema
-    type(error_t), allocatable, intent(out) :: error
-    call write_attributes(file, schema, error)
-    if (.not. allocated(error)) call write_texts(file, schema, error)
-  end subroutine write_attributes_and_texts
-
   subroutine create_variable(file, schema, variable, error, tile_shape)
     type(h5_file_t), intent(in) :: file
     type(schema_t), intent(in) :: schema
@@ -107,9 +99,9 @@ contains
       return
     end if
     if (present(tile_shape)) then
-      storage%fixed = variable%type /= type_string
+      storage%fixed = .true.
       if (variable%tiled) storage%chunk = tile_shape
-    else if (is_compressed(variable%type, lengths)) then
+    else if (is_compressed(lengths)) then
       storage%chunk = final_chunk(lengths)
       storage%compressed = .true.
     end if
@@ -120,10 +112,9 @@ contains
   end subroutine create_variable
 
   !> Whether a variable has compressed chunks in the final file.
-  pure logical function is_compressed(type, lengths)
-    integer, intent(in) :: type
+  pure logical function is_compressed(lengths)
     integer(int64), intent(in) :: lengths(:)
-    is_compressed = type /= type_string .and. product(lengths) > small
+    is_compressed = product(lengths) > small
   end function is_compressed
 
   subroutine describe(file, path, variable, error)
@@ -228,25 +219,6 @@ contains
     end do
   end subroutine write_attributes
 
-  subroutine write_texts(file, schema, error)
-    type(h5_file_t), intent(in) :: file
-    type(schema_t), intent(in) :: schema
-    type(error_t), allocatable, intent(out) :: error
-    type(h5_dataset_t) :: dataset
-    integer :: i
-    do i = 1, size(schema%texts)
-      associate (text => schema%texts(i))
-        if (text%group /= '') call h5_create_group(file, '/'//text%group, error)
-        if (allocated(error)) return
-        call h5_create_dataset(file, path_of(text%group, text%name), type_string, [integer(int64) ::], h5_storage_t(), &
-                               dataset, error)
-        if (.not. allocated(error)) call h5_write_strings(dataset, [text%text], error)
-        if (.not. allocated(error)) call h5_close_dataset(dataset, error)
-        if (allocated(error)) return
-      end associate
-    end do
-  end subroutine write_texts
-
   !> Writes the values that the schema gives for a variable, zeros if it gives none.
   subroutine write_data(file, schema, variable, error)
     type(h5_file_t), intent(in) :: file
@@ -259,7 +231,6 @@ contains
     count = product(schema%lengths_of(variable%dimensions))
     given = count
     if (allocated(variable%data)) given = size(variable%data, kind=int64)
-    if (allocated(variable%strings)) given = size(variable%strings, kind=int64)
     if (given /= count) then
       call fail(error, exit_internal, 'variable '//variable%name//' has '//to_text(count)//' values, given are '// &
                 to_text(given))
@@ -267,13 +238,9 @@ contains
     end if
     call h5_open_dataset(file, path_of(variable%group, variable%name), dataset, error)
     if (allocated(error)) return
-    if (variable%type == type_string) then
-      if (allocated(variable%strings)) call h5_write_strings(dataset, variable%strings, error)
-    else
-      allocate (bytes(count*bytes_of(variable%type)), source=0_int8)
-      if (allocated(variable%data)) call to_bytes(variable%type, variable%data, bytes)
-      call h5_write(dataset, bytes, error)
-    end if
+    allocate (bytes(count*bytes_of(variable%type)), source=0_int8)
+    if (allocated(variable%data)) call to_bytes(variable%type, variable%data, bytes)
+    call h5_write(dataset, bytes, error)
     if (.not. allocated(error)) call h5_close_dataset(dataset, error)
   end subroutine write_data
 

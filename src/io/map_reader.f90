@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Reading a file of Separatrix.
+!> Reading a file of Separatrix, of any format version up to that which is written.
 module map_reader
   use errors, only: error_t, fail
   use guard, only: end_guard
@@ -13,6 +13,7 @@ module map_reader
   use h5_trap, only: trap
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
+  use map_schema, only: format_version, oldest_version
   use status, only: exit_bad_case, exit_io, exit_no_input
   use files, only: file_exists, is_text
   use output_check, only: is_folder
@@ -52,7 +53,7 @@ module map_reader
 contains
 
   !> Opens a file for reading, also a working file. Code 66 if there is none, 74 if it is not HDF5 or
-  !> not one of Separatrix.
+  !> not one of Separatrix, 65 if it is of a later format.
   subroutine open_final(path, reader, error)
     character(len=*), intent(in) :: path
     type(reader_t), intent(out) :: reader
@@ -64,7 +65,20 @@ contains
     if (reader%has_attribute('/', 'format')) call reader%text_attribute('/', 'format', format, error)
     if (allocated(error)) return
     if (format /= 'separatrix') call fail(error, exit_io, ''''//path//''' is not a file of Separatrix')
+    if (.not. allocated(error)) call check_version(reader, error)
   end subroutine open_final
+
+  subroutine check_version(reader, error)
+    type(reader_t), intent(in) :: reader
+    type(error_t), allocatable, intent(out) :: error
+    real(real64) :: version
+    if (.not. reader%has_attribute('/', 'format_version')) return
+    call reader%number_attribute('/', 'format_version', version, error)
+    if (allocated(error)) return
+    if (version >= oldest_version .and. version <= format_version) return
+    call fail(error, exit_bad_case, ''''//reader%path//''': found format_version '//to_text(nint(version))// &
+              ', this program reads '//to_text(oldest_version)//' to '//to_text(format_version))
+  end subroutine check_version
 
   !> Opens any HDF5 file for reading. Code 66 if there is none, 65 if it is a text where `allowed` is asked for, 74 if it is
   !> not HDF5.
@@ -251,7 +265,7 @@ contains
     call h5_close_dataset(dataset, error)
   end subroutine read_block
 
-  !> The strings of a variable of strings.
+  !> The texts of a variable: the meanings of its codes, or what it has in a file of version 1, strings.
   subroutine read_strings(self, path, strings, error)
     class(reader_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -260,22 +274,65 @@ contains
     type(h5_dataset_t) :: dataset
     call h5_open_dataset(self%file, path, dataset, error)
     if (allocated(error)) return
-    if (dataset%type /= type_string) then
-      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not text')
-      return
-    end if
-    call h5_read_strings(dataset, strings, error)
+    if (dataset%type == type_string) call h5_read_strings(dataset, strings, error)
+    if (allocated(error)) return
+    if (dataset%type /= type_string) call read_meanings(self, path, strings, error)
     if (allocated(error)) return
     call h5_close_dataset(dataset, error)
   end subroutine read_strings
 
-  !> The text of a scalar dataset ('/provenance/case_text').
+  !> The meanings of the codes of a variable.
+  subroutine read_meanings(self, path, strings, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: strings(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: unknown = 'unknown'
+    real(real64), allocatable :: codes(:), values(:)
+    character(len=:), allocatable :: meanings
+    integer :: i, code
+    if (.not. self%has_attribute(path, 'flag_meanings')) then
+      call fail(error, exit_io, ''''//path//''' of '''//self%path//''' is not text')
+      return
+    end if
+    call self%read_values(path, values, error)
+    if (.not. allocated(error)) call h5_get_numbers(self%file, path, 'flag_values', codes, error)
+    if (.not. allocated(error)) call self%text_attribute(path, 'flag_meanings', meanings, error)
+    if (allocated(error)) return
+    allocate (character(len=max(len(meanings), len(unknown))) :: strings(size(values)))
+    do i = 1, size(values)
+      code = findloc(abs(codes - values(i)) <= 0, .true., 1)
+      strings(i) = unknown
+      if (code > 0) strings(i) = word_of(meanings, code)
+    end do
+  end subroutine read_meanings
+
+  !> Word number `number` of a text whose words are parted by blanks.
+  pure function word_of(text, number) result(word)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: number
+    character(len=:), allocatable :: word
+    integer :: i
+    word = text
+    do i = 2, number
+      word = adjustl(word(min(index(word//' ', ' '), len(word) + 1):))
+    end do
+    word = word(:index(word//' ', ' ') - 1)
+  end function word_of
+
+  !> The text '/provenance/case_text': an attribute of its group, in a file of version 1 a scalar dataset.
   subroutine read_text(self, path, text, error)
     class(reader_t), intent(in) :: self
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: strings(:)
+    integer :: slash
+    slash = index(path, '/', back=.true.)
+    if (.not. self%has(path)) then
+      call self%text_attribute(path(:slash - 1), path(slash + 1:), text, error)
+      return
+    end if
     call self%read_strings(path, strings, error)
     if (allocated(error)) return
     if (size(strings) /= 1) then

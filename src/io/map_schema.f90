@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The description of a file: dimensions, variables, attributes and texts. Groups are named without
-!> slashes ('catalogue'); '' is the root.
+!> The description of a file: dimensions, variables and attributes. Groups are named without slashes
+!> ('catalogue'); '' is the root. Texts are attributes: many readers stop at a dataset of texts.
 module map_schema
   use angle_units, only: unit_of
   use kinds, only: int64, real64
@@ -12,6 +12,9 @@ module map_schema
   private
 
   public :: type_int8, type_int16, type_int32, type_int64, type_float32, type_float64, type_string
+
+  !> Version of the files that are written, and the oldest that is read (docs/file-format.md).
+  integer, parameter, public :: format_version = 2, oldest_version = 1
 
   !> Longest name of a dimension.
   integer, parameter, public :: name_length = 64
@@ -36,9 +39,8 @@ module map_schema
     character(len=:), allocatable :: flag_meanings
     !> Written tile by tile; its dimensions are those of the grid.
     logical :: tiled = .false.
-    !> Values in C order, zeros if not given; or, of a variable of strings, the strings.
+    !> Values in C order, zeros if not given.
     real(real64), allocatable :: data(:)
-    character(len=:), allocatable :: strings(:)
   end type variable_t
 
   !> A text, or numbers (`type_int64` or `type_float64`).
@@ -49,22 +51,15 @@ module map_schema
     real(real64) :: number = 0
   end type attribute_t
 
-  !> A scalar dataset that holds a text of any length.
-  type, public :: text_t
-    character(len=:), allocatable :: group, name, text
-  end type text_t
-
   type, public :: schema_t
     type(dimension_t), allocatable :: dimensions(:)
     type(variable_t), allocatable :: variables(:)
     type(attribute_t), allocatable :: attributes(:)
-    type(text_t), allocatable :: texts(:)
     !> Positions are angles: lengths and speeds get the units of these.
     logical :: positions_are_angles = .false.
   contains
     procedure :: add_dimension
     procedure :: add_variable
-    procedure :: add_text
     procedure, private :: add_text_attribute
     procedure, private :: add_integer_attribute
     procedure, private :: add_long_attribute
@@ -93,12 +88,12 @@ contains
 
   !> Adds a variable. `dimensions`: names in C order. What is not given is absent from the file.
   subroutine add_variable(self, name, type, dimensions, units, long_name, flag_values, flag_meanings, &
-                          tiled, data, strings, group)
+                          tiled, data, group)
     class(schema_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer, intent(in) :: type
     character(len=*), intent(in) :: dimensions(:)
-    character(len=*), intent(in), optional :: units, long_name, flag_meanings, strings(:), group
+    character(len=*), intent(in), optional :: units, long_name, flag_meanings, group
     integer, intent(in), optional :: flag_values(:)
     logical, intent(in), optional :: tiled
     real(real64), intent(in), optional :: data(:)
@@ -116,24 +111,8 @@ contains
     if (present(flag_meanings)) variable%flag_meanings = flag_meanings
     if (present(tiled)) variable%tiled = tiled
     if (present(data)) variable%data = data
-    if (present(strings)) then
-      allocate (character(len=len(strings)) :: variable%strings(size(strings)))
-      variable%strings(:) = strings
-    end if
     call push_variable(self%variables, variable)
   end subroutine add_variable
-
-  !> Adds a scalar dataset with a text.
-  subroutine add_text(self, group, name, text)
-    class(schema_t), intent(inout) :: self
-    character(len=*), intent(in) :: group, name, text
-    type(text_t) :: item
-    call complete(self)
-    item%group = group
-    item%name = name
-    item%text = text
-    call push_text(self%texts, item)
-  end subroutine add_text
 
   !> Adds an attribute of a group. A later one of the same name replaces an earlier one.
   subroutine add_text_attribute(self, group, name, text)
@@ -199,9 +178,6 @@ contains
     do i = 1, size(other%attributes)
       call push_attribute(self%attributes, other%attributes(i))
     end do
-    do i = 1, size(other%texts)
-      call push_text(self%texts, other%texts(i))
-    end do
   end subroutine append
 
   !> Bytes of the numbers that the variables hold; of tiled ones those of no tile.
@@ -259,10 +235,9 @@ contains
     if (.not. allocated(self%dimensions)) allocate (self%dimensions(0))
     if (.not. allocated(self%variables)) allocate (self%variables(0))
     if (.not. allocated(self%attributes)) allocate (self%attributes(0))
-    if (.not. allocated(self%texts)) allocate (self%texts(0))
   end subroutine complete
 
-  ! gfortran 12 leaks array constructors of types with allocatable components; hence these four.
+  ! gfortran 12 leaks array constructors of types with allocatable components; hence these three.
 
   subroutine push_dimension(list, item)
     type(dimension_t), allocatable, intent(inout) :: list(:)
@@ -293,15 +268,5 @@ contains
     longer(size(longer)) = item
     call move_alloc(longer, list)
   end subroutine push_attribute
-
-  subroutine push_text(list, item)
-    type(text_t), allocatable, intent(inout) :: list(:)
-    type(text_t), intent(in) :: item
-    type(text_t), allocatable :: longer(:)
-    allocate (longer(size(list) + 1))
-    longer(:size(list)) = list
-    longer(size(longer)) = item
-    call move_alloc(longer, list)
-  end subroutine push_text
 
 end module map_schema

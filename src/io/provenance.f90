@@ -5,7 +5,7 @@
 module provenance
   use h5, only: h5_version
   use kinds, only: real64
-  use map_schema, only: schema_t
+  use map_schema, only: format_version, schema_t
   use system, only: cpu_name, environment_text, host_name, monotonic_seconds, utc_now
   use team, only: host_length, team_t
   use text, only: join
@@ -61,7 +61,7 @@ contains
     call schema%add_attribute('', 'source', 'Separatrix '//self%version)
     call schema%add_attribute('', 'history', self%started//' '//self%command)
     call schema%add_attribute('', 'format', 'separatrix')
-    call schema%add_attribute('', 'format_version', 1)
+    call schema%add_attribute('', 'format_version', format_version)
     call schema%add_attribute('', 'date_created', self%started)
     call schema%add_attribute('', 'complete', 0)
     call schema%add_attribute('provenance', 'version', self%version)

@@ -10,7 +10,7 @@ module point_columns
   implicit none
   private
 
-  public :: outcome_values
+  public :: outcome_values, margin_or_infinite
 
   type, public :: point_column_t
     character(len=18) :: name
@@ -26,7 +26,7 @@ module point_columns
     point_column_t('attractor', 'int32', '1', 'label of the attractor in the catalogue, 0 = none'), &
     point_column_t('reason', 'int8', '1', 'why the trajectory ended'), &
     point_column_t('period', 'int16', '1', 'period in drive periods, 0 = not periodic'), &
-    point_column_t('event_word', 'int64', '1', 'events of one period of the motion, three bits each'), &
+    point_column_t('event_word', 'float64', '1', 'events of one period of the motion, three bits each'), &
     point_column_t('impacts_per_period', 'float32', '1', 'impacts per drive period'), &
     point_column_t('mean_impact_speed', 'float32', 'm/s', 'mean speed just before impact'), &
     point_column_t('amplitude', 'float32', 'm', 'half the range of the position'), &
@@ -49,12 +49,18 @@ contains
     associate (f => outcome%features)
       settled = outcome%settle_time
       if (settled < 0) settled = ieee_value(1.0_wp, ieee_quiet_nan)
-      margin = f%grazing_margin
-      if (.not. margin < huge(1.0_wp)) margin = ieee_value(1.0_wp, ieee_positive_inf)
+      margin = margin_or_infinite(f%grazing_margin)
       values = [real(f%regime, wp), real(outcome%attractor, wp), real(outcome%reason, wp), real(outcome%period, wp), &
                 real(f%word, wp), f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
                 settled, margin]
     end associate
   end function outcome_values
+
+  !> The smallest distance to a barrier; infinite where no turning point missed one.
+  elemental real(wp) function margin_or_infinite(margin)
+    real(wp), intent(in) :: margin
+    margin_or_infinite = margin
+    if (.not. margin < huge(1.0_wp)) margin_or_infinite = ieee_value(1.0_wp, ieee_positive_inf)
+  end function margin_or_infinite
 
 end module point_columns

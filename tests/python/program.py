@@ -201,12 +201,15 @@ def contents(path: Path) -> dict[str, object]:
     return found
 
 
-def values_of(item: h5py.Dataset) -> bytes | list[bytes]:
+def values_of(item: h5py.Dataset) -> bytes:
     """All bits of a dataset."""
-    values = item[()]
-    if item.dtype.kind == "O":
-        return list(np.ravel(values))
-    return np.asarray(values).tobytes()
+    return np.asarray(item[()]).tobytes()
+
+
+def meanings(item: h5py.Dataset) -> list[str]:
+    """What the codes of a dataset stand for."""
+    names = dict(zip(item.attrs["flag_values"], item.attrs["flag_meanings"].split(), strict=True))
+    return [names[code] for code in item[()]]
 
 
 def differences(first: Path, second: Path) -> list[str]:

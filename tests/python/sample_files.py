@@ -6,6 +6,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from separatrix.variables import FORMAT_VERSION
 
 REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
 REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget"
@@ -61,7 +62,7 @@ def write_basin(
         "attractor": (attractor, "i4", "1"),
         "reason": (np.where(attractor > 0, 1, 2), "i1", "1"),
         "period": (np.where(attractor > 0, 1, 0), "i2", "1"),
-        "event_word": (word, "i8", "1"),
+        "event_word": (word, "f8", "1"),
         "impacts_per_period": (impacting, "f4", "1"),
         "mean_impact_speed": (3.9 * impacting, "f4", "m/s"),
         "amplitude": (0.2 + 0.24 * impacting, "f4", "m"),
@@ -109,7 +110,7 @@ def write_sweep(path: Path, ratios: np.ndarray, starts: int = 6, samples: int = 
             ("impacts_per_period", 1.0 * impact, "1"),
             ("regime", (1 + impact).astype("i1"), "1"),
             ("period", np.ones(impact.shape, "i2"), "1"),
-            ("event_word", np.where(impact, WORD_IMPACT, WORD_QUIET), "1"),
+            ("event_word", np.where(impact, float(WORD_IMPACT), WORD_QUIET), "1"),
             ("reason", np.full(impact.shape, 2, "i1"), "1"),
         ):
             _variable(file, name, data, dims, unit)
@@ -129,7 +130,7 @@ def write_sweep(path: Path, ratios: np.ndarray, starts: int = 6, samples: int = 
             ("reason", np.ones(branch.shape, "i1"), "1"),
             ("attractor", (1 + branch).astype("i4"), "1"),
             ("period", np.ones(branch.shape, "i2"), "1"),
-            ("event_word", np.where(branch, WORD_IMPACT, WORD_QUIET), "1"),
+            ("event_word", np.where(branch, float(WORD_IMPACT), WORD_QUIET), "1"),
         ):
             _variable(file, f"branch_{name}", data, ["drive_ratio", "start"], unit)
         _variable(file, "start_x0", np.linspace(-0.5, 0.7, starts), ["start"], "m")
@@ -222,7 +223,7 @@ def write_boundary(path: Path, stack: Path) -> Path:
         )
         file["piece_drive_ratio"] = ratios
         group = file.create_group("saddles")
-        for name, values in (("period", [1, 1]), ("event_word", [WORD_IMPACT] * 2), ("saddle", [1, 2]),
+        for name, values in (("period", [1, 1]), ("event_word", [float(WORD_IMPACT)] * 2), ("saddle", [1, 2]),
                              ("boundary_points", [40, 40])):  # fmt: skip
             group[name] = np.array(values)
         group["multipliers"] = np.array([[3.0, 0.1], [4.0, 0.2]])
@@ -235,13 +236,11 @@ def _create(path: Path, kind: str) -> h5py.File:
     file = h5py.File(path, "w", libver=("earliest", "v110"))
     file.attrs.update(
         Conventions="CF-1.10", title=f"A {kind} costing 1 $", source="Separatrix 0.1.0", history="by a test",
-        references="", format="separatrix", format_version=np.int32(1), kind=kind,
+        references="", format="separatrix", format_version=np.int32(FORMAT_VERSION), kind=kind,
         date_created="2026-01-01T00:00:00Z", complete=np.int32(1),
     )  # fmt: skip
     group = file.create_group("provenance")
-    for name in ("case_text", "resolved_case"):
-        # fixed length and padded, as Fortran writes it
-        group[name] = np.array(CASE.encode() + b"   ", dtype=h5py.string_dtype("utf-8", len(CASE) + 3))
+    group.attrs.update(case_text=CASE, resolved_case=CASE)
     group.attrs.update(version="0.1.0", commit="0123456789abcdef", ranks=np.int32(2), wall_seconds=1.5)
     return file
 
@@ -280,7 +279,7 @@ def _catalogue(file: h5py.File, slices: int, regime_of: tuple[int, ...]) -> None
         "regime": regime, "period": np.ones(len(rows)),
         "event_word": np.where(regime == 2, WORD_IMPACT, WORD_QUIET),
     }  # fmt: skip
-    kinds = {"slice": "i4", "attractor": "i4", "regime": "i1", "period": "i2", "event_word": "i8"}
+    kinds = {"slice": "i4", "attractor": "i4", "regime": "i1", "period": "i2", "event_word": "f8"}
     for name, data in columns.items():
         _variable(group, name, np.asarray(data).astype(kinds[name]), ["entry"], "1")
     for name, unit in (
@@ -297,8 +296,8 @@ def _limits(file: h5py.File) -> None:
     group = file.create_group("limits")
     names = ["impacts_start_up", "impacts_stop_up", "impacts_start_down", "impacts_stop_down"]
     _scale(group, "limit", np.arange(4, dtype="i4"), "1", "limit")
-    group["name"] = np.array([name.ljust(24).encode() for name in names])
-    group["name"].dims[0].attach_scale(group["limit"])
+    _variable(group, "name", np.arange(4, dtype="i1"), ["limit"], "1")
+    group["name"].attrs.update(flag_values=np.arange(4, dtype="i1"), flag_meanings=" ".join(names))
     middle = np.array([0.871, 1.351, 1.121, 0.869])
     _variable(group, "lower", middle - 0.002, ["limit"], "1")
     _variable(group, "upper", middle + 0.002, ["limit"], "1")

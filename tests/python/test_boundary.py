@@ -206,7 +206,7 @@ def test_the_stable_set_is_the_boundary_and_the_unstable_set_leads_to_the_attrac
         x, v, curve = (sets[name].values for name in ("x", "v", "curve"))
         stable = sets["stable"].values[curve] == 1
         # labels on both sides of points of the stable set, across its chord
-        pieces = np.stack([curve, sets["piece"].values])
+        pieces = np.stack([curve, sets["part"].values])
         inner = np.flatnonzero(stable & (x > 0.1) & (x < 1.0))[1:-1]
         inner = inner[(pieces[:, inner - 1] == pieces[:, inner + 1]).all(axis=0)]
         assert inner.size > 100

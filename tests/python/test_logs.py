@@ -10,7 +10,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from program import differences, run, succeed, write_case
+from program import FOLD, differences, run, succeed, write_case
 
 COMMAND = ["basin", "case.toml", "-o", "map.h5", "--log", "run.jsonl"]
 
@@ -41,6 +41,14 @@ def test_the_log_has_what_stdout_says_and_more(mpi_separatrix, tmp_path, ranks):
     assert balance["written_bytes"] == 19 * 31 * 48
     assert balance["resident_bytes_max"] > 1e6
     assert ("binding" in outcome.out or "cores" in outcome.out) == (ranks > 1)
+
+
+def test_bytes_of_a_second_look_are_those_of_its_tiles(mpi_separatrix, tmp_path):
+    """The impacting cycle is found by the second look, which writes two tiles of 10 x 10 points again."""
+    write_case(tmp_path, FOLD + "[grid]\ntile = [10, 10]\n")
+    succeed(mpi_separatrix, *COMMAND, folder=tmp_path, ranks=3)
+    balances = [line["written_bytes"] for line in events(tmp_path) if line["event"] == "balance"]
+    assert balances == [60 * 60 * 48, (60 * 60 + 200) * 48]
 
 
 def test_the_log_grows_and_keeps_errors(separatrix, tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import run, succeed, write_case
+from program import meanings, run, succeed, write_case
 
 NO_STARTS = ["sweep", "case.toml", "--set", "sweep.starts=[0, 0]"]
 FLOATS = ("x_max", "x_min", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period")
@@ -84,7 +84,7 @@ def test_a_direction_that_was_not_run_is_nan(one_way, way, ran):
             assert np.isfinite(file[name][ran]).all(), name
         assert (file["reason"][1 - ran] == 0).all()
         assert (file["reason"][ran] == 2).all()
-        names = [name.decode().rstrip() for name in file["limits/name"][()]]
+        names = meanings(file["limits/name"])
         assert names
         assert all(name.endswith(f"_{way}") for name in names)
 
@@ -165,8 +165,8 @@ def test_limits_are_where_the_settled_motion_touches_the_wall(separatrix, source
     up, down = grazing_ratios(tomllib.loads(path.read_text()))
     assert (up, down) == pytest.approx((0.870901, 1.114313), abs=1e-6)
     with h5py.File(tmp_path / "out.h5") as file:
-        rows = zip(file["limits/name"], file["limits/lower"], file["limits/upper"], strict=True)
-        found = {name.decode().strip(): (lower, upper) for name, lower, upper in rows}
+        rows = zip(meanings(file["limits/name"]), file["limits/lower"], file["limits/upper"], strict=True)
+        found = {name: (lower, upper) for name, lower, upper in rows}
     for name, place in (("impacts_start_up", up), ("impacts_start_down", down)):
         lower, upper = found[name]
         assert lower <= place <= upper

@@ -135,7 +135,7 @@ def test_an_unknown_code_is_shown_as_its_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("attributes", "message"),
     [
-        ({"format_version": 2}, "format_version 2"),
+        ({"format_version": 3}, "format_version 3"),
         ({"format": "other"}, "not a Separatrix file"),
         ({"kind": "soup"}, "unknown kind 'soup'; known kinds: basin"),
         ({"complete": 0}, "not complete"),

@@ -45,7 +45,7 @@ def test_a_motion_is_what_the_program_writes(
     succeed(separatrix, "trajectory", case, "-o", "out.h5", folder=tmp_path)
     model = Model.read(case)
     with h5py.File(tmp_path / "out.h5") as file:
-        resolved = Model.from_text(file["provenance/resolved_case"][()].decode(), case.parent)
+        resolved = Model.from_text(file["provenance"].attrs["resolved_case"], case.parent)
         start = start_of(resolved)
         motion = trajectory(model, start, room=(1, 1))
         columns = dict(motion.samples)
@@ -105,7 +105,7 @@ def labels_of_file(path: Path) -> tuple[dict[str, np.ndarray], np.ndarray, Model
     file = h5py.File(path)
     x0, v0 = np.meshgrid(file["x0"][()], file["v0"][()], indexing="ij")
     starts = np.column_stack([x0.ravel(), v0.ravel(), np.zeros(x0.size)])
-    model = Model.from_text(file["provenance/resolved_case"][()].decode())
+    model = Model.from_text(file["provenance"].attrs["resolved_case"])
     return {key: file[key][()] for key in simulate.LABEL_VARIABLES}, starts, model, file
 
 

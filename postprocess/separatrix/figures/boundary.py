@@ -203,7 +203,7 @@ def _draw_sets(
 ) -> dict[str, Line2D]:
     """Draw the stable and unstable sets of the saddles: thin lines that end at cuts."""
     handles: dict[str, Line2D] = {}
-    curve, part = result["sets_curve"].values, result["sets_piece"].values
+    curve, part = result["sets_curve"].values, result["sets_part"].values
     points = [result[f"sets_{name}"].values for name in ("x", "v")]
     across_points, down_points = points if across == "x0" else points[::-1]
     breaks = np.flatnonzero((np.diff(curve) != 0) | (np.diff(part) != 0)) + 1

@@ -18,7 +18,7 @@ from separatrix.measuring.api import NAMES, measures
 from separatrix.measuring.maps import place_of
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
-from separatrix.variables import is_start
+from separatrix.variables import FORMAT_VERSION, is_start
 from separatrix.version import __version__
 
 __all__ = ["measures_along"]
@@ -223,12 +223,12 @@ def _dataset(result: xr.Dataset, dim: str, rows: list[list[dict]]) -> xr.Dataset
     limits = {limit for row in rows for one in row for limit in one["limits"]}
     coordinates = {
         dim: result[dim].astype(float),
-        "basin": ("basin", numbers, {"long_name": "number of the attractor"}),
+        "basin": ("basin", np.array(numbers, np.int32), {"long_name": "number of the attractor"}),
     }
     about = {
         "Conventions": "CF-1.10",
         "format": "separatrix",
-        "format_version": 1,
+        "format_version": FORMAT_VERSION,
         "kind": "measures",
         "complete": 1,
         "title": str(result.attrs.get("title", "")),
@@ -252,7 +252,12 @@ def _existence(result: xr.Dataset, dim: str, numbers: list[int], count: int) -> 
         "exists": (
             (dim, "basin"),
             exists,
-            {"units": "1", "long_name": "1: the attractor is in the catalogue"},
+            {
+                "units": "1",
+                "long_name": "whether the attractor is in the catalogue",
+                "flag_values": np.array([0, 1], np.int8),
+                "flag_meanings": "absent present",
+            },
         )
     }
 
@@ -268,7 +273,7 @@ def _write(data: xr.Dataset, target: Path) -> None:
             part, engine="h5netcdf", encoding={name: {"_FillValue": None} for name in plain.variables}
         )
         with h5py.File(part, "a") as file:
-            file.create_group("provenance")["resolved_case"] = data.attrs["resolved_case"]
+            file.create_group("provenance").attrs["resolved_case"] = data.attrs["resolved_case"]
         part.replace(target)
     except OSError as error:
         part.unlink(missing_ok=True)

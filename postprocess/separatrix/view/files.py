@@ -10,6 +10,7 @@ import numpy as np
 
 from separatrix.errors import DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import try_first
+from separatrix.variables import FORMAT_VERSION
 from separatrix.view.packing import clean
 from separatrix.words import decode_word
 
@@ -51,9 +52,10 @@ class ResultFile:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
         if attributes.get("format") != "separatrix":
             raise SeparatrixError(f"{self.path}: is not a file of Separatrix")
-        if int(attributes["format_version"]) > 1:
+        if int(attributes["format_version"]) > FORMAT_VERSION:
             raise SeparatrixError(
-                f"{self.path}: has format {attributes['format_version']}; this viewer reads 1"
+                f"{self.path}: has format {attributes['format_version']}; "
+                f"this viewer reads 1 to {FORMAT_VERSION}"
             )
         if not int(attributes["complete"]):
             raise SeparatrixError(f"{self.path}: is not complete; finish it with --resume")
@@ -61,7 +63,10 @@ class ResultFile:
         if self.kind not in KINDS:
             raise SeparatrixError(f"{self.path}: holds '{self.kind}', allowed are {', '.join(KINDS)}")
         self.attributes = attributes
-        self.case_text = _plain(file["provenance/resolved_case"][()])
+        provenance = file["provenance"]
+        # in files of version 1 it is a dataset
+        old = "resolved_case" in provenance
+        self.case_text = _plain(provenance["resolved_case"][()] if old else provenance.attrs["resolved_case"])
         self.case = tomllib.loads(self.case_text)
         self.axes = self._read_axes(file) if self.kind == "basin" else []
         self.shape = tuple(axis["count"] for axis in self.axes)
@@ -103,7 +108,7 @@ class ResultFile:
             "name": name,
             "label": _text(item, "long_name", name),
             "unit": _unit(item),
-            "classes": item.dtype.kind in "iu",
+            "classes": item.dtype.kind in "iu" or name == "event_word",
             "codes": codes,
             "dtype": item.dtype.str,
         }
@@ -197,10 +202,20 @@ def _table(group: h5py.Group) -> dict[str, list]:
     rows = next((len(columns[name]) for name in ("attractor", "lower") if name in columns), 0)
     columns = {name: values for name, values in columns.items() if len(values) == rows}
     return {
-        name: [_plain(value) for value in values]
+        name: _plain_column(group, name, values)
         for name, values in columns.items()
         if name not in ("entry", "limit")
     }
+
+
+def _plain_column(group: h5py.Group, name: str, values: np.ndarray) -> list:
+    """Return a column; the codes of limits as texts, as files of version 1 have them."""
+    attributes = group[name].attrs
+    if group.name == "/limits" and "flag_meanings" in attributes:
+        names = str(_plain(attributes["flag_meanings"])).split()
+        texts = dict(zip(np.atleast_1d(attributes["flag_values"]).tolist(), names, strict=True))
+        return [texts[value] for value in values.tolist()]
+    return [_plain(value) for value in values]
 
 
 def _text(item: h5py.Dataset, key: str, otherwise: str) -> str:

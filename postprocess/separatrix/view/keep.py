@@ -15,6 +15,7 @@ import numpy as np
 
 from separatrix.errors import SeparatrixError
 from separatrix.simulate import LABEL_VARIABLES, StopFlag
+from separatrix.variables import CATALOGUE, FORMAT_VERSION
 from separatrix.version import __version__
 from separatrix.view import live
 from separatrix.view.machine import Machine
@@ -23,12 +24,6 @@ __all__ = ["keep_file"]
 
 _CANNOT_CREATE = 73
 _ROWS = 16  # computed at a time
-_CATALOGUE = {
-    "slice": np.int32, "attractor": np.int32, "regime": np.int8, "period": np.int16, "event_word": np.int64,
-    "x": float, "v": float, "multiplier": float, "capture_radius": float, "amplitude": float, "x_max": float,
-    "x_min": float, "v_max": float, "impacts_per_period": float, "mean_impact_speed": float,
-    "grazing_margin": float, "count": np.int64,
-}  # fmt: skip
 
 
 def keep_file(
@@ -110,7 +105,7 @@ def _write(
         history=f"{now} separatrix-view: points computed live beside {source.path.name}",
         format="separatrix", kind="basin", date_created=now,
     )  # fmt: skip
-    file.attrs.update(format_version=np.int32(1), complete=np.int32(1))
+    file.attrs.update(format_version=np.int32(FORMAT_VERSION), complete=np.int32(1))
     for axis, points in axes:
         _put(file, axis["key"], points, axis["unit"], axis["label"]).make_scale(axis["key"])
     for name, array in values.items():
@@ -129,8 +124,7 @@ def _write(
         _write_catalogue(file, machine, parameters, None if changed else source.slice_number(at), values)
     provenance = file.create_group("provenance")
     text = _case_of_view(machine, axes, parameters, source, at)
-    for name in ("case_text", "resolved_case"):
-        provenance[name] = text
+    provenance.attrs.update(case_text=text, resolved_case=text)
     provenance.attrs.update(version=__version__, computed_by="separatrix-view", started=now, finished=now)
 
 
@@ -158,10 +152,10 @@ def _write_catalogue(
     group = file.create_group("catalogue")
     group["entry"] = np.arange(len(rows), dtype=np.int32)
     group["entry"].make_scale("entry")
-    for name, kind in _CATALOGUE.items():
-        _put(group, name, np.array([row[name] for row in rows], kind), "1", name).dims[0].attach_scale(
-            group["entry"]
-        )
+    for name, (kind, *described) in CATALOGUE.items():
+        item = _put(group, name, np.array([row[name] for row in rows], kind), *described[:2])
+        item.attrs.update(described[2])
+        item.dims[0].attach_scale(group["entry"])
 
 
 def _put(group: h5py.Group, name: str, array: np.ndarray, unit: str, label: str) -> h5py.Dataset:

@@ -284,7 +284,6 @@ def points(desk: Desk, parameters: Parameters) -> bytes:
         found = live.compute(desk.machine(source), across, up, at, lattice, changed, flag)
     finally:
         desk.views.leave(page, view, flag)
-    found["event_word"] = found["event_word"].astype(np.float64)
     return pack({"points": len(found["attractor"])}, found)
 
 

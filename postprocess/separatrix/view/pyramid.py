@@ -111,11 +111,16 @@ class Plane:
             place = place[::-1]
         whole = rows.stop - rows.start == columns.stop - columns.start == TILE
         whole = whole and rows.start % TILE == columns.start % TILE == 0 and data.chunks == (TILE, TILE)
-        if not whole or data.compression != "gzip" or data.shuffle or data.fletcher32:
+        if not whole or data.compression != "gzip" or data.fletcher32:
             return None
         mask, packed = data.id.read_direct_chunk(place)
         try:
-            return None if mask else np.frombuffer(zlib.decompress(packed), data.dtype).reshape(TILE, TILE)
+            if mask:
+                return None
+            values = zlib.decompress(packed)
+            if data.shuffle:
+                values = np.frombuffer(values, np.uint8).reshape(data.dtype.itemsize, -1).T.tobytes()
+            return np.frombuffer(values, data.dtype).reshape(TILE, TILE)
         except zlib.error as error:
             raise OSError(f"a chunk is damaged: {error}") from error
 

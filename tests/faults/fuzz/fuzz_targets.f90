@@ -173,7 +173,7 @@ contains
     integer :: i
     call schema%add_attribute('', 'format', 'separatrix')
     call schema%add_attribute('provenance', 'case_identity', 'basin 0123456789abcdef')
-    call schema%add_text('provenance', 'case_text', base_case)
+    call schema%add_attribute('provenance', 'case_text', base_case)
     call schema%add_dimension('x0', 8_int64)
     call schema%add_dimension('v0', 6_int64)
     call schema%add_variable('x0', type_float32, ['x0'], units='m', data=[(0.1_wp*i, i=0, 7)])
