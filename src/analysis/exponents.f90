@@ -52,8 +52,8 @@ module exponents
     real(wp) :: memory = 0
     integer(int64) :: impacts = 0
     !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event
-    !> tangentially.
-    integer :: periods = 0
+    !> tangentially, as `reason` says (module `status`).
+    integer :: periods = 0, reason = 0
     real(wp) :: mean_period = 0
     logical :: known = .false.
     !> Where it is not: sections that a structure passed before that, and whether it was all but at rest then.
@@ -89,11 +89,11 @@ contains
       call open_log(log, 0.0_wp)
       log%book%kept = .false.
       spectrum%has_sum = has_exact_sum(body)
-      call fly_on(body, state, log, transient - aligning, spectrum%known)
-      if (.not. spectrum%known) return
+      call fly_on(body, state, log, transient - aligning, spectrum%reason)
+      if (spectrum%reason /= 0) return
       do i = 1 - min(transient, aligning), periods
-        call vary_period(machines, body, state, log, events, by_start, spectrum%known)
-        if (.not. spectrum%known) return
+        call vary_period(machines, body, state, log, events, by_start, spectrum%reason)
+        if (spectrum%reason /= 0) return
         ! In units in which both coordinates are alike.
         by_start(1, 2) = by_start(1, 2)*body%size_of(2)/body%size_of(1)
         by_start(2, 1) = by_start(2, 1)*body%size_of(1)/body%size_of(2)
@@ -119,27 +119,28 @@ contains
       spectrum%sum_exact = spectrum%sum_exact/duration - body%moving%machine%friction%damping/body%moving%machine%mass
       call conclude(batch*batches/duration, lost*batches/duration, singular, dead, spectrum)
     end select
+    spectrum%known = .true.
     spectrum%periods = periods
     spectrum%mean_period = machines%centre%period
   end subroutine lyapunov_exponents
 
-  !> Moves a body that starts at another crank angle on to the first section, and from there over `periods`, if any.
-  subroutine fly_on(body, state, log, periods, ok)
+  !> Moves a body that starts at another crank angle on to the first section, and from there over `periods`, if any. `reason` is
+  !> not 0 if it had to be given up.
+  subroutine fly_on(body, state, log, periods, reason)
     type(one_body_t), intent(in) :: body
     type(state_t), intent(inout) :: state
     type(log_t), intent(inout) :: log
     integer, intent(in) :: periods
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     type(tally_t) :: tally
-    integer :: i, reason
-    ok = .true.
+    integer :: i
+    reason = 0
     do i = merge(0, 1, state%time > 0), max(0, periods)
       tally = tally_t()
       log%events = 0
       log%origin = 0
       call advance_period(body%moving, state, tally, reason, log)
-      ok = reason == 0
-      if (.not. ok) return
+      if (reason /= 0) return
     end do
   end subroutine fly_on
 

@@ -8,6 +8,7 @@ module stability_driver
   use case_check, only: require_start
   use case_setup, only: options_of
   use command_line, only: command_t
+  use endings, only: judge_motion
   use errors, only: error_t
   use exponents, only: motion_names, spectrum_t, type_of_motion, zero_one_test
   use files, only: file_exists, is_special, is_text
@@ -16,8 +17,8 @@ module stability_driver
   use launcher, only: launched_rank
   use machine_family, only: machine_neighbourhood
   use session, only: open_session, session_t
-  use stability_of_map, only: most_points, run_stability_of_map
-  use status, only: exit_done
+  use stability_of_map, only: most_points, run_stability_of_map, why_not_known
+  use status, only: exit_done, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
@@ -78,18 +79,11 @@ contains
       else
         call session%journal%line('not_known', 'not known: '//why_not_known(spectrum))
       end if
+      call judge_motion(spectrum%reason, reason_name(spectrum%reason), command%partial, error)
     end if
+    call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine run_stability_of_case
-
-  !> Why nothing is known of the exponents of a motion.
-  pure function why_not_known(spectrum) result(why)
-    type(spectrum_t), intent(in) :: spectrum
-    character(len=:), allocatable :: why
-    why = 'the motion was given up, met an event tangentially, or rests where nothing holds it'
-    if (spectrum%at_rest) why = 'the motion comes to rest: after '//to_text(spectrum%passed)//' sections nothing is left that '// &
-      'turns round; the eigenvalues of an equilibrium are those that `separatrix branches` gives'
-  end function why_not_known
 
   !> What was found, with errors and the check.
   subroutine report(session, spectrum, has_clock, k)
