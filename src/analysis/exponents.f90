@@ -17,9 +17,11 @@ module exponents
   private
 
   public :: lyapunov_exponents, error_of, zero_one_test, type_of_motion, period_of_section
-  public :: conclude, fly_on, has_exact_sum, loses_direction, note_events
+  public :: conclude, decay_of, fly_on, has_exact_sum, loses_direction, note_events
 
   integer, parameter, public :: batches = 32
+  !> Section points that the 0-1 test looks at, at most.
+  integer, parameter, public :: most_points = 5000
   !> Frequencies of the 0-1 test.
   integer, parameter :: frequencies = 100
   !> Periods in which a direction turns to where it grows most.
@@ -35,6 +37,8 @@ module exponents
     !> Exponents [1/s], the largest first, -huge for a direction that is lost (sticking, completed chatter); standard errors by
     !> batch means.
     real(wp), allocatable :: exponents(:), errors(:)
+    !> Power of the time with which the error of the largest falls: 1/2 for chance, up to 1 where the directions turn to and fro.
+    real(wp) :: decay = 0.5_wp
     !> Sum of the exponents, and what it must be from damping, impacts and turning points alone; `has_sum` tells whether the
     !> machine has such a formula.
     real(wp) :: sum_found = 0, sum_exact = 0
@@ -159,6 +163,7 @@ contains
     type(spectrum_t), intent(inout) :: spectrum
     spectrum%exponents(1) = sum(largest)/batches
     spectrum%errors(1) = error_of(largest)
+    spectrum%decay = decay_of(largest)
     spectrum%sum_found = sum(both)/batches
     spectrum%exponents(2) = spectrum%sum_found - spectrum%exponents(1)
     spectrum%errors(2) = error_of(both - largest)
@@ -172,6 +177,17 @@ contains
     real(wp), intent(in) :: values(batches)
     error_of = norm2(values - sum(values)/batches)/sqrt(real(batches, wp)*(batches - 1))
   end function error_of
+
+  !> Power of the time with which the error of a mean falls, from that of batches twice as long.
+  pure real(wp) function decay_of(values) result(decay)
+    real(wp), intent(in) :: values(batches)
+    real(wp) :: twice(batches/2), spread(2)
+    twice = (values(::2) + values(2::2))/2
+    spread = [norm2(values - sum(values)/batches)/sqrt(batches - 1.0_wp), &
+              norm2(twice - sum(twice)/size(twice))/sqrt(size(twice) - 1.0_wp)]
+    decay = 0.5_wp
+    if (all(spread > 0)) decay = min(1.0_wp, max(0.5_wp, logarithm(spread(1)/spread(2))/logarithm(2.0_wp)))
+  end function decay_of
 
   !> Whether areas change by a formula: viscous damping, a constant restitution, friction that does not depend on the speed.
   pure logical function has_exact_sum(body)

@@ -5,7 +5,7 @@
 module structure_exponents
   use cycle_reached, only: note_cycle
   use elementary, only: logarithm
-  use exponents, only: batches, error_of, lyapunov_exponents, spectrum_t
+  use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
@@ -235,6 +235,7 @@ contains
       spectrum%exponents = spectrum%exponents(:structure%n - 1)
       spectrum%errors = spectrum%errors(:structure%n - 1)
     end if
+    spectrum%decay = decay_of(batch(:, 1))
     spectrum%halves = 2*[sum(batch(:batches/2, 1)), sum(batch(batches/2 + 1:, 1))]/batches
     spectrum%sum_found = sum(batch)/batches
     spectrum%sum_exact = spectrum%sum_exact/duration - damping_rate(structure)

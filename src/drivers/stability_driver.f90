@@ -10,14 +10,15 @@ module stability_driver
   use command_line, only: command_t
   use endings, only: judge_motion
   use errors, only: error_t
-  use exponents, only: motion_names, spectrum_t, type_of_motion, zero_one_test
+  use exponents, only: most_points, motion_names, spectrum_t, type_of_motion, zero_one_test
   use files, only: file_exists, is_special, is_text
   use journal, only: json_number, json_text
   use kinds, only: wp
   use launcher, only: launched_rank
   use machine_family, only: machine_neighbourhood
+  use more_periods, only: periods_needed
   use session, only: open_session, session_t
-  use stability_of_map, only: most_points, run_stability_of_map, why_not_known
+  use stability_of_map, only: needed_text, run_stability_of_map, why_not_known
   use status, only: exit_done, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
@@ -91,7 +92,7 @@ contains
     type(spectrum_t), intent(in) :: spectrum
     logical, intent(in) :: has_clock
     real(wp), intent(in) :: k
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: name, more
     integer :: i
     do i = 1, size(spectrum%exponents)
       associate (value => spectrum%exponents(i), error => spectrum%errors(i))
@@ -113,11 +114,13 @@ contains
         ', "exact": '//json_number(spectrum%sum_exact))
     end if
     call session%journal%line('zero_one', '0-1 test: '//to_text(k, 3)//' (0 regular, 1 chaotic)', '"value": '//json_number(k))
+    more = ''
+    if (periods_needed(spectrum, k) > 0) more = ', "periods_needed": '//to_text(periods_needed(spectrum, k))
     name = trim(motion_names(type_of_motion(spectrum, k)))
     call session%journal%line('motion', 'the motion is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')// &
       ', by '//to_text(spectrum%periods)//trim(merge(' drive periods', ' returns      ', has_clock))//' with '// &
-      to_text(spectrum%impacts)//' impacts', &
-      '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts))
+      to_text(spectrum%impacts)//' impacts'//needed_text(spectrum, k), &
+      '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts)//more)
   end subroutine report
 
 end module stability_driver

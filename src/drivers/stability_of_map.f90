@@ -11,7 +11,7 @@ module stability_of_map
   use command_line, only: command_t
   use endings, only: judge_given_up
   use errors, only: error_t, fail
-  use exponents, only: motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
+  use exponents, only: most_points, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
     motion_transient, period_of_section, spectrum_t, type_of_motion, zero_one_test
   use grid, only: grid_t, point_laws, point_slice, point_start
   use journal, only: journal_t, json_number, json_text
@@ -19,6 +19,7 @@ module stability_of_map
   use machine_family, only: machine_neighbourhood
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
+  use more_periods, only: periods_needed, test_is_open
   use status, only: exit_bad_case, exit_usage, is_given_up, reason_left_domain, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
@@ -26,10 +27,8 @@ module stability_of_map
   implicit none
   private
 
-  public :: run_stability_of_map, why_not_known
+  public :: needed_text, run_stability_of_map, why_not_known
 
-  !> Section points that the 0-1 test looks at, at most.
-  integer, parameter, public :: most_points = 5000
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
   !> Logarithm of the contraction over a period from which on points that are the same tell a cycle.
@@ -225,9 +224,26 @@ contains
       words = words//': '//why_not_known(found%spectrum)
     else
       call add_numbers(found, words, data)
+      if (found%type == not_known) then
+        words = words//needed_text(found%spectrum, found%zero_one)
+        data = data//', "periods_needed": '//to_text(periods_needed(found%spectrum, found%zero_one))
+      end if
     end if
     call journal%line('entry', words, data)
   end subroutine tell
+
+  !> What more periods would do for a motion that is not known, by the 0-1 test `k`; '' if that is not known either.
+  pure function needed_text(spectrum, k) result(text)
+    type(spectrum_t), intent(in) :: spectrum
+    real(wp), intent(in) :: k
+    character(len=:), allocatable :: text
+    integer :: periods
+    text = ''
+    periods = periods_needed(spectrum, k)
+    if (periods > 0) text = '; its errors need about '//to_text(periods)//' periods (--periods '//to_text(periods)//')'
+    if (test_is_open(spectrum, k) .and. spectrum%periods < most_points) text = '; the 0-1 test decides here, and takes up '// &
+      'to '//to_text(most_points)//' periods into account (--periods '//to_text(most_points)//')'
+  end function needed_text
 
   !> Why nothing is known of the exponents of a motion.
   pure function why_not_known(spectrum) result(why)
