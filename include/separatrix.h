@@ -7,7 +7,8 @@
  * "effect.viscous.damping") or by index from 0. All quantities are in SI units.
  *
  * Functions return 0, or a code as the program does (64: wrong call, 65: bad case or value, 66: a file
- * cannot be read) and then write what is wrong into `message`, of `message_size` characters, cut to fit.
+ * cannot be read, 78: the motion was given up) and then write what is wrong into `message`, of
+ * `message_size` characters, cut to fit.
  * Nothing is kept outside the handles; one handle may be used by several threads at once.
  */
 #ifndef SEPARATRIX_H
@@ -180,7 +181,8 @@ enum {
  * Reason of the `trajectory`; its energy [J] at the start, lost to friction, damping and contacts, put in; if
  * it came to its end, energy at the end and what is missing in this book, otherwise not numbers. Period of
  * the cycle in drive periods, 0: none; not a number, and the values are over the window, with a duration
- * other than that of the case */
+ * other than that of the case. All of it is written also where the motion was given up, as far as it went:
+ * the answer is then 78 */
 int separatrix_trajectory(const separatrix_model *model, int chosen_count, const int *chosen,
                           const double *values, const double *start, double duration, int samples_per_period,
                           int sample_capacity, int *sample_count, double *sample, int event_capacity,

@@ -14,7 +14,7 @@ Importing the package imports nothing else; each name below brings its module wh
 import importlib
 from typing import TYPE_CHECKING
 
-from separatrix.errors import CaseError, Interrupted, SeparatrixError, SeparatrixWarning
+from separatrix.errors import CaseError, GivenUpError, Interrupted, SeparatrixError, SeparatrixWarning
 from separatrix.version import __version__
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ _HOME = {
 
 __all__ = [
     "CaseError",
+    "GivenUpError",
     "Interrupted",
     "SeparatrixError",
     "SeparatrixWarning",

@@ -17,6 +17,7 @@ from separatrix.figures import basin, boundary, branches, contact, erosion, poin
 from separatrix.figures.animation import animate
 from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
+from separatrix.given_up import refuse
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
 from separatrix.save import FORMATS, save
@@ -97,6 +98,8 @@ def make(path: Path, options: argparse.Namespace) -> list[Path]:
 
 def _make(path: Path, options: argparse.Namespace) -> list[Path]:
     with style.context(options.style), open_result(path) as result:
+        if not options.partial:
+            refuse(path, result)
         title = plain(options.title or result.attrs.get("title", path.stem))
         stem = path.name.removesuffix(".h5")
         folder = options.output or path.parent
@@ -164,7 +167,8 @@ def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-figures",
         description="Make the figures that fit each Separatrix result file.",
-        epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write.",
+        epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write, "
+        "78 every motion was given up.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="result file (.h5)")
     parser.add_argument(
@@ -193,6 +197,9 @@ def _parser() -> Parser:
         metavar="FILE",
         type=Path,
         help="files of measures along a parameter: draw these branches over the same parameter above them",
+    )
+    parser.add_argument(
+        "--partial", action="store_true", help="draw motions that were given up as far as they went"
     )
     parser.add_argument("--title", help="title of the figures [that of the file]")
     parser.add_argument(

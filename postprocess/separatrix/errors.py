@@ -11,6 +11,7 @@ INTERNAL = 70
 NO_MEMORY = 71
 CANNOT_CREATE = 73
 STOPPED = 75
+GIVEN_UP = 78
 INTERRUPTED = 130
 TERMINATED = 143
 
@@ -39,6 +40,15 @@ class SeparatrixError(Exception):
 
 class CaseError(SeparatrixError):
     """A case, a value or a call that the simulator refuses; `code` is that of the program."""
+
+
+class GivenUpError(SeparatrixError):
+    """Motions that had to be given up; `result` is what there is of it."""
+
+    def __init__(self, message: str, result: object) -> None:
+        """Keep what there is."""
+        super().__init__(message, GIVEN_UP)
+        self.result = result
 
 
 class SeparatrixWarning(UserWarning):

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.cases import Case, as_case, linspace, quantity
-from separatrix.errors import USAGE, CaseError, Interrupted, SeparatrixError
+from separatrix.errors import GIVEN_UP, USAGE, CaseError, GivenUpError, Interrupted, SeparatrixError
 from separatrix.labelling import Labelling, SecondLookError, axis_values, can_label
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
@@ -63,11 +63,19 @@ class _Work:
         try:
             with Progress(self.progress) as told:
                 self._compute(place, target, told, resume=self.resume or folder is not None)
+        except SeparatrixError as error:
+            if error.code != GIVEN_UP:
+                raise
+            message = str(error).removesuffix(" (--partial: no error)")
+            raise GivenUpError(message, self._result(target)) from None
         except StoppedError as stop:
             again = "; resume() goes on" + (", and so does resume=True" if self.output else "")
             raise Interrupted(
                 f"stopped at {100 * stop.done:.0f} %{again}", stop.done, lambda: self(own)
             ) from None
+        return self._result(target)
+
+    def _result(self, target: Path) -> xr.Dataset:
         if self.output:
             return open_result(target)
         with open_result(target) as result:
@@ -106,10 +114,18 @@ class _Work:
             commands.append([*base, "-o", str(target), "--shard", f"{i}/{count}", "--resume", *found])
         run(commands, told, None, rename, unlocked, self.time_limit)
         joined = ["merge", str(target), *map(str, shares), "--json"]
-        run([[*joined, *(["--force"] if self.overwrite else [])]], told, None, rename)
+        given_up = None
+        try:
+            run([[*joined, *(["--force"] if self.overwrite else [])]], told, None, rename)
+        except SeparatrixError as error:
+            given_up = error
+            if error.code != GIVEN_UP:
+                raise
         for share in shares:
             share.unlink()
             Path(f"{share}.lock").unlink(missing_ok=True)
+        if given_up:
+            raise given_up
 
 
 def basin(

@@ -10,7 +10,7 @@ import xarray as xr
 import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
 from separatrix.cases import Case, as_case, number
-from separatrix.errors import USAGE, SeparatrixError
+from separatrix.errors import USAGE, GivenUpError, SeparatrixError
 from separatrix.variables import EVENTS, FORMAT_VERSION, KINDS, REASONS, REGIMES, SAMPLES, attributes
 from separatrix.version import __version__
 
@@ -30,8 +30,11 @@ def trajectory(
     *,
     duration: float | str | None = None,
     samples: int | None = None,
+    partial: bool = False,
 ) -> xr.Dataset:
     """Return one motion, equidistant samples and every event, as a file of `separatrix trajectory` has it.
+
+    A motion that had to be given up is a GivenUpError, whose `result` is the dataset as far as it went.
 
     Parameters
     ----------
@@ -44,6 +47,8 @@ def trajectory(
         Seconds, or a text with a unit; that of the case if not given.
     samples
         Samples per drive period, two or more; those of the case if not given.
+    partial
+        Return a motion that was given up as far as it went; its attribute `reason` says why.
     """
     case = as_case(case)
     if isinstance(duration, str):
@@ -54,9 +59,13 @@ def trajectory(
     if samples is not None and samples < 2:
         raise SeparatrixError(f"samples: found {samples}, allowed 2 or more", USAGE)
     start = case.start(x0=x0, v0=v0, crank_angle=crank_angle)
-    motion = simulate.trajectory(
-        case.model, tuple(start.values()), duration=duration or 0.0, samples_per_period=samples or 0
-    )
+    given_up = None
+    try:
+        motion = simulate.trajectory(
+            case.model, tuple(start.values()), duration=duration or 0.0, samples_per_period=samples or 0
+        )
+    except GivenUpError as error:
+        given_up, motion = str(error), error.result
     asked = {f"start.{name}": value for name, value in start.items()}
     if duration is not None:
         window = min(float(case.resolved["run"]["window"]), duration)
@@ -64,7 +73,11 @@ def trajectory(
     if samples is not None:
         asked["trajectory.samples_per_period"] = int(samples)
     changed = case.with_(asked)
-    return _dataset(changed, motion, _cycle(changed, motion.summary))
+    result = _dataset(changed, motion, _cycle(changed, motion.summary))
+    if given_up and not partial:
+        message = f"{given_up} after {float(result.time[-1]) if result.time.size else 0.0:.6g} s"
+        raise GivenUpError(f"{message} (partial=True returns it as far as it went)", result)
+    return result
 
 
 def _cycle(case: Case, summary: dict[str, float]) -> dict[str, float] | None:

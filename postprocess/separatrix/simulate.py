@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.errors import GIVEN_UP, GivenUpError
 from separatrix.library import CaseError, Model, _call, _library, _pointer
 from separatrix.variables import MAP
 
@@ -111,11 +112,13 @@ def trajectory(
     duration: float = 0.0,
     samples_per_period: int = 0,
     room: tuple[int, int] = (20000, 1000),
+    partial: bool = False,
 ) -> Motion:
     """Fly one motion from `start` = x [m], v [m/s], crank angle [rad], with other `values` by path.
 
     `duration` in s and `samples_per_period` are those of the case if 0; no samples if negative. `room` for
-    samples and events is only where to begin.
+    samples and events is only where to begin. A motion that was given up is returned as far as it went if
+    `partial`; else it is a GivenUpError that has it as `result`.
     """
     start = np.array(start, float)
     if start.shape != (3,):
@@ -125,7 +128,7 @@ def trajectory(
     summary = np.empty(len(SUMMARY))
     while True:
         samples, events = np.empty((room[0], len(SAMPLE_COLUMNS))), np.empty((room[1], len(EVENT_COLUMNS)))
-        _call(
+        given_up = _call_or_given_up(
             "separatrix_trajectory",
             model._handle,
             *chosen,
@@ -144,11 +147,25 @@ def trajectory(
         if found[0] <= room[0] and found[1] <= room[1]:
             break
         room = found
-    return Motion(
+    motion = Motion(
         _columns(SAMPLE_COLUMNS, samples[: found[0]]),
         _columns(EVENT_COLUMNS, events[: found[1]]),
         _numbers(SUMMARY, summary),
     )
+    if given_up and not partial:
+        raise GivenUpError(given_up, motion)
+    return motion
+
+
+def _call_or_given_up(name: str, *arguments: object) -> str:
+    """Call a function; what it says of a motion that was given up, '' of others."""
+    try:
+        _call(name, *arguments)
+    except CaseError as error:
+        if error.code != GIVEN_UP:
+            raise
+        return str(error)
+    return ""
 
 
 def section_points(

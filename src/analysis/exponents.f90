@@ -17,9 +17,11 @@ module exponents
   private
 
   public :: lyapunov_exponents, error_of, zero_one_test, type_of_motion, period_of_section
-  public :: conclude, fly_on, has_exact_sum, loses_direction, note_events
+  public :: conclude, decay_of, fly_on, has_exact_sum, loses_direction, note_events
 
   integer, parameter, public :: batches = 32
+  !> Section points that the 0-1 test looks at, at most.
+  integer, parameter, public :: most_points = 5000
   !> Frequencies of the 0-1 test.
   integer, parameter :: frequencies = 100
   !> Periods in which a direction turns to where it grows most.
@@ -35,6 +37,8 @@ module exponents
     !> Exponents [1/s], the largest first, -huge for a direction that is lost (sticking, completed chatter); standard errors by
     !> batch means.
     real(wp), allocatable :: exponents(:), errors(:)
+    !> Power of the time with which the error of the largest falls: 1/2 for chance, up to 1 where the directions turn to and fro.
+    real(wp) :: decay = 0.5_wp
     !> Sum of the exponents, and what it must be from damping, impacts and turning points alone; `has_sum` tells whether the
     !> machine has such a formula.
     real(wp) :: sum_found = 0, sum_exact = 0
@@ -52,8 +56,8 @@ module exponents
     real(wp) :: memory = 0
     integer(int64) :: impacts = 0
     !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event
-    !> tangentially.
-    integer :: periods = 0
+    !> tangentially, as `reason` says (module `status`).
+    integer :: periods = 0, reason = 0
     real(wp) :: mean_period = 0
     logical :: known = .false.
     !> Sections that a structure passed, and whether it was all but at rest then, or else comes to rest.
@@ -89,11 +93,11 @@ contains
       call open_log(log, 0.0_wp)
       log%book%kept = .false.
       spectrum%has_sum = has_exact_sum(body)
-      call fly_on(body, state, log, transient - aligning, spectrum%known)
-      if (.not. spectrum%known) return
+      call fly_on(body, state, log, transient - aligning, spectrum%reason)
+      if (spectrum%reason /= 0) return
       do i = 1 - min(transient, aligning), periods
-        call vary_period(machines, body, state, log, events, by_start, spectrum%known)
-        if (.not. spectrum%known) return
+        call vary_period(machines, body, state, log, events, by_start, spectrum%reason)
+        if (spectrum%reason /= 0) return
         ! In units in which both coordinates are alike.
         by_start(1, 2) = by_start(1, 2)*body%size_of(2)/body%size_of(1)
         by_start(2, 1) = by_start(2, 1)*body%size_of(1)/body%size_of(2)
@@ -119,27 +123,28 @@ contains
       spectrum%sum_exact = spectrum%sum_exact/duration - body%moving%machine%friction%damping/body%moving%machine%mass
       call conclude(batch*batches/duration, lost*batches/duration, singular, dead, spectrum)
     end select
+    spectrum%known = .true.
     spectrum%periods = periods
     spectrum%mean_period = machines%centre%period
   end subroutine lyapunov_exponents
 
-  !> Moves a body that starts at another crank angle on to the first section, and from there over `periods`, if any.
-  subroutine fly_on(body, state, log, periods, ok)
+  !> Moves a body that starts at another crank angle on to the first section, and from there over `periods`, if any. `reason` is
+  !> not 0 if it had to be given up.
+  subroutine fly_on(body, state, log, periods, reason)
     type(one_body_t), intent(in) :: body
     type(state_t), intent(inout) :: state
     type(log_t), intent(inout) :: log
     integer, intent(in) :: periods
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     type(tally_t) :: tally
-    integer :: i, reason
-    ok = .true.
+    integer :: i
+    reason = 0
     do i = merge(0, 1, state%time > 0), max(0, periods)
       tally = tally_t()
       log%events = 0
       log%origin = 0
       call advance_period(body%moving, state, tally, reason, log)
-      ok = reason == 0
-      if (.not. ok) return
+      if (reason /= 0) return
     end do
   end subroutine fly_on
 
@@ -158,6 +163,7 @@ contains
     type(spectrum_t), intent(inout) :: spectrum
     spectrum%exponents(1) = sum(largest)/batches
     spectrum%errors(1) = error_of(largest)
+    spectrum%decay = decay_of(largest)
     spectrum%sum_found = sum(both)/batches
     spectrum%exponents(2) = spectrum%sum_found - spectrum%exponents(1)
     spectrum%errors(2) = error_of(both - largest)
@@ -171,6 +177,17 @@ contains
     real(wp), intent(in) :: values(batches)
     error_of = norm2(values - sum(values)/batches)/sqrt(real(batches, wp)*(batches - 1))
   end function error_of
+
+  !> Power of the time with which the error of a mean falls, from that of batches twice as long.
+  pure real(wp) function decay_of(values) result(decay)
+    real(wp), intent(in) :: values(batches)
+    real(wp) :: twice(batches/2), spread(2)
+    twice = (values(::2) + values(2::2))/2
+    spread = [norm2(values - sum(values)/batches)/sqrt(batches - 1.0_wp), &
+              norm2(twice - sum(twice)/size(twice))/sqrt(size(twice) - 1.0_wp)]
+    decay = 0.5_wp
+    if (all(spread > 0)) decay = min(1.0_wp, max(0.5_wp, logarithm(spread(1)/spread(2))/logarithm(2.0_wp)))
+  end function decay_of
 
   !> Whether areas change by a formula: viscous damping, a constant restitution, friction that does not depend on the speed.
   pure logical function has_exact_sum(body)

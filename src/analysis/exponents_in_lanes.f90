@@ -17,6 +17,7 @@ module exponents_in_lanes
   use motion, only: motion_t, start_state
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, open_log, state_t
   use one_body, only: one_body_t
+  use status, only: reason_left_domain
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -88,8 +89,8 @@ contains
     flow = flow_of(body)
     call open_log(log, 0.0_wp)
     log%book%kept = .false.
-    call lead_the_way(body, state, log, transient, starts, section, spectrum%known)
-    if (.not. spectrum%known) return
+    call lead_the_way(body, state, log, transient, starts, section, spectrum%reason)
+    if (spectrum%reason /= 0) return
     spectrum%point = [state%x, state%v]
     spectrum%has_sum = .true.
     batch%budget = real(body%moving%options%event_budget, wp)
@@ -109,17 +110,18 @@ contains
         if (progress(lane)%part > halves) cycle
         if (abs(batch%status(lane) - lane_left) <= 0) then
           call take_over(machines, body, flow, lane, periods, log, batch, tangents, progress(lane), sums, spectrum)
-          if (.not. spectrum%known) return
+          if (spectrum%reason /= 0) return
         else if (abs(batch%status(lane) - lane_flying) > 0) then
           ! Out of its domain it stops before it has to.
-          spectrum%known = batch%sections(lane) < 0.5_wp
-          if (.not. spectrum%known) return
+          if (batch%sections(lane) >= 0.5_wp) spectrum%reason = reason_left_domain
+          if (spectrum%reason /= 0) return
           batch%status(lane) = lane_flying
           call settle(body, flow%machine%decay, lane, progress(lane), batch, tangents, sums, spectrum)
           call go_on(periods, lane, progress(lane), batch)
         end if
       end do
     end do
+    spectrum%known = .true.
     duration = periods*body%period
     spectrum%sum_exact = sum(sums%exact)/duration - body%moving%machine%friction%damping/body%moving%machine%mass
     call conclude(sums%first*batches/duration, sums%both*batches/duration, sums%singular, sums%dead, spectrum)
@@ -130,25 +132,25 @@ contains
 
   !> Flies the one motion over `transient` and the sections; the lanes start beside what it passes in the second half of the
   !> transient, so far apart that they are no repetition of each other.
-  subroutine lead_the_way(body, state, log, transient, starts, section, ok)
+  subroutine lead_the_way(body, state, log, transient, starts, section, reason)
     type(one_body_t), intent(in) :: body
     type(state_t), intent(inout) :: state
     type(log_t), intent(inout) :: log
     integer, intent(in) :: transient
     type(state_t), intent(out) :: starts(lane_count)
     real(wp), intent(out) :: section(:)
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     integer :: gap, i
     gap = max(transient/(2*lane_count), aligning)
-    call fly_on(body, state, log, transient - lane_count*gap, ok)
+    call fly_on(body, state, log, transient - lane_count*gap, reason)
     do i = 1, lane_count
-      if (.not. ok) return
+      if (reason /= 0) return
       starts(i) = beside(body%moving, state, i*apart*body%size_of(1))
-      call fly_on(body, state, log, gap, ok)
+      call fly_on(body, state, log, gap, reason)
     end do
     do i = 1, size(section)
-      if (.not. ok) return
-      call fly_on(body, state, log, 1, ok)
+      if (reason /= 0) return
+      call fly_on(body, state, log, 1, reason)
       section(i) = state%x
     end do
   end subroutine lead_the_way
@@ -276,8 +278,8 @@ contains
     if (.not. (state%time > 0 .or. abs(state%v) > 0)) state = start_state(body%moving, state%x, state%v, 0.0_wp)
     directions = tangents_at_state(flow, batch, lane, tangents)
     do
-      call vary_period(machines, body, state, log, events, by_start, spectrum%known)
-      if (.not. spectrum%known) return
+      call vary_period(machines, body, state, log, events, by_start, spectrum%reason)
+      if (spectrum%reason /= 0) return
       if (progress%part > 0) then
         sums%singular = sums%singular .or. any(loses_direction(events))
         spectrum%sum_exact = sums%exact(lane)

@@ -37,6 +37,8 @@ module orbit_search
     type(orbit_t), allocatable :: orbits(:)
     !> Orbits met that are not isolated; equilibria, which without a clock are met as cycles of no extent.
     integer :: families = 0, equilibria = 0
+    !> Starts, and those whose motions were given up or left their domain.
+    integer :: starts = 0, lost = 0
   end type found_t
 
 contains
@@ -56,7 +58,10 @@ contains
     do i = 1, size(starts, 2)
       if (present(watch)) call watch%tell_start()
       call settle(machines, starts(:, i), longest, found, settled, n)
-      if (n == 0 .or. is_found(machines, settled, n, found)) cycle
+      found%starts = found%starts + 1
+      if (n < 0) found%lost = found%lost + 1
+      if (n <= 0) cycle
+      if (is_found(machines, settled, n, found)) cycle
       call try_newton(family, machines, value, settled, n, found)
     end do
     do i = 1, size(starts, 2)
@@ -85,7 +90,8 @@ contains
     end do
   end function is_found
 
-  !> Where a motion is after many periods, and after how many it is back there (0: it is not, or it has come to a known orbit).
+  !> Where a motion is after many periods, and after how many it is back there (0: it is not, or it has come to a known orbit; -1: it
+  !> was given up or left its domain).
   subroutine settle(machines, start, longest, found, settled, periods)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: start(:)
@@ -101,7 +107,10 @@ contains
     then = start
     do i = 1, settling
       call image_of(machines, settled, next, ok)
-      if (.not. ok) return
+      if (.not. ok) then
+        periods = -1
+        return
+      end if
       settled = next
       if (modulo(i, any_period) /= 0) cycle
       if (distance(machines, settled, then) < at_rest) exit

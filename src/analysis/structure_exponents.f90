@@ -5,7 +5,7 @@
 module structure_exponents
   use cycle_reached, only: note_cycle
   use elementary, only: logarithm
-  use exponents, only: batches, error_of, lyapunov_exponents, spectrum_t
+  use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
   use jointed, only: joint_contact, joint_soft
@@ -16,6 +16,7 @@ module structure_exponents
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_touch_lower, &
     event_touch_upper, event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
+  use status, only: reason_not_smooth
   use structure, only: coordinates_of, mode_number, state_in, structure_t
   use structure_family, only: least_dimension, state_at_start, vary_section
   use structure_walk, only: advance_section, start_of_structure
@@ -109,16 +110,16 @@ contains
     spectrum%has_sum = has_exact_sum(structure)
     allocate (spectrum%exponents(structure%n), spectrum%errors(structure%n), source=0.0_wp)
     ! To the first section.
-    call advance_alone(structure, state, events, lasted, spectrum%known)
-    if (.not. spectrum%known) return
+    call advance_alone(structure, state, events, lasted, spectrum%reason)
+    if (spectrum%reason /= 0) return
     do i = 1 - transient, sections
       call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
       spectrum%passed = transient + i
       pace(max(1, i)) = pace_of(structure, mode, coordinates_of(structure, state))
       spectrum%at_rest = .not. structure%has_clock .and. pace(max(1, i)) < still
-      call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%known)
-      if (.not. spectrum%known) return
+      call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%reason)
+      if (spectrum%reason /= 0) return
       if (i < 1) cycle
       left = min(left, least_dimension(structure, mode, events))
       duration = duration + lasted
@@ -128,6 +129,7 @@ contains
       if (i <= size(series)) series(i) = place_of(structure, state)
       if (i == size(series)) spectrum%point = coordinates_of(structure, state)
     end do
+    spectrum%known = .true.
     spectrum%periods = sections
     spectrum%mean_period = duration/sections
     call conclude(structure, batch*batches/duration, duration, left, spectrum)
@@ -175,14 +177,14 @@ contains
     end associate
   end subroutine bring_back
 
-  !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `ok` is false if it had to be given up;
+  !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `reason` is not 0 if it had to be given up;
   !> `smooth` where a transition is not known to be smooth.
-  subroutine advance_alone(structure, state, events, lasted, ok, smooth)
+  subroutine advance_alone(structure, state, events, lasted, reason, smooth)
     type(structure_t), intent(in) :: structure
     type(jointed_state_t), intent(inout) :: state
     type(event_t), allocatable, intent(inout) :: events(:)
     real(wp), intent(out) :: lasted
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     logical, intent(out), optional :: smooth
     type(tally_t) :: tally
     integer :: count_events
@@ -192,29 +194,31 @@ contains
     lasted = 0
     certain = .true.
     ! Budgets are those of a section, as for one body.
-    call advance_section(structure, state, lasted, events, count_events, tally, ok, certain)
+    call advance_section(structure, state, lasted, events, count_events, tally, reason, certain)
     events = events(:count_events)
     if (present(smooth)) smooth = certain
   end subroutine advance_alone
 
-  !> The same with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `ok` is false also where
+  !> The same with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `reason` is not 0 also where
   !> the derivatives are not known.
-  subroutine advance_with_frame(machines, structure, state, frame, growth, events, lasted, ok)
+  subroutine advance_with_frame(machines, structure, state, frame, growth, events, lasted, reason)
     type(neighbourhood_t), intent(in) :: machines
     type(structure_t), intent(in) :: structure
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(inout) :: frame(:, :)
     real(wp), intent(out) :: growth(:), lasted
     type(event_t), allocatable, intent(inout) :: events(:)
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     real(wp) :: point(structure%n), by_start(structure%n, structure%n)
     integer :: k, mode
-    logical :: smooth
+    logical :: smooth, ok
     point = coordinates_of(structure, state)
     mode = mode_number(structure%frame%moving%machine, state%phase)
-    call advance_alone(structure, state, events, lasted, ok, smooth)
-    ok = ok .and. smooth
+    call advance_alone(structure, state, events, lasted, reason, smooth)
+    if (reason /= 0) return
+    ok = smooth
     if (ok) call vary_section(machines, structure, mode, point, events, 1, coordinates_of(structure, state), by_start, ok)
+    if (.not. ok) reason = reason_not_smooth
     if (.not. ok) return
     do k = 1, structure%n
       by_start(:, k) = by_start(:, k)*structure%size_of(k)/structure%size_of
@@ -251,6 +255,7 @@ contains
       spectrum%exponents = spectrum%exponents(:structure%n - 1)
       spectrum%errors = spectrum%errors(:structure%n - 1)
     end if
+    spectrum%decay = decay_of(batch(:, 1))
     spectrum%halves = 2*[sum(batch(:batches/2, 1)), sum(batch(batches/2 + 1:, 1))]/batches
     spectrum%sum_found = sum(batch)/batches
     spectrum%sum_exact = spectrum%sum_exact/duration - damping_rate(structure)

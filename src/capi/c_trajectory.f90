@@ -18,7 +18,7 @@ module c_trajectory
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: closing_error, log_t, open_log
   use settled_cycle, only: describe_cycle
-  use status, only: exit_usage, reason_time_over
+  use status, only: exit_given_up, exit_usage, is_given_up, reason_name, reason_time_over
   use text, only: to_text
   use trajectories, only: run_trajectories
   use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
@@ -69,6 +69,7 @@ contains
       kept = min(event_count, event_capacity)
       if (kept > 0) call put_events(prepared%journey%moving, log, kept, event)
       call summarise(prepared%journey%moving, log, outcome, summary)
+      if (is_given_up(outcome%reason)) call fail(error, exit_given_up, 'the motion was given up: '//reason_name(outcome%reason))
     end if
     code = answer(error, message, message_size)
   end function separatrix_trajectory

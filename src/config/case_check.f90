@@ -9,6 +9,7 @@ module case_check
   use case_parameters, only: is_start, parameter_value, set_parameter
   use case_source, only: case_source_t, report
   use case_type, only: case_t
+  use contact_law, only: barriers_are_soft
   use errors, only: error_t, fail
   use grid, only: sample_axis
   use kinds, only: wp
@@ -280,7 +281,7 @@ contains
     end do
   end subroutine check_sweep_starts
 
-  !> How a position violates the tightest barriers of the case with these axes; '' if it does not.
+  !> How a position violates the tightest rigid barriers of the case with these axes; '' if it does not.
   pure function beyond(the_case, axes, x) result(problem)
     type(case_t), intent(in) :: the_case
     type(axis_t), intent(in) :: axes(:)
@@ -291,6 +292,8 @@ contains
     character(len=:), allocatable :: from_driver
     real(wp) :: upper, lower, second, driver(2)
     integer :: i
+    problem = ''
+    if (barriers_are_soft(the_case%laws)) return
     ! Stops on a driving body: its least and its largest place.
     driver = 0
     from_driver = ''
@@ -318,7 +321,6 @@ contains
       upper = second
       upper_key = second_key
     end if
-    problem = ''
     if (x - driver(1) > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier '//upper_key//' = '// &
                                          to_text(upper)//' m'//from_driver
     if (x - driver(2) < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier '//lower_key//' = '// &

@@ -6,17 +6,20 @@ module status
   implicit none
   private
 
-  public :: reason_name
+  public :: reason_name, reason_code, is_given_up
 
   ! Exit codes (sysexits style).
   integer, parameter, public :: exit_done = 0, exit_usage = 64, exit_bad_case = 65, &
     exit_no_input = 66, exit_internal = 70, exit_cannot_create = 73, exit_io = 74, &
-    exit_resumable = 75, exit_other_case = 76, exit_uncertain = 77
+    exit_resumable = 75, exit_other_case = 76, exit_uncertain = 77, exit_given_up = 78
 
   ! Why a trajectory ended. The codes add up to the number of points; there is no catch-all.
   integer, parameter, public :: reason_not_run = 0, reason_settled = 1, reason_time_over = 2, &
     reason_left_domain = 3, reason_not_finite = 4, reason_event_budget = 5, &
     reason_step_failed = 6, reason_step_budget = 7, last_reason = 7
+
+  !> No end of a trajectory: it went on, but how it changes with its start is not known.
+  integer, parameter, public :: reason_not_smooth = -1
 
   !> Texts of the reason codes, index = code.
   character(len=*), parameter, public :: reason_names(0:last_reason) = [character(len=14) :: &
@@ -35,5 +38,20 @@ contains
       name = 'unknown'
     end if
   end function reason_name
+
+  !> The code of a reason; -1 for a text outside the table.
+  pure integer function reason_code(name) result(code)
+    character(len=*), intent(in) :: name
+    do code = 0, last_reason
+      if (reason_names(code) == name) return
+    end do
+    code = -1
+  end function reason_code
+
+  !> Whether a motion that ended for this reason was given up. One that left its domain was not: that it leaves is known.
+  pure elemental logical function is_given_up(code)
+    integer, intent(in) :: code
+    is_given_up = any(code == [reason_not_finite, reason_event_budget, reason_step_failed, reason_step_budget])
+  end function is_given_up
 
 end module status

@@ -3,7 +3,7 @@
 
 !> One flight of one segment of a body, by whatever flew it, and what a flight of a neighbour makes of derivatives.
 module segment_flight
-  use contact_law, only: barrier_positions
+  use contact_law, only: barrier_positions, beyond_barrier
   use kinds, only: wp
   use motion, only: motion_t
   use variants, only: family_t, sensor_bias, sensor_delay, sensor_gain, variant_t
@@ -31,8 +31,7 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     start_allowed = all(ieee_is_finite(start))
-    if (start_allowed) start_allowed = start(1) <= moving%machine%contact%upper &
-                                       .and. start(1) >= moving%machine%contact%lower
+    if (start_allowed) start_allowed = .not. beyond_barrier(moving%machine%contact, start(1))
   end function start_allowed
 
   !> The start a step away in coordinate `k`, forth (`turn` 1) or back (2). A velocity is first made larger, so that a slow body

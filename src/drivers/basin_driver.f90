@@ -11,7 +11,7 @@ module basin_driver
   use catalogue_report, only: list_attractors, missed_text, not_known_text, tell_found
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
-  use endings, only: report_reasons
+  use endings, only: judge_reasons, report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
   use point_columns, only: marks_of_attractor, point_values
@@ -155,6 +155,7 @@ contains
     type(map_file_t), intent(inout) :: file
     logical, intent(in) :: complete
     type(schema_t) :: extra
+    type(error_t), allocatable :: error
     call sum_counts(session, work)
     call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
     if (allocated(work%grid%drawn)) call add_sample_shares(extra, work%captured, points_of_slice(work%grid))
@@ -162,6 +163,8 @@ contains
     call finish_tiles(session, file, complete, extra)
     call report_shares(session, work)
     if (work%refine%active) call report_refinement(session, work, work%grid%shape, work%origins)
+    call judge_reasons(session%journal, work%reasons, session%command%partial, error)
+    call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine end_basin
 

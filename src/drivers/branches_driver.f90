@@ -27,7 +27,7 @@ module branches_driver
   use orbit_words, only: symmetry_text, word_of
   use periodic_orbit, only: orbit_t
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_bad_case, exit_done
+  use status, only: exit_bad_case, exit_done, exit_given_up
   use text, only: join, replace_all, to_text
   use written_check, only: check_written
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
@@ -89,9 +89,10 @@ contains
       call report_curves(session, search, curves)
     end if
     if (session%team%is_root()) then
-      if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, exit_bad_case, &
+      if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, merge(exit_given_up, &
+        exit_bad_case, all(search%found%lost == search%found%starts) .and. .not. command%partial), &
         'no isolated periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
-        to_text(search%plan%highest)//'; nothing is written')
+        to_text(search%plan%highest)//lost_text(search)//'; nothing is written')
     end if
     call session%stop_if(error)
     call describe_file(session, 'branches', schema)
@@ -106,6 +107,15 @@ contains
     call session%journal%line('written', 'wrote '//path)
     call session%end_with(exit_done)
   end subroutine run_branches
+
+  !> How many starts led nowhere; '' if none was lost.
+  pure function lost_text(search) result(text)
+    type(search_t), intent(in) :: search
+    character(len=:), allocatable :: text
+    text = ''
+    if (sum(search%found%lost) > 0) text = '; the motions of '//to_text(sum(search%found%lost))//' of '// &
+                                           to_text(sum(search%found%starts))//' starts were given up or left the domain'
+  end function lost_text
 
   !> Every labelled point, and what was found from how many seeds.
   subroutine report(session, search, contacts, unit)
@@ -128,7 +138,7 @@ contains
       end associate
     end do
     call session%journal%line('found', to_text(size(search%branches))//' branches from '//to_text(search%seeds)// &
-      ' seeds at '//to_text(size(search%values))//' values of '//search%family%path//'; there may be others')
+      ' seeds at '//to_text(size(search%values))//' values of '//search%family%path//'; there may be others'//lost_text(search))
     if (search%seeds > 0 .and. .not. search%depends) call session%journal%line('no_effect', search%family%path// &
       ' has no effect on any orbit that was found: each is the same at every value')
     families = sum(search%found%equilibria)

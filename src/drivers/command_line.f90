@@ -58,6 +58,8 @@ module command_line
     integer :: sample = 200, seed = 1
     !> `verify`: share of the labels that may change, in per cent.
     real(wp) :: max_changes = 1
+    !> Motions that were given up are no error.
+    logical :: partial = .false.
     !> Options that were given.
     logical :: given(size(options)) = .false.
   end type command_t
@@ -238,6 +240,8 @@ contains
       command%resume = .true.
     case ('--search-only')
       command%search_only = .true.
+    case ('--partial')
+      command%partial = .true.
     case ('--contacts')
       command%contacts = .true.
     case ('--json')

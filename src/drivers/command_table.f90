@@ -101,7 +101,7 @@ module command_table
     character(len=130) :: help
   end type option_row_t
 
-  type(option_row_t), parameter, public :: options(36) = [ &
+  type(option_row_t), parameter, public :: options(37) = [ &
     option_row_t('--output', '-o', .true., 'basin sweep branches boundary trajectory points', &
       '  -o, --output FILE  where to write (default: NAME.COMMAND.h5, NAME that of the case or map)'), &
     option_row_t('--set', '', .true., 'basin sweep branches stability trajectory points', &
@@ -140,6 +140,8 @@ module command_table
       '  -q, --quiet        errors only'), &
     option_row_t('--version', '', .false., '', &
       '  --version          version, commit, compilers, MPI, HDF5 and flags'), &
+    option_row_t('--partial', '', .false., 'basin sweep branches boundary stability trajectory points merge verify', &
+      '  --partial          code 0 also where every motion was given up (else 78)'), &
     option_row_t('--list', '', .true., 'points', &
       ''), &
     option_row_t('--csv', '', .true., 'points trajectory merge', &

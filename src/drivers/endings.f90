@@ -1,16 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> How trajectories ended, as every command that runs many tells it.
+!> How trajectories ended, as every command that runs many says it, and whether that is an error.
 module endings
+  use errors, only: error_t, fail
   use journal, only: journal_t, json_text
   use kinds, only: int64
-  use status, only: last_reason, reason_names
+  use status, only: exit_given_up, is_given_up, last_reason, reason_names
   use text, only: to_text
   implicit none
   private
 
-  public :: report_reasons
+  public :: report_reasons, judge_reasons, judge_given_up, judge_motion
 
 contains
 
@@ -24,5 +25,42 @@ contains
         ' points', '"reason": '//json_text(trim(reason_names(i)))//', "points": '//to_text(reasons(i)))
     end do
   end subroutine report_reasons
+
+  !> As `judge_given_up`, of points that ended for these reasons.
+  subroutine judge_reasons(journal, reasons, partial, error)
+    type(journal_t), intent(inout) :: journal
+    integer(int64), intent(in) :: reasons(0:last_reason)
+    logical, intent(in) :: partial
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    call judge_given_up(journal, sum(pack(reasons, is_given_up([(i, i=0, last_reason)]))), sum(reasons), 'points', partial, error)
+  end subroutine judge_reasons
+
+  !> A line where some of the motions were given up; code 78 where all of them were, unless `partial` results are asked for.
+  subroutine judge_given_up(journal, given_up, motions, things, partial, error)
+    type(journal_t), intent(inout) :: journal
+    integer(int64), intent(in) :: given_up, motions
+    character(len=*), intent(in) :: things
+    logical, intent(in) :: partial
+    type(error_t), allocatable, intent(out) :: error
+    if (given_up == 0) return
+    if (given_up == motions .and. .not. partial) then
+      call fail(error, exit_given_up, 'the motions of all '//to_text(motions)//' '//things//' were given up: nothing is known '// &
+                'of their ends (--partial: no error)')
+    else
+      call journal%line('given_up', '  given up: '//to_text(given_up)//' of '//to_text(motions)//' '//things, &
+                        '"given_up": '//to_text(given_up)//', "of": '//to_text(motions))
+    end if
+  end subroutine judge_given_up
+
+  !> Code 78 where the one motion that was asked for was given up, as `words` say, unless `partial` results are asked for.
+  pure subroutine judge_motion(reason, words, partial, error)
+    integer, intent(in) :: reason
+    character(len=*), intent(in) :: words
+    logical, intent(in) :: partial
+    type(error_t), allocatable, intent(out) :: error
+    if (is_given_up(reason) .and. .not. partial) call fail(error, exit_given_up, 'the motion was given up: '//words// &
+                                                           ' (--partial: no error)')
+  end subroutine judge_motion
 
 end module endings

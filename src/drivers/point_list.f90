@@ -7,7 +7,7 @@ module point_list
   use case_parameters, only: parameter_bounds
   use case_values, only: bounds_t
   use constants, only: unreachable
-  use contact_law, only: barrier_positions, contact_t
+  use contact_law, only: barrier_positions, beyond_barrier, contact_t
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_table, only: is_start_parameter, law_choice_t
@@ -164,7 +164,6 @@ contains
     real(wp), intent(in) :: default_ratio
     type(contact_t), intent(in) :: contact
     real(wp), allocatable, intent(out) :: row(:)
-    real(wp) :: barriers(2)
     type(error_t), allocatable, intent(out) :: error
     character(len=name_length) :: names(size(columns))
     character(len=:), allocatable :: where_found, word
@@ -186,8 +185,7 @@ contains
         return
       end if
     end do
-    barriers = barrier_positions(contact)
-    if (row(1) > barriers(1) .or. row(1) < barriers(2)) then
+    if (beyond_barrier(contact, row(1))) then
       call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))// &
                 ' m, allowed is '//between_barriers(contact))
     else if (columns(3) > 0 .and. .not. row(3) > 0) then

@@ -9,7 +9,7 @@ module points_driver
   use case_setup, only: grid_of, output_path, points_of_tile, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use endings, only: report_reasons
+  use endings, only: judge_reasons, report_reasons
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime, axis_dimension
   use fleet, only: prepare_flow
@@ -121,6 +121,8 @@ contains
       if (len(csv) > 0) call session%journal%line('written', 'wrote '//csv)
     end associate
     call report_reasons(session%journal, work%reasons)
+    call judge_reasons(session%journal, work%reasons, session%command%partial, error)
+    call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine end_points
 

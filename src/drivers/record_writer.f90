@@ -15,7 +15,7 @@ module record_writer
   use oscillator, only: oscillator_t
   use random, only: uniform
   use sampling, only: sample_positions
-  use status, only: exit_bad_case, reason_name
+  use status, only: exit_bad_case, exit_given_up, is_given_up, reason_name
   use text, only: to_text
   use text_table, only: table_t
   implicit none
@@ -45,7 +45,8 @@ contains
       x = observed(sensor, x)
     end associate
     if (reason /= 0) then
-      call fail(error, exit_bad_case, 'record: the motion was given up: '//reason_name(reason))
+      call fail(error, merge(exit_given_up, exit_bad_case, is_given_up(reason)), 'record: the motion ended early: '// &
+                reason_name(reason)//'; no record was written')
       return
     end if
     call measure(the_case%record, 0_int64, x)

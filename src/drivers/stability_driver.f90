@@ -8,16 +8,18 @@ module stability_driver
   use case_check, only: require_start
   use case_setup, only: options_of
   use command_line, only: command_t
+  use endings, only: judge_motion
   use errors, only: error_t
-  use exponents, only: motion_names, spectrum_t, type_of_motion, zero_one_test
+  use exponents, only: most_points, motion_names, spectrum_t, type_of_motion, zero_one_test
   use files, only: file_exists, is_special, is_text
   use journal, only: json_number, json_text
   use kinds, only: wp
   use launcher, only: launched_rank
   use machine_family, only: machine_neighbourhood
+  use more_periods, only: periods_needed
   use session, only: open_session, session_t
-  use stability_of_map, only: most_points, run_stability_of_map
-  use status, only: exit_done
+  use stability_of_map, only: needed_text, run_stability_of_map, why_not_known
+  use status, only: exit_done, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
@@ -78,18 +80,11 @@ contains
       else
         call session%journal%line('not_known', 'not known: '//why_not_known(spectrum))
       end if
+      call judge_motion(spectrum%reason, reason_name(spectrum%reason), command%partial, error)
     end if
+    call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine run_stability_of_case
-
-  !> Why nothing is known of the exponents of a motion.
-  pure function why_not_known(spectrum) result(why)
-    type(spectrum_t), intent(in) :: spectrum
-    character(len=:), allocatable :: why
-    why = 'the motion was given up, met an event tangentially, or rests where nothing holds it'
-    if (spectrum%at_rest) why = 'the motion comes to rest: after '//to_text(spectrum%passed)//' sections nothing is left that '// &
-      'turns round; the eigenvalues of an equilibrium are those that `separatrix branches` gives'
-  end function why_not_known
 
   !> What was found, with errors and the check.
   subroutine report(session, spectrum, has_clock, k)
@@ -97,7 +92,7 @@ contains
     type(spectrum_t), intent(in) :: spectrum
     logical, intent(in) :: has_clock
     real(wp), intent(in) :: k
-    character(len=:), allocatable :: name, what
+    character(len=:), allocatable :: name, what, more
     integer :: i
     do i = 1, size(spectrum%exponents)
       associate (value => spectrum%exponents(i), error => spectrum%errors(i))
@@ -119,12 +114,15 @@ contains
         ', "exact": '//json_number(spectrum%sum_exact))
     end if
     call session%journal%line('zero_one', '0-1 test: '//to_text(k, 3)//' (0 regular, 1 chaotic)', '"value": '//json_number(k))
+    more = ''
+    if (periods_needed(spectrum, k) > 0) more = ', "periods_needed": '//to_text(periods_needed(spectrum, k))
     name = trim(motion_names(type_of_motion(spectrum, k)))
     what = 'is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')
     if (spectrum%at_rest) what = 'comes to rest'
     call session%journal%line('motion', 'the motion '//what//', by '//to_text(spectrum%periods)// &
-      trim(merge(' drive periods', ' returns      ', has_clock))//' with '//to_text(spectrum%impacts)//' impacts', &
-      '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts))
+      trim(merge(' drive periods', ' returns      ', has_clock))//' with '//to_text(spectrum%impacts)//' impacts'// &
+      needed_text(spectrum, k), &
+      '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts)//more)
   end subroutine report
 
 end module stability_driver

@@ -9,8 +9,9 @@ module stability_of_map
   use case_setup, only: grid_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use endings, only: judge_given_up
   use errors, only: error_t, fail
-  use exponents, only: motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
+  use exponents, only: most_points, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
     motion_transient, period_of_section, spectrum_t, type_of_motion, zero_one_test
   use grid, only: grid_t, point_laws, point_slice, point_start
   use journal, only: journal_t, json_number, json_text
@@ -18,17 +19,16 @@ module stability_of_map
   use machine_family, only: machine_neighbourhood
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
-  use status, only: exit_bad_case, exit_usage
+  use more_periods, only: periods_needed, test_is_open
+  use status, only: exit_bad_case, exit_usage, is_given_up, reason_left_domain, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: run_stability_of_map
+  public :: needed_text, run_stability_of_map, why_not_known
 
-  !> Section points that the 0-1 test looks at, at most.
-  integer, parameter, public :: most_points = 5000
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
   !> Logarithm of the contraction over a period from which on points that are the same tell a cycle.
@@ -65,6 +65,7 @@ contains
     type(entry_t), allocatable :: entries(:)
     type(error_t), allocatable :: ignored
     integer :: i, total, datasets
+    integer(int64) :: given_up
     if (size(command%overrides) > 0) call fail(error, exit_usage, '--set belongs to a case: stability takes that of its map')
     if (len(command%draw) > 0) call fail(error, exit_usage, '--draw belongs to a case: stability MAP draws none')
     if (allocated(error)) return
@@ -80,9 +81,11 @@ contains
     call journal%line('entries', to_text(size(entries))//' of '//to_text(total)//' entries of the catalogue have no known period', &
                       '"without_period": '//to_text(size(entries))//', "attractors": '//to_text(total))
     if (command%validate .or. command%dry_run) return
+    given_up = 0
     do i = 1, size(entries)
-      call tell(journal, grid, the_case, entries(i), command%periods)
+      call tell(journal, grid, the_case, entries(i), command%periods, given_up)
     end do
+    call judge_given_up(journal, given_up, size(entries, kind=int64), 'entries', command%partial, error)
   end subroutine run_stability_of_map
 
   !> The case of a map, its grid, and the entries without a period among the `total`.
@@ -187,13 +190,14 @@ contains
     end do
   end subroutine look_for
 
-  !> Computes and tells what an entry is.
-  subroutine tell(journal, grid, the_case, entry, periods)
+  !> Computes and tells what an entry is; counts those whose motion was given up.
+  subroutine tell(journal, grid, the_case, entry, periods, given_up)
     type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(case_t), intent(in) :: the_case
     type(entry_t), intent(in) :: entry
     integer, intent(in) :: periods
+    integer(int64), intent(inout) :: given_up
     type(finding_t) :: found
     type(error_t), allocatable :: error
     character(len=:), allocatable :: name, words, data
@@ -209,6 +213,7 @@ contains
       call journal%line('entry', name//': not known: '//error%message, data//', "type": "not_known"')
       return
     end if
+    if (is_given_up(found%spectrum%reason)) given_up = given_up + 1
     words = name//': '//replace_all(trim(type_names(found%type)), '_', merge('-', ' ', found%type == quasi_periodic))
     data = data//', "type": '//json_text(trim(type_names(found%type)))
     if (found%period > 0) then
@@ -216,12 +221,45 @@ contains
       data = data//', "period": '//to_text(found%period)
     end if
     if (.not. found%spectrum%known) then
-      words = words//': the motion was given up, met an event tangentially, or rests where nothing holds it'
+      words = words//': '//why_not_known(found%spectrum)
     else
       call add_numbers(found, words, data)
+      if (found%type == not_known) then
+        words = words//needed_text(found%spectrum, found%zero_one)
+        data = data//', "periods_needed": '//to_text(periods_needed(found%spectrum, found%zero_one))
+      end if
     end if
     call journal%line('entry', words, data)
   end subroutine tell
+
+  !> What more periods would do for a motion that is not known, by the 0-1 test `k`; '' if that is not known either.
+  pure function needed_text(spectrum, k) result(text)
+    type(spectrum_t), intent(in) :: spectrum
+    real(wp), intent(in) :: k
+    character(len=:), allocatable :: text
+    integer :: periods
+    text = ''
+    periods = periods_needed(spectrum, k)
+    if (periods > 0) text = '; its errors need about '//to_text(periods)//' periods (--periods '//to_text(periods)//')'
+    if (test_is_open(spectrum, k) .and. spectrum%periods < most_points) text = '; the 0-1 test decides here, and takes up '// &
+      'to '//to_text(most_points)//' periods into account (--periods '//to_text(most_points)//')'
+  end function needed_text
+
+  !> Why nothing is known of the exponents of a motion.
+  pure function why_not_known(spectrum) result(why)
+    type(spectrum_t), intent(in) :: spectrum
+    character(len=:), allocatable :: why
+    if (spectrum%at_rest) then
+      why = 'the motion comes to rest: after '//to_text(spectrum%passed)//' sections nothing is left that '// &
+            'turns round; the eigenvalues of an equilibrium are those that `separatrix branches` gives'
+    else if (is_given_up(spectrum%reason)) then
+      why = 'the motion was given up: '//reason_name(spectrum%reason)
+    else if (spectrum%reason == reason_left_domain) then
+      why = 'the motion leaves the domain (run.domain)'
+    else
+      why = 'the motion met an event tangentially, or rests where nothing holds it'
+    end if
+  end function why_not_known
 
   !> Exponents with standard errors, their sum, the 0-1 test and what they are from.
   subroutine add_numbers(found, words, data)

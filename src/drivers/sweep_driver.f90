@@ -12,7 +12,7 @@ module sweep_driver
   use case_type, only: case_t
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
-  use endings, only: report_reasons
+  use endings, only: judge_given_up, report_reasons
   use errors, only: error_t
   use file_layout, only: add_map_variables, axis_dimension
   use grid, only: grid_t
@@ -23,10 +23,10 @@ module sweep_driver
   use map_schema, only: name_length, schema_t, type_float64
   use point_columns, only: point_values
   use session, only: describe_file, open_session, session_t
-  use status, only: exit_done, last_reason, reason_settled, reason_time_over
+  use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use strobe, only: strobe_t
   use sweep, only: hold_parameter, hold_t
-  use sweep_chain, only: chains_t, new_chains, run_chains
+  use sweep_chain, only: chains_t, hold_reason, new_chains, run_chains
   use sweep_report, only: describe_chains, report_given_up, report_limits
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -101,8 +101,28 @@ contains
       call check_written(session, path)
       call session%journal%line('written', 'wrote '//path)
     end if
+    call judge_sweep(session, work, chains)
     call session%end_with(exit_done)
   end subroutine run_sweep
+
+  !> Ends the program with code 78 where every hold of the runs and every one of the many starts was given up.
+  subroutine judge_sweep(session, work, chains)
+    type(session_t), intent(inout) :: session
+    type(branch_work_t), intent(in) :: work
+    type(chains_t), intent(in) :: chains
+    type(error_t), allocatable :: error
+    integer(int64) :: given_up, motions
+    integer :: i
+    given_up = sum(pack(work%reasons, is_given_up([(i, i=0, last_reason)])))
+    motions = sum(work%reasons)
+    do i = 1, 2
+      if (.not. chains%ran(i)) cycle
+      given_up = given_up + count(is_given_up(nint(chains%holds(hold_reason, :, i))))
+      motions = motions + size(chains%holds, 2)
+    end do
+    call judge_given_up(session%journal, given_up, motions, 'holds and starts', session%command%partial, error)
+    call session%stop_if(error)
+  end subroutine judge_sweep
 
   !> Says what would be done: holds of the runs, points of the many starts, bytes, time. Ends the program.
   subroutine tell_plan(session, work)

@@ -11,6 +11,7 @@ module trajectory_driver
   use command_line, only: command_t
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
+  use endings, only: judge_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
@@ -27,7 +28,7 @@ module trajectory_driver
   use session, only: describe_file, open_session, session_t
   use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
-  use status, only: exit_bad_case, exit_done, reason_event_budget, reason_name, reason_time_over
+  use status, only: exit_bad_case, exit_done, is_given_up, reason_event_budget, reason_name, reason_time_over
   use strobe, only: coordinates_of
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -107,6 +108,9 @@ contains
     call check_written(session, path)
     call report(session, moving, span, outcome, cycle, log)
     call report_files(session, command, path)
+    call judge_motion(outcome%reason, explained(outcome%reason)//' after '//to_text(recorded_until(log), 6)//' s of '// &
+                      to_text(span%duration, 6)//' s; '//path//' has what comes before', command%partial, error)
+    call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
 
@@ -340,8 +344,8 @@ contains
     type(log_t), intent(in) :: log
     associate (f => outcome%window, journal => session%journal, is_angle => position_is_angle(session%the_case%laws))
       if (outcome%reason /= reason_time_over) then
-        call journal%line('end', 'given up before the end: '//explained(outcome%reason)//'; '//to_text(log%events)// &
-          ' events recorded until then')
+        call journal%line('end', trim(merge('given up', 'ended   ', is_given_up(outcome%reason)))//' before the end: '// &
+          explained(outcome%reason)//'; '//to_text(log%events)//' events recorded until then')
         return
       end if
       call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
@@ -356,6 +360,14 @@ contains
         to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
     end associate
   end subroutine report
+
+  !> Time of the last sample or event [s].
+  pure real(wp) function recorded_until(log) result(time)
+    type(log_t), intent(in) :: log
+    time = 0
+    if (log%samples > 0) time = log%sample_data(1, log%samples)
+    if (log%events > 0) time = max(time, log%event_data(1, log%events))
+  end function recorded_until
 
   !> What steady values are taken over.
   pure function taken_over(moving, span, cycle) result(text)

@@ -14,6 +14,7 @@ module verify_driver
   use case_setup, only: grid_of, span_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use endings, only: judge_given_up, judge_motion
   use errors, only: error_t, fail
   use grid, only: grid_t, point_laws, point_slice, point_start
   use info_driver, only: count_codes
@@ -29,7 +30,7 @@ module verify_driver
   use restoring_law, only: position_is_angle
   use serial_team, only: serial_team_t
   use statistics, only: share_upper_limit
-  use status, only: exit_io, exit_uncertain, reason_settled
+  use status, only: exit_io, exit_uncertain, is_given_up, reason_code, reason_settled
   use stored_map, only: restore_catalogues
   use sweep_driver, only: sweep_axes
   use text, only: to_text
@@ -47,14 +48,14 @@ module verify_driver
 contains
 
   !> Verifies the file that `command` names. Code 74 naming what is wrong; 77 where the sample shows that more labels would
-  !> change than the command allows.
+  !> change than the command allows, 78 where all the motions were given up.
   subroutine run_verify(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
     type(reader_t) :: reader
     type(audit_t) :: audit
     type(journal_t) :: journal
-    character(len=:), allocatable :: kind, resolved
+    character(len=:), allocatable :: kind, resolved, reason
     type(case_t) :: the_case
     type(error_t), allocatable :: ignored
     character(len=128) :: no_overrides(0)
@@ -85,6 +86,8 @@ contains
         call audit_boundary(reader, journal, the_case, command%sample, command%seed, audit, error)
       case ('points')
         call audit_points(reader, the_case, command%sample, command%seed, audit, error)
+      case ('trajectory')
+        call reader%text_attribute('/', 'reason', reason, error)
       end select
     end if
     call reader%close(ignored)
@@ -93,6 +96,10 @@ contains
     if (audit%differing > 0) call fail(error, exit_io, "'"//command%path//"': "//to_text(audit%differing)// &
       ' of '//to_text(audit%points)//' points rerun differ from the file, first '//audit%first_difference)
     if (.not. allocated(error)) call judge_changes(command, audit, error)
+    if (allocated(error)) return
+    call judge_given_up(journal, int(audit%given_up, int64), int(audit%points, int64), 'points', command%partial, error)
+    if (allocated(reason)) call judge_motion(reason_code(reason), reason//'; the file is whole', command%partial, &
+                                             error)
   end subroutine run_verify
 
   !> Code 77 if the share of the sample whose label changes is above what is allowed. The share itself is judged, not its
@@ -198,6 +205,7 @@ contains
     integer :: k
     logical :: same, inferred
     audit%points = audit%points + 1
+    if (is_given_up(nint(values(3)))) audit%given_up = audit%given_up + 1
     inferred = .false.
     if (reader%has('/origin')) then
       call reader%read_block('/origin', place, spread(1_int64, 1, size(place)), stored, error)

@@ -7,7 +7,7 @@
 !> turns round, see `turn_section`.
 module strobe
   use body_section, only: body_at, body_point, coordinates_of_body, resumed_body, scales_of_body, start_of_body
-  use contact_law, only: barrier_positions
+  use contact_law, only: beyond_barrier
   use energy, only: energy_of_body, record_with_book
   use jointed_log, only: energy_of_jointed, log_sample, watched_state
   use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
@@ -124,19 +124,17 @@ contains
     end if
   end function start_strobe
 
-  !> Whether no body starts beyond a stop: x [m], v [m/s], crank angle [rad], and what may follow as in `start_strobe`.
+  !> Whether no body starts beyond a rigid stop: x [m], v [m/s], crank angle [rad], and what may follow as in `start_strobe`.
   pure logical function start_is_allowed(moving, start)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
     type(strobe_t) :: strobe
-    real(wp) :: barriers(2)
     if (allocated(moving%jointed)) then
       strobe = start_strobe(moving, start)
       start_is_allowed = .not. any(strobe%jointed%q /= strobe%jointed%q)
       if (start_is_allowed .and. has_driver(moving)) start_is_allowed = keeps_within(moving%jointed%machine, strobe%jointed)
     else
-      barriers = barrier_positions(moving%machine%contact)
-      start_is_allowed = start(1) <= barriers(1) .and. start(1) >= barriers(2)
+      start_is_allowed = .not. beyond_barrier(moving%machine%contact, start(1))
     end if
   end function start_is_allowed
 

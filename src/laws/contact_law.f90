@@ -10,16 +10,21 @@ module contact_law
   use curve_law, only: continued_at, curve_of, curve_t, integral_of, slope_of, value_at
   use elementary, only: exponential, logarithm
   use kinds, only: wp
-  use law_table, only: law_choice_t, list_of, value_of
+  use law_table, only: effect_family, law_choice_t, list_of, value_of
   use restitution_law, only: formula_damping, kelvin_voigt_ratio
   implicit none
   private
 
   public :: contact_of, add_to_contact, compliant_contact, force_table, contact_at_speed, barrier_positions, &
+    beyond_barrier, barriers_are_soft, &
     velocity_after_impact, restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
     contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6, contact_table = 7
+
+  !> Effects that make rigid barriers soft.
+  character(len=20), parameter, public :: softening(3) = [character(len=20) :: 'compliant_contact', 'kelvin_voigt_contact', &
+    'contact_curve']
 
   type, public :: contact_t
     integer :: kind = contact_constant
@@ -185,6 +190,25 @@ contains
     real(wp) :: positions(2)
     positions = [min(law%upper, law%soft_upper), max(law%lower, law%soft_lower)]
   end function barrier_positions
+
+  !> Whether `x` [m] is no place for a body: beyond a rigid barrier. Inside a soft one a body may be.
+  pure elemental logical function beyond_barrier(law, x)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: x
+    beyond_barrier = x > law%upper .or. x < law%lower
+  end function beyond_barrier
+
+  !> Whether the contact law and the effects of a case make its barriers soft.
+  pure logical function barriers_are_soft(choices) result(soft)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(contact_t) :: law
+    integer :: i
+    soft = .false.
+    do i = 1, size(choices)
+      if (choices(i)%family == 'contact') law = contact_of(choices(i), mass=1.0_wp)
+      soft = soft .or. law%soft .or. (choices(i)%family == effect_family .and. any(softening == choices(i)%name))
+    end do
+  end function barriers_are_soft
 
   !> v+ = -k v- [m/s].
   pure elemental real(wp) function velocity_after_impact(law, v)

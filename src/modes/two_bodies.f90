@@ -39,7 +39,7 @@ contains
     at = findloc(is_stop(machine%joints%kind), .true., 1)
   end function contact_at
 
-  !> Whether the watched body is between its stops, soft ones too, but for rounding.
+  !> Whether the watched body is between its stops, if these are rigid, but for rounding.
   pure logical function keeps_within(machine, state)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(in) :: state
@@ -49,6 +49,7 @@ contains
     keeps_within = .true.
     j = contact_at(machine)
     if (j == 0) return
+    if (machine%joints(j)%kind /= joint_contact) return
     associate (joint => machine%joints(j))
       turning = turning_at(machine%frequency, state%time, size(turning))
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)

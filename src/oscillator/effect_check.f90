@@ -3,7 +3,7 @@
 
 !> Which effects the laws of a machine have a place for.
 module effect_check
-  use contact_law, only: force_table
+  use contact_law, only: force_table, softening
   use curve_law, only: is_positive, knots_problem, most_knots
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
@@ -105,11 +105,10 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     character(len=*), intent(in) :: but
     character(len=:), allocatable :: name
-    character(len=20), parameter :: soft(3) = [character(len=20) :: 'compliant_contact', 'kelvin_voigt_contact', 'contact_curve']
     integer :: i
     name = ''
-    do i = 1, size(soft)
-      if (soft(i) /= but .and. has_effect(choices, soft(i))) name = trim(soft(i))
+    do i = 1, size(softening)
+      if (softening(i) /= but .and. has_effect(choices, softening(i))) name = trim(softening(i))
     end do
   end function soft_effect
 

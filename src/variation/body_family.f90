@@ -12,7 +12,7 @@ module body_family
   use motion, only: advance_period, motion_t, start_state
   use motion_state, only: log_t, mode_stick, open_log, options_t, reset_tally, state_t, tally_t
   use one_body, only: mode_of_body, one_body_of, one_body_t, why_not_varied
-  use status, only: exit_bad_case
+  use status, only: exit_bad_case, reason_not_smooth
   use text, only: to_text
   use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
   implicit none
@@ -206,31 +206,32 @@ contains
   end subroutine fly_periods
 
   !> Moves a body to the next section, from one or from where it is: derivatives of its state there by that before, and the
-  !> events on the way. `log` is the caller's, opened once, and holds them too. `ok` is false if the trajectory had to be given
-  !> up or the derivatives are not known.
-  pure subroutine vary_period(machines, body, state, log, events, by_start, ok)
+  !> events on the way. `log` is the caller's, opened once, and holds them too. `reason` is 0 but where the trajectory had to
+  !> be given up or the derivatives are not known (module `status`).
+  pure subroutine vary_period(machines, body, state, log, events, by_start, reason)
     type(neighbourhood_t), intent(in) :: machines
     type(one_body_t), intent(in) :: body
     type(state_t), intent(inout) :: state
     type(log_t), intent(inout) :: log
     type(event_t), allocatable, intent(out) :: events(:)
     real(wp), intent(out) :: by_start(2, 2)
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     type(state_t) :: start
     type(tally_t) :: tally
-    integer :: reason, mode
+    logical :: ok
+    integer :: mode
     by_start = 0
     log%events = 0
     log%origin = 0
     start = state
     call advance_period(body%moving, state, tally, reason, log)
-    ok = reason == 0
-    if (.not. ok) return
+    if (reason /= 0) return
     call events_of_body(body, start, log, state, .false., events, mode)
-    ok = .not. rests_unheld(body, start%mode, events)
-    if (.not. ok) return
+    reason = reason_not_smooth
+    if (rests_unheld(body, start%mode, events)) return
     call vary(machines, mode_of_body(body, start), [start%x, start%v], events, body%period, likeness*body%size_of, by_start, ok, &
               t_start=start%time)
+    if (ok) reason = 0
   end subroutine vary_period
 
   !> Mode after the last event of a motion that began in `mode`.

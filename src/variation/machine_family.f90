@@ -108,7 +108,8 @@ contains
       allocate (events(8))
       count_events = 0
       lasted = 0
-      call advance_section(machine, jointed, lasted, events, count_events, tally, ok, certain)
+      call advance_section(machine, jointed, lasted, events, count_events, tally, reason, certain)
+      ok = reason == 0
       events = events(:count_events)
       if (ok) point = coordinates_of(machine, jointed)
     end select

@@ -138,23 +138,23 @@ contains
   end subroutine advance_to_section
 
   !> Flies a structure on over one section: the transitions become events, whose times count on from `offset` [s], which becomes the
-  !> time of the section. `ok` is false if the motion had to be given up, `certain` where a transition is not known to be smooth.
-  pure subroutine advance_section(structure, state, offset, events, count_events, tally, ok, certain)
+  !> time of the section. `reason` is not 0 if the motion had to be given up, `certain` false where a transition is not known to be
+  !> smooth.
+  pure subroutine advance_section(structure, state, offset, events, count_events, tally, reason, certain)
     type(structure_t), intent(in) :: structure
     type(jointed_state_t), intent(inout) :: state
     real(wp), intent(inout) :: offset
     type(event_t), allocatable, intent(inout) :: events(:)
     integer, intent(inout) :: count_events
     type(tally_t), intent(inout) :: tally
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     logical, intent(inout) :: certain
     type(transitions_t) :: transitions
     type(event_t), allocatable :: more(:)
     real(wp) :: lasted
-    integer :: reason, i
+    integer :: i
     call advance_to_section(structure, state, lasted, tally, reason, transitions)
-    ok = reason == 0
-    if (.not. ok) return
+    if (reason /= 0) return
     if (count_events + transitions%count > size(events)) then
       allocate (more(2*(count_events + transitions%count)))
       more(:count_events) = events(:count_events)
@@ -184,7 +184,7 @@ contains
     type(jointed_state_t) :: state
     type(state_t) :: watched
     real(wp) :: offset
-    integer :: i, count_events
+    integer :: i, count_events, reason
     logical :: smooth
     image = point
     allocate (events(8))
@@ -199,7 +199,8 @@ contains
       watched%v = state%v(structure%frame%moving%machine%watched)
       call reset_tally(tally, watched, .false.)
       do i = 1, sections
-        call advance_section(structure, state, offset, events, count_events, tally, ok, smooth)
+        call advance_section(structure, state, offset, events, count_events, tally, reason, smooth)
+        ok = reason == 0
         if (.not. ok) exit
       end do
     end if

@@ -95,7 +95,7 @@ def test_codes_add_up(separatrix, tmp_path, figures, long_if, name):
     # Without [sweep], whose bounds would have to follow.
     life.write_case(tmp_path, CASE[: CASE.index("[sweep]")])
     settings = [word for setting in CASES[name] for word in ("--set", setting)]
-    command = ["basin", "case.toml", *MAP, *settings, "-o", life.NAME]
+    command = ["basin", "case.toml", *MAP, *settings, "--partial", "-o", life.NAME]
     outcome = life.run(separatrix, *command, folder=tmp_path, timeout=20)
     assert outcome.code == 0, outcome
     with h5py.File(tmp_path / life.NAME) as file:

@@ -99,8 +99,9 @@ def test_a_very_stiff_stop_that_moves(separatrix, tmp_path):
 
 def test_a_motion_given_up_at_once(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(PAIR + "[integrator]\nevent_budget = 1\n")
-    told = succeed(separatrix, "trajectory", "case.toml", "--set", "body.blow=1", folder=tmp_path).out
-    assert "given up before the end: event_budget (flights count" in told
+    outcome = run(separatrix, "trajectory", "case.toml", "--set", "body.blow=1", folder=tmp_path)
+    assert outcome.code == 78
+    assert "given up before the end: event_budget (flights count" in outcome.out
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file["time"].size == 0
         assert file.attrs["reason"] == "event_budget"
@@ -110,12 +111,15 @@ def test_a_motion_given_up_at_once(separatrix, tmp_path):
 
 def test_a_stiff_barrier_ends_by_the_step_budget(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(SOFT)
-    told = succeed(separatrix, "trajectory", "case.toml", folder=tmp_path).out
+    outcome = run(separatrix, "trajectory", "case.toml", folder=tmp_path)
+    told = outcome.out
+    assert outcome.code == 78
     assert "so stiff that integrator.step_budget = 20000 lasts" in told
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file.attrs["reason"] == "step_budget"
     (tmp_path / "list.csv").write_text("x0,v0\n0,0.5\n0.01,0\n")
-    succeed(separatrix, "points", "case.toml", "--list", "list.csv", "-o", "points.h5", folder=tmp_path)
+    words = ["points", "case.toml", "--list", "list.csv", "-o", "points.h5", "--partial"]
+    assert "given up: 2 of 2 points" in succeed(separatrix, *words, folder=tmp_path).out
     with h5py.File(tmp_path / "points.h5") as file:
         assert file["reason"][()].tolist() == [7, 7]
 

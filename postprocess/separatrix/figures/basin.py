@@ -113,9 +113,9 @@ def basin_map(
         inset.frame(figure, *grid, part, axes)
     if look.attractors and field in ("attractor", "regime", "settle_time") and {down, across} == {"x0", "v0"}:
         places = chosen + chosen[: len(grid) - len(panels)]
-        marked = marks.draw(grid, whole, result, across, others, places, look)
+        marked, lacking = marks.draw(grid, whole, result, across, others, places, look)
         handles = [marks.on_legend(handle, marked) for handle in handles]
-        caption += ["markers: points of the attractors on the section"] if marked else []
+        caption += ["markers: points of the attractors on the section", *lacking] if marked else []
         if section.coordinates(result) > 2:
             caption.append("attractors are not marked: they have more coordinates than the picture")
     caption += _count_caption(result, field, panels, len(places_of_all), look)

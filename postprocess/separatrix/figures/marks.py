@@ -16,6 +16,7 @@ from separatrix.figures import section
 from separatrix.figures.look import Look
 
 _MARKS = "osD^vP*X"
+_MOST_NOTES = 4
 
 
 def shaded(
@@ -54,9 +55,10 @@ def draw(
     others: list[str],
     places: list[tuple],
     look: Look,
-) -> dict[int, dict]:
-    """Mark the points of each attractor on the section of the map; return how, by label."""
+) -> tuple[dict[int, dict], list[str]]:
+    """Mark the points of each attractor on the section; return how, by label, and what the picture lacks."""
     marked: dict[int, dict] = {}
+    lacking: dict[str, None] = {}
     for ax, place in zip(grid, places, strict=True):
         # The place in the whole result: the catalogue counts its slices.
         at = {}
@@ -75,12 +77,29 @@ def draw(
                 "markeredgecolor": "black",
             }
             drawn |= {"linestyle": "", "markeredgewidth": 0.6, "zorder": 5}
+            lacking |= dict.fromkeys(_not_shown(whole, identity, x, v))
             x, v = x * look.factor("m"), v * look.factor("m/s")
             ax.plot(*((x, v) if across == "x0" else (v, x)), **drawn)
             marked[identity] = drawn
         ax.set_xlim(limits[0])
         ax.set_ylim(limits[1])
-    return marked
+    notes = list(lacking)
+    if len(notes) > _MOST_NOTES:
+        notes = [*notes[:_MOST_NOTES], f"and so of {len(notes) - _MOST_NOTES} more"]
+    return marked, notes
+
+
+def _not_shown(whole: xr.Dataset, identity: int, x: np.ndarray, v: np.ndarray) -> list[str]:
+    """Say how many points of an attractor the map has no place for."""
+    if not np.isfinite(x).all():
+        return [f"points of attractor {identity}: not known"]
+    outside = np.zeros(x.size, bool)
+    for name, values in (("x0", x), ("v0", v)):
+        axis = whole[name].values
+        outside |= (values < axis.min()) | (values > axis.max())
+    if not outside.any():
+        return []
+    return [f"attractor {identity}: {outside.sum()} of {x.size} points outside of the map"]
 
 
 def on_legend(handle: Patch, marked: dict[int, dict]) -> Patch | Line2D:

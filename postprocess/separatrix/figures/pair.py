@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 
 from separatrix import style
 from separatrix.figures.caption import describe_case, resolved_case, version_text
+from separatrix.given_up import given_up_text, reason_of
 from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -119,6 +120,6 @@ def caption(result: xr.Dataset) -> list[str]:
     """Return the bodies, their regime, and the version of the program."""
     return [
         *describe_case(result),
-        f"regime: {flag_text(str(result.attrs['regime']))}",
+        given_up_text(result) if reason_of(result) else f"regime: {flag_text(str(result.attrs['regime']))}",
         plain(version_text(result)),
     ]

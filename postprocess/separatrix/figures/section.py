@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix import simulate
-from separatrix.errors import CaseError
+from separatrix.errors import CaseError, SeparatrixError
 from separatrix.figures.caption import resolved_case
 from separatrix.library import Model
 from separatrix.open import table
@@ -23,7 +23,7 @@ _PLANE = 2
 def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Yield label, positions and velocities of each periodic attractor of one slice.
 
-    They are those at the crank angle of the starts. `place`: the position on the axes that are not x0 and v0.
+    They are those at the crank angle of the starts, not numbers where they cannot be computed. `place`: the position on the axes that are not x0 and v0.
     Nothing comes of several bodies, whose section has more coordinates, of a file without a case, and without
     the library.
     """
@@ -48,10 +48,19 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
             entry = {name: catalogue[name].values[row] for name in ("attractor", "period", "x", "v")}
             if 0 < entry["period"] <= _LONGEST:
                 point = float(entry["x"]), float(entry["v"])
-                found = simulate.section_points(model, point, int(entry["period"]), angle, values)
-                yield (int(entry["attractor"]), *found.T)
+                yield (int(entry["attractor"]), *_flown(model, point, int(entry["period"]), angle, values))
     except (CaseError, KeyError):
         return
+
+
+def _flown(
+    model: Model, point: tuple[float, float], period: int, angle: float, values: Mapping[str, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities of a cycle; not numbers where it cannot be computed."""
+    try:
+        return tuple(simulate.section_points(model, point, period, angle, values).T)
+    except SeparatrixError:
+        return np.full(period, np.nan), np.full(period, np.nan)
 
 
 def coordinates(result: xr.Dataset) -> int:

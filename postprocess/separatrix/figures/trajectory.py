@@ -12,9 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
+from separatrix.errors import SeparatrixError
 from separatrix.figures import contact, energy, impacts, pair
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
+from separatrix.given_up import given_up_text, reason_of
 from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -36,6 +38,8 @@ _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
     """Return the figures of a trajectory file by name."""
     look.require("trajectory", "units")
+    if result.sizes["time"] <= 1:
+        raise SeparatrixError(f"found {result.sizes['time']} samples, a figure needs two or more")
     given, result = result, _in_units(result, look)
     two_bodies = "driver_x" in result
     made = {"history": pair.history(result, title) if two_bodies else time_history(result, title, look)}
@@ -253,6 +257,8 @@ def _barrier_handle(result: xr.Dataset) -> list[Line2D]:
 def _caption(result: xr.Dataset, look: Look) -> list[str]:
     attributes = result.attrs
     pieces = caption_pieces(result, look, describe_case(result))
+    if reason_of(result):
+        return [*pieces, _start_text(result, look), given_up_text(result), plain(version_text(result))]
     pieces += [_start_text(result, look), f"steady motion: {_regime_text(attributes['regime'])}"]
     pieces.append(f"amplitude {attributes['amplitude']:.4g} {unit(result['x'])}")
     pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} {unit(result['v'])}")

@@ -9,8 +9,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import xarray as xr
+
 from separatrix.arguments import Parser, list_of, pairs, positive, whole_number
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
+from separatrix.given_up import refuse
 from separatrix.measuring.along import measures_along
 from separatrix.measuring.api import NAMES, measures, tipping
 from separatrix.measuring.tipping import Tipping
@@ -47,6 +50,13 @@ def _check(options: argparse.Namespace) -> None:
         raise SeparatrixError("--along: needs -o FILE.h5", USAGE)
 
 
+def _judge(options: argparse.Namespace, *results: xr.Dataset) -> None:
+    """Refuse maps all of whose points were given up, unless they are asked for."""
+    for path, result in zip(options.files, results, strict=True):
+        if not options.partial:
+            refuse(path, result)
+
+
 def _answer(options: argparse.Namespace) -> str:
     if options.tipping:
         with (
@@ -54,9 +64,11 @@ def _answer(options: argparse.Namespace) -> str:
             open_result(options.files[0]) as one,
             open_result(options.files[1]) as two,
         ):
+            _judge(options, one, two)
             matrix = tipping(one, two)
         return _written(options, tipping_text(matrix), tipping_dict(matrix))
     with reading(options.files[0]), open_result(options.files[0]) as result:
+        _judge(options, result)
         given = {
             "attractors": options.attractor,
             "frequency": options.frequency,
@@ -128,7 +140,8 @@ def _parser() -> Parser:
         prog="separatrix-measures",
         description="Measure the basins of a map: how safe, how large, how entangled; with intervals "
         "and limits.",
-        epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write.",
+        epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write, "
+        "78 every motion was given up.",
     )
     parser.add_argument("files", metavar="MAP", nargs="+", type=Path, help="basin file (.h5)")
     parser.add_argument(
@@ -136,6 +149,9 @@ def _parser() -> Parser:
         metavar="LIST",
         type=list_of([*NAMES, "all"]),
         help=f"all, or some of {', '.join(NAMES)} [those that take seconds]",
+    )
+    parser.add_argument(
+        "--partial", action="store_true", help="measure a map also if all its points were given up"
     )
     parser.add_argument(
         "--attractor", metavar="N", type=whole_number(1), help="the basin of this attractor alone [all]"

@@ -54,7 +54,7 @@ class Machine:
         self, start: tuple[float, float, float], values: Mapping[str, float], duration: float, samples: int
     ) -> Motion:
         """Fly one motion; `duration` [s] and `samples` a drive period are those of the case if 0."""
-        return trajectory(self.model, start, values, duration, samples)
+        return trajectory(self.model, start, values, duration, samples, partial=True)
 
     def period(self, values: Mapping[str, float]) -> float:
         """Return the drive period [s]."""

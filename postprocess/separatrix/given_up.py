@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results whose motions were given up: code 78, as the program ends where it makes one."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from separatrix.errors import GIVEN_UP, SeparatrixError
+from separatrix.variables import REASONS
+
+GIVEN_UP_REASONS = ("not_finite", "event_budget", "step_failed", "step_budget")
+_CODES = [REASONS.index(name) for name in GIVEN_UP_REASONS]
+
+
+def reason_of(result: xr.Dataset) -> str:
+    """Why the motion of a trajectory was given up; '' if it was not, and of other results."""
+    reason = str(result.attrs.get("reason", ""))
+    return reason if result.attrs.get("kind") == "trajectory" and reason in GIVEN_UP_REASONS else ""
+
+
+def given_up_text(result: xr.Dataset) -> str:
+    """What a caption says of a motion that was given up."""
+    time = result["time"].values
+    return f"given up after {time[-1] if time.size else 0.0:.6g} s: {reason_of(result).replace('_', ' ')}"
+
+
+def refuse(path: Path, result: xr.Dataset) -> None:
+    """Raise a SeparatrixError of code 78 where every motion of a result was given up."""
+    reason = reason_of(result)
+    if reason:
+        raise SeparatrixError(
+            f"{path}: the motion was given up: {reason} (--partial: as far as it went)", GIVEN_UP
+        )
+    found = [result[name].values for name in ("reason", "branch_reason") if name in result]
+    points = sum(values.size for values in found)
+    if points and all(np.isin(values, _CODES).all() for values in found):
+        raise SeparatrixError(
+            f"{path}: the motions of all {points} points were given up (--partial: no error)", GIVEN_UP
+        )
