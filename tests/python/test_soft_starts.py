@@ -5,9 +5,9 @@
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from program import run, succeed
 from scipy.integrate import solve_ivp
-import separatrix as sx
 from separatrix import simulate
 from separatrix.library import CaseError, Model
 
@@ -79,7 +79,10 @@ def one_body(law: str, side: int) -> str:
 
 def in_parts(law: str, side: int) -> str:
     """The same as a machine in parts: the foot of the spring is a force."""
-    return PARTS + f'[contact.wall]\nbetween = ["block"]\n{law}\n{"upper" if side > 0 else "lower"} = {side * GAP}\n'
+    return (
+        PARTS
+        + f'[contact.wall]\nbetween = ["block"]\n{law}\n{"upper" if side > 0 else "lower"} = {side * GAP}\n'
+    )
 
 
 def referee(force, side: int, x0: float, v0: float) -> tuple[float, float]:
@@ -181,7 +184,12 @@ def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeyp
         settings += ["--set", "run.duration=15"]
         succeed(separatrix, "basin", "case.toml", *settings, "-o", f"{run_with}.h5", folder=tmp_path)
         with h5py.File(tmp_path / f"{run_with}.h5") as file:
-            maps.append({key: file[key][()] for key in ("attractor", "reason", "amplitude", "v_max", "impacts_per_period")})
+            maps.append(
+                {
+                    key: file[key][()]
+                    for key in ("attractor", "reason", "amplitude", "v_max", "impacts_per_period")
+                }
+            )
     assert (maps[0]["reason"] <= 2).all()
     for key, values in maps[0].items():
         np.testing.assert_array_equal(values, maps[1][key], err_msg=key)
