@@ -11,7 +11,7 @@ module part_reader
   use kinds, only: wp
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, set_value, value_of
-  use part_names, only: check_columns, check_names, ground, names_of
+  use part_names, only: check_columns, check_names, ground, is_table, names_of
   use structure_reader, only: read_structure
   use suggest, only: nearest_word
   use text, only: join, number_in, to_text
@@ -33,7 +33,7 @@ module part_reader
 
 contains
 
-  !> Whether a case has tables [body.NAME] or [structure.NAME]. A table in the place of a key of [body] is none.
+  !> Whether a case has tables [body.NAME] or [structure.NAME]; a body may have the name of a key of [body].
   pure logical function has_parts(source)
     type(case_source_t), intent(in) :: source
     character(len=label_length), allocatable :: names(:)
@@ -41,6 +41,7 @@ contains
     has_parts = .false.
     names = names_of(source, 'body')
     do i = 1, size(names)
+      has_parts = has_parts .or. is_table(source, 'body.'//trim(names(i)))
       if (.not. any(parameters%family == 'body' .and. parameters%name == names(i))) has_parts = .true.
     end do
     if (size(names_of(source, 'structure')) > 0) has_parts = .true.
