@@ -61,7 +61,8 @@ def test_a_record_is_its_harmonics(separatrix, tmp_path):
 
 def test_one_file_has_one_period(separatrix, tmp_path):
     """A record of one body and of parts: a last sample that is the first once more begins the next period."""
-    one = '[body]\nmass = 1\n[restoring]\nlaw = "linear"\nstiffness = 4\n[friction]\nlaw = "viscous"\ndamping = 0.3\n'
+    one = '[body]\nmass = 1\n[restoring]\nlaw = "linear"\nstiffness = 4\n'
+    one += '[friction]\nlaw = "viscous"\ndamping = 0.3\n'
     one += '[drive]\nlaw = "measured_force"\nforce = "force.csv"\n'
     parts = '[body.ball]\nmass = 1\n[spring.s]\nbetween = ["ball"]\nstiffness = 4\ndamping = 0.3\n'
     parts += '[drive.f]\nlaw = "force"\nbody = "ball"\nrecord = "force.csv"\n'

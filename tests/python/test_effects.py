@@ -66,7 +66,7 @@ def test_measured_force_drives_what_it_was_measured_on(separatrix, tmp_path):
 
 
 def test_samples_of_a_force_repeat_as_one_period(separatrix, tmp_path):
-    """The first sample follows the last, which is said; a record that ends with its last is to be stated, and jumps."""
+    """The first sample follows the last, which is said; one that ends with its last jumps, and is stated."""
     samples = [round(float(x), 12) for x in np.cos(2 * np.pi * np.arange(20) / 20)]
     text = (
         "[body]\nmass = 1\n[restoring]\nlaw = 'linear'\nstiffness = 4\n"

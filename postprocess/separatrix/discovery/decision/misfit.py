@@ -61,10 +61,9 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
     ]
 
 
-def unused(data: Data, fit: Fit) -> list[str]:
-    """Return in words how many segments of each record a machine is not judged by."""
+def unused(data: Data, fit: Fit, contacts: bool) -> list[str]:
+    """Return in words how many segments of each record a machine, with contacts or none, is not judged by."""
     record, evaluation = data.stages[data.last].record, fit.evaluation
-    contacts = any(path.startswith("contact.") for path in fit.problem.model.parameters)
     notes = []
     for number, one in enumerate(data.prepared):
         here = record == number
