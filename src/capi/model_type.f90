@@ -113,6 +113,8 @@ contains
     else
       call set_value(laws(drive_law), 'interval', [interval])
       call set_value(laws(drive_law), 'force', force)
+      ! A record from its first sample to its last, however that of the case repeats.
+      call set_value(laws(drive_law), 'periodic', [0.0_wp])
     end if
   end subroutine laws_with_force
 

@@ -5,11 +5,13 @@
 !> line each: `FILE:LINE: key 'friction.damping': found ..., allowed ...`.
 module case_reader
   use angle_units, only: unit_of
+  use assumptions, only: assumed_by_default
   use attractors, only: longest_period
+  use axis, only: name_length
   use axis_reader, only: read_axes, read_sweep
   use case_check, only: check_case
   use case_echo, only: echo_case
-  use case_source, only: case_source_t, enter_table, open_source, origin_of, problems_of, report_unknown
+  use case_source, only: assume, case_source_t, enter_table, open_source, origin_of, problems_of, report_unknown
   use case_type, only: case_t
   use case_values, only: any_number, at_least, between, more_than, take_choice, take_integer, take_real, take_text
   use errors, only: error_t
@@ -78,6 +80,8 @@ contains
     call problems_of(source, error)
     if (allocated(error)) return
     the_case%resolved_text = echo_case(the_case)
+    call assume(source, assumed_by_default(source, the_case%laws, [character(len=name_length) :: the_case%axes%name]))
+    the_case%assumed = source%assumed
   end subroutine load_case_text
 
   subroutine read_start(source, the_case)

@@ -14,7 +14,7 @@ module case_source
   implicit none
   private
 
-  public :: open_source, find, origin_of, list_size, know, know_all_below, enter_table, report, forgive_missing, &
+  public :: open_source, find, origin_of, list_size, know, know_all_below, enter_table, report, assume, forgive_missing, &
     report_unknown, problems_of, description, has_problems
 
   type :: problem_t
@@ -35,6 +35,8 @@ module case_source
     !> Paths of the keys that may occur.
     character(len=path_length), allocatable :: known(:)
     type(problem_t), allocatable :: problems(:)
+    !> What its readers decided that it does not say, parted by semicolons.
+    character(len=:), allocatable :: assumed
     !> Reads HDF5 files of structures, where the program can.
     procedure(structure_file_reader), pointer, nopass :: structure_file => null()
   end type case_source_t
@@ -49,6 +51,7 @@ contains
     type(toml_entry_t), allocatable :: entries(:)
     integer :: i
     source%name = name
+    source%assumed = ''
     allocate (source%known(0), source%problems(0))
     call read_toml(text, name, entries, error)
     if (allocated(error)) return
@@ -114,6 +117,14 @@ contains
       if (is_or_is_below(source%entries(i)%entry%path, path)) call know(source, source%entries(i)%entry%path)
     end do
   end subroutine know_all_below
+
+  !> Notes what is assumed where the source says nothing.
+  pure subroutine assume(source, what)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: what
+    if (len(source%assumed) > 0 .and. len(what) > 0) source%assumed = source%assumed//'; '
+    source%assumed = source%assumed//what
+  end subroutine assume
 
   !> Whether the table `path` is in the source; anything else under that name is a problem.
   subroutine enter_table(source, path, found)

@@ -104,6 +104,8 @@ module case_type
     character(len=:), allocatable :: path, raw_text
     !> The case with every default filled in, itself a case file.
     character(len=:), allocatable :: resolved_text
+    !> Defaults that change the physics, for the log.
+    character(len=:), allocatable :: assumed
     !> One law per family, in the order of `families`, then the effects.
     type(law_choice_t), allocatable :: laws(:)
     type(start_t) :: start

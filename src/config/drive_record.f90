@@ -2,11 +2,12 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A measured force on a body of several: record = "FILE.csv" of a [drive.NAME], in the place of its frequency and series. The
-!> record is one period; what its harmonics leave is told.
+!> record is one period, by the rule of one body: a last sample that is the first once more begins the next.
 module drive_record
-  use case_source, only: case_source_t, find, know, report
+  use case_source, only: assume, case_source_t, find, know, report
   use case_values, only: take_integer, take_text
   use constants, only: two_pi
+  use drive_law, only: ends_with_its_first
   use elementary, only: sine_cosine
   use force_record, only: read_force
   use kinds, only: wp
@@ -34,11 +35,14 @@ contains
     real(wp), allocatable :: force(:), cosine(:), sine(:)
     real(wp) :: interval, mean, left
     integer :: harmonics, i
+    logical :: harmonics_said
     found = find(source, path//'.record') > 0
     if (.not. found) return
     file = ''
     call take_text(source, path//'.record', file)
     harmonics = usual_harmonics
+    call know(source, path//'.periodic')
+    harmonics_said = find(source, path//'.harmonics') > 0
     call take_integer(source, path//'.harmonics', 1, harmonics, highest=most_harmonics)
     do i = 1, size(others)
       call know(source, path//'.'//trim(others(i)))
@@ -51,12 +55,18 @@ contains
     if (allocated(problem)) then
       call report(source, path//'.record', problem)
       return
-    else if (size(force) < 3) then
-      call report(source, path//'.record', 'found '//to_text(size(force))//' samples, allowed 3 or more: one period')
+    end if
+    call take_one_period(source, path, force)
+    if (size(force) < 3) then
+      call report(source, path//'.record', 'found '//to_text(size(force))//' samples of one period, allowed 3 or more')
       return
     end if
     call series_of(force, min(harmonics, (size(force) - 1)/2), mean, cosine, sine, left)
-    if (left > most_left .and. find(source, path//'.harmonics') == 0) then
+    if (find(source, path//'.periodic') == 0) call assume(source, path//'.record has the period '// &
+                                                         to_text(interval*size(force), 6)//' s')
+    if (.not. harmonics_said) call assume(source, path//'.harmonics = '//to_text(size(cosine))//' (they leave '// &
+                                          to_text(100*left, 2)//' %)')
+    if (left > most_left .and. .not. harmonics_said) then
       call report(source, path//'.record', 'found a record of which '//to_text(usual_harmonics)//' harmonics leave '// &
                   to_text(nint(100*left))//' %, allowed with the number of harmonics said: '//path//'.harmonics, 1 to '// &
                   to_text(most_harmonics))
@@ -66,6 +76,24 @@ contains
     call set_value(choice, 'cosine', cosine)
     call set_value(choice, 'sine', sine)
   end subroutine read_record
+
+  !> Keeps the samples of one period: all, or without a last one that is the first once more. With `periodic` = 0 the period ends
+  !> with the last sample, whatever it is, in the middle between it and the first.
+  subroutine take_one_period(source, path, force)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    real(wp), allocatable, intent(inout) :: force(:)
+    integer :: periodic
+    logical :: closed
+    closed = ends_with_its_first(force)
+    periodic = merge(0, 1, closed)
+    call take_integer(source, path//'.periodic', 0, periodic, highest=1)
+    if (periodic == 1 .and. closed) call report(source, path//'.periodic', 'found 1 with the first sample, '// &
+      to_text(force(1))//' N, once more at the end of the record; allowed without it, or 0')
+    if (periodic == 1) return
+    force(1) = (force(1) + force(size(force)))/2
+    force = force(:size(force) - 1)
+  end subroutine take_one_period
 
   !> Mean and harmonics of samples at equal steps over one period, and the root mean square of what they leave, as a share of
   !> that of the samples about their mean.

@@ -7,7 +7,7 @@ module law_check
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
-  use drive_law, only: same_force
+  use drive_law, only: ends_with_its_first
   use effect_check, only: refuse_effects
   use errors, only: error_t
   use jointed, only: jointed_t
@@ -106,7 +106,7 @@ contains
         call report(source, 'drive.periodic', 'found '//to_text(periodic)//', allowed 0 or 1'//at)
       else if (size(force) < 2) then
         call report(source, 'drive.force', 'found '//to_text(size(force))//' samples, allowed two or more')
-      else if (periodic > 0 .and. .not. abs(force(size(force)) - force(1)) > same_force*maxval(abs(force))) then
+      else if (periodic > 0 .and. ends_with_its_first(force)) then
         call report(source, 'drive.periodic', 'found 1 with the first sample, '//to_text(force(1))// &
                     ' N, once more at the end of drive.force; allowed without it, or 0'//at)
       end if

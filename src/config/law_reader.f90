@@ -4,14 +4,19 @@
 !> The tables [body], [restoring], [friction], [contact], [drive] and [effect.NAME], read by the law table.
 module law_reader
   use case_parameters, only: find_parameter, row_bounds
-  use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, report
+  use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_real, take_reals, take_text
+  use drive_law, only: ends_with_its_first
   use force_record, only: read_force
   use kinds, only: wp
+  use part_names, only: is_table
   use part_reader, only: has_parts, read_parts
-  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, law_names, laws, parameter_row_t, &
-    parameters_of, set_value, table_of
+  use law_row, only: law_length
+  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, &
+    parameter_row_t, parameters_of, set_value, table_of
+  use pair_rows, only: pair_laws
   use suggest, only: nearest_word
+  use text, only: join
   use toml_bindings, only: toml_string
   implicit none
   private
@@ -25,11 +30,12 @@ contains
   subroutine read_laws(source, choices)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), allocatable, intent(out) :: choices(:)
+    character(len=law_length) :: body
     integer :: i
     allocate (choices(size(families)))
     if (has_parts(source)) then
       choices(1) = law_choice('body', 'structure')
-      call read_parameters(source, choices(1))
+      if (.not. is_table(source, 'body.in_sequence')) call read_parameters(source, choices(1))
       do i = 2, size(families)
         choices(i) = law_choice(families(i), 'none')
       end do
@@ -37,8 +43,11 @@ contains
       call read_parts(source, choices)
       return
     end if
-    do i = 1, size(families)
-      call read_law(source, trim(families(i)), choices(i))
+    call read_law(source, 'body', '', choices(1))
+    body = choices(1)%name
+    if (has_problems(source, 'body.law')) body = ''
+    do i = 2, size(families)
+      call read_law(source, trim(families(i)), body, choices(i))
     end do
     call resolve_static_friction(choices)
     call read_effects(source, choices)
@@ -69,22 +78,23 @@ contains
     end do
   end subroutine read_effects
 
-  subroutine read_law(source, family, choice)
+  !> The law of a family beside the law `body` of [body], '' if that is not known.
+  subroutine read_law(source, family, body, choice)
     type(case_source_t), intent(inout) :: source
-    character(len=*), intent(in) :: family
+    character(len=*), intent(in) :: family, body
     type(law_choice_t), intent(out) :: choice
-    character(len=:), allocatable :: name, default
+    character(len=:), allocatable :: name, default, names
     integer :: at
     logical :: found
     default = 'none'
     if (family == 'body') default = 'point_mass'
     choice = law_choice(family, default)
+    names = laws_beside(family, body)
     call enter_table(source, family, found)
     at = find(source, family//'.law')
     if (at > 0) then
       if (source%entries(at)%entry%kind /= toml_string) then
-        call report(source, family//'.law', 'found '//description(source%entries(at)%entry)//', allowed '// &
-                    law_names(family))
+        call report(source, family//'.law', 'found '//description(source%entries(at)%entry)//', allowed '//names)
         call know_all_below(source, family)
         return
       end if
@@ -92,16 +102,54 @@ contains
     name = default
     call take_text(source, family//'.law', name)
     if (found .and. default == 'none' .and. at == 0) then
-      call report(source, family//'.law', 'missing, allowed '//law_names(family))
+      call report(source, family//'.law', 'missing, allowed '//names)
       call know_all_below(source, family)
     else if (find_law(family, name) == 0) then
-      call report(source, family//'.law', 'found "'//name//'"'//hint(family, name)//', allowed '//law_names(family))
+      call report(source, family//'.law', 'found "'//name//'"'//hint(family, name)//', allowed '//names)
+      call know_all_below(source, family)
+    else if (.not. goes_with(family, name, body)) then
+      ! Before its keys, which would be in vain.
+      call report(source, family//'.law', 'found "'//name//'", '//whose(body)//' '//names)
       call know_all_below(source, family)
     else
       choice = law_choice(family, name)
       call read_parameters(source, choice)
     end if
   end subroutine read_law
+
+  !> Whether a body has a place for a law of another family.
+  pure logical function goes_with(family, law, body)
+    character(len=*), intent(in) :: family, law, body
+    logical :: of_two
+    goes_with = .true.
+    if (law == 'none' .or. len_trim(body) == 0) return
+    of_two = any(pair_laws%family == family .and. pair_laws%name == law)
+    if (body == 'point_mass') then
+      goes_with = .not. of_two
+    else if (family == 'drive') then
+      goes_with = of_two
+    else if (family == 'friction') then
+      goes_with = law == 'viscous'
+    else if (family == 'restoring') then
+      goes_with = law == 'linear'
+    end if
+  end function goes_with
+
+  !> The laws of a family that a body has a place for, for messages.
+  pure function laws_beside(family, body) result(names)
+    character(len=*), intent(in) :: family, body
+    character(len=:), allocatable :: names
+    integer :: i
+    names = join(pack(laws%name, [(laws(i)%family == family .and. goes_with(family, laws(i)%name, body), i=1, size(laws))]), ', ')
+  end function laws_beside
+
+  !> What a law is missing that the body has no place for, for messages.
+  pure function whose(body) result(text)
+    character(len=*), intent(in) :: body
+    character(len=:), allocatable :: text
+    text = 'allowed with two bodies'
+    if (body == 'point_mass') text = 'allowed with two bodies (body.law = "friction_pair" or "backlash_pair"); with one'
+  end function whose
 
   pure function hint(family, name) result(text)
     character(len=*), intent(in) :: family, name
@@ -119,11 +167,9 @@ contains
     integer :: i
     logical :: from_file
     rows = parameters_of(choice%family, choice%name)
-    if (choice%name == 'measured_force') then
-      call read_force_file(source, choice, from_file)
-    else
-      from_file = .false.
-    end if
+    from_file = .false.
+    if (choice%name == 'measured_force') call read_force_file(source, choice, from_file)
+    if (any(rows%name == 'ratio')) call refuse_frequency(source, choice%name, rows)
     do i = 1, size(rows)
       if (from_file .and. (rows(i)%name == 'interval' .or. rows(i)%name == 'force')) cycle
       path = table_of(rows(i)%family, rows(i)%law)//'.'//trim(rows(i)%name)
@@ -135,7 +181,22 @@ contains
                        required=.not. rows(i)%optional)
       end if
     end do
+    if (choice%name == 'measured_force' .and. find(source, 'drive.periodic') == 0) then
+      call set_value(choice, 'periodic', [merge(0.0_wp, 1.0_wp, ends_with_its_first(list_of(choice, 'force')))])
+    end if
   end subroutine read_parameters
+
+  !> A drive of the foot has a ratio: a frequency is refused in its place, and the ratio is then not missing.
+  subroutine refuse_frequency(source, law, rows)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: law
+    type(parameter_row_t), intent(inout) :: rows(:)
+    if (find(source, 'drive.frequency') == 0) return
+    call know(source, 'drive.frequency')
+    call report(source, 'drive.frequency', 'found with drive.law = "'//trim(law)//'", allowed drive.ratio in its place: the '// &
+                'angular frequency over sqrt(restoring.stiffness/body.mass)')
+    where (rows%name == 'ratio') rows%optional = .true.
+  end subroutine refuse_frequency
 
   !> A measured force that is the name of a file, relative to the folder of the case; `found` is false if it is not.
   subroutine read_force_file(source, choice, found)

@@ -3,17 +3,19 @@
 
 !> The names in the tables of a machine of several bodies.
 module part_names
-  use case_source, only: case_source_t, report
+  use case_source, only: case_source_t, find, report
   use law_table, only: label_length, law_choice_t, list_of
   use text, only: replace_all, starts_with, to_text
   use toml_bindings, only: toml_table
   implicit none
   private
 
-  public :: check_columns, check_names, names_of
+  public :: check_columns, check_names, is_table, names_of
 
   !> The end of a joint that is no body.
   character(len=*), parameter, public :: ground = 'ground'
+  !> Names before _x and _v that results have for their events.
+  character(len=11), parameter :: columns_of_events(2) = [character(len=11) :: 'event', 'event_joint']
 
 contains
 
@@ -41,6 +43,19 @@ contains
     names = found(:count_names)
   end function names_of
 
+  !> Whether `path` is a table, perhaps one that keys below it alone make.
+  pure logical function is_table(source, path)
+    type(case_source_t), intent(in) :: source
+    character(len=*), intent(in) :: path
+    integer :: at
+    at = find(source, path)
+    if (at > 0) then
+      is_table = source%entries(at)%entry%kind == toml_table
+    else
+      is_table = any([(starts_with(source%entries(at)%entry%path, path//'.'), at=1, size(source%entries))])
+    end if
+  end function is_table
+
   !> Names that can be told apart in paths and messages.
   subroutine check_names(source, kind, names)
     type(case_source_t), intent(inout) :: source
@@ -50,6 +65,12 @@ contains
     do i = 1, size(names)
       if (verify(trim(names(i)), 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-') > 0) then
         call report(source, kind//'.'//trim(names(i)), 'found the name "'//trim(names(i))//'", allowed letters, digits, _ and -')
+      else if (names(i) == 'law' .or. (kind == 'body' .and. names(i) == 'in_sequence')) then
+        call report(source, kind//'.'//trim(names(i)), 'found a part with the name of a key of ['//kind// &
+                    '], allowed any other name')
+      else if (kind == 'body' .and. any(names(i) == columns_of_events)) then
+        call report(source, 'body.'//trim(names(i)), 'found a body whose columns in results are those of the events, '// &
+                    'allowed another name')
       else if (kind == 'body' .and. names(i) == ground) then
         call report(source, kind//'.'//trim(names(i)), 'found a body with the name "ground", allowed any other: it is what '// &
                     'stands still')

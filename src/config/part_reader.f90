@@ -15,7 +15,7 @@ module part_reader
   use structure_reader, only: read_structure
   use suggest, only: nearest_word
   use text, only: join, number_in, to_text
-  use toml_bindings, only: toml_array, toml_string
+  use toml_bindings, only: toml_array, toml_string, toml_table
   implicit none
   private
 
@@ -33,7 +33,7 @@ module part_reader
 
 contains
 
-  !> Whether a case has tables [body.NAME] or [structure.NAME]. A table in the place of a key of [body] is none.
+  !> Whether a case has tables [body.NAME] or [structure.NAME]. A body may have the name of a key of [body]: it has a mass.
   pure logical function has_parts(source)
     type(case_source_t), intent(in) :: source
     character(len=label_length), allocatable :: names(:)
@@ -41,6 +41,7 @@ contains
     has_parts = .false.
     names = names_of(source, 'body')
     do i = 1, size(names)
+      has_parts = has_parts .or. find(source, 'body.'//trim(names(i))//'.mass') > 0
       if (.not. any(parameters%family == 'body' .and. parameters%name == names(i))) has_parts = .true.
     end do
     if (size(names_of(source, 'structure')) > 0) has_parts = .true.
@@ -77,6 +78,7 @@ contains
     call read_watch(source, bodies, watched)
     do i = 1, size(kinds_of_parts)
       names = names_of(source, trim(kinds_of_parts(i)))
+      if (i > 1) call refuse_keys(source, trim(kinds_of_parts(i)))
       if (i > 1) call check_names(source, trim(kinds_of_parts(i)), names)
       do k = 1, size(names)
         call read_part(source, trim(kinds_of_parts(i)), trim(default_law(i)), trim(names(k)), watched, bodies, choices)
@@ -88,6 +90,24 @@ contains
       choices = [choices, structures]
     end do
   end subroutine read_parts
+
+  !> Keys of a table without the name of a part, as one body has them.
+  subroutine refuse_keys(source, kind)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: kind
+    integer :: i, first
+    first = 0
+    do i = 1, size(source%entries)
+      associate (entry => source%entries(i)%entry)
+        if (index(entry%path, kind//'.') /= 1 .or. entry%kind == toml_table) cycle
+        if (scan(entry%path(len(kind) + 2:), '.[') > 0) cycle
+        call know(source, entry%path)
+        if (first == 0) first = i
+      end associate
+    end do
+    if (first > 0) call report(source, source%entries(first)%entry%path, 'found beside [body.NAME], allowed in tables with a '// &
+                               'name, ['//kind//'.NAME]')
+  end subroutine refuse_keys
 
   !> The body or point that the start and the results refer to: the first, unless [watch] names another.
   subroutine read_watch(source, bodies, watched)

@@ -10,8 +10,8 @@ module angle_units
 
 contains
 
-  !> The unit of a quantity of a motion, given as that of a position on a line: rad for m, rad/s for m/s where the position is
-  !> an angle.
+  !> The unit of a quantity of a motion, given as that of a position on a line: rad for m, rad/s for m/s and N m for N where the
+  !> position is an angle.
   pure function unit_of(unit, is_angle) result(name)
     character(len=*), intent(in) :: unit
     logical, intent(in) :: is_angle
@@ -23,6 +23,8 @@ contains
       name = 'rad'
     case ('m/s')
       name = 'rad/s'
+    case ('N')
+      name = 'N m'
     end select
   end function unit_of
 

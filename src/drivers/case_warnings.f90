@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What is allowed in a case and hardly meant.
+!> What a case leaves to defaults, and what is allowed in it and hardly meant.
 module case_warnings
   use build_jointed, only: jointed_of
   use case_parameters, only: parameter_value
   use case_setup, only: grid_of
   use case_type, only: case_t
   use contact_law, only: contact_at_speed, contact_kelvin_voigt, contact_t
-  use drive_law, only: same_force
+  use drive_law, only: ends_with_its_first
   use eigen, only: undamped_modes
   use errors, only: error_t
   use friction_law, only: power
@@ -40,6 +40,7 @@ contains
     type(contact_t) :: stops
     type(error_t), allocatable :: error
     character(len=:), allocatable :: obstacle
+    if (len(the_case%assumed) > 0) call journal%line('assumed', 'assumed: '//the_case%assumed)
     grid = grid_of(the_case, the_case%axes(:0))
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
@@ -126,7 +127,7 @@ contains
     integer :: last
     associate (force => moving%machine%drive%force, period => moving%machine%period)
       last = size(force)
-      if (.not. abs(force(last) - force(1)) > same_force*maxval(abs(force))) return
+      if (ends_with_its_first(force)) return
       if (command /= 'basin' .and. command /= 'sweep' .and. the_case%run%duration <= period) return
       call journal%line('warning', 'warning: drive.force begins with '//to_text(force(1), 6)//' N and ends with '// &
         to_text(force(last), 6)//' N: repeated every '//to_text(period, 6)//' s, from its first sample to its last, it jumps. '// &

@@ -3,8 +3,7 @@
 
 !> `separatrix trajectory`: one motion, its time history and every event.
 module trajectory_driver
-  use angle_units, only: unit_of
-  use attractors, only: attractor_t, features_t, kind_rest, regime_names
+  use attractors, only: attractor_t, regime_names
   use case_check, only: require_start
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
@@ -18,25 +17,24 @@ module trajectory_driver
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
-  use machine_facts, only: stops_of
+  use machine_facts, only: has_drive_period, stops_of
   use motion, only: motion_t
   use motion_columns, only: event_columns, motion_column_t, sample_columns
   use motion_history, only: contact_forces, kinetic_energies
   use motion_state, only: book_t, closing_error, event_names, log_t, open_log
   use record_writer, only: write_record
-  use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
   use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
-  use status, only: exit_bad_case, exit_done, is_given_up, reason_event_budget, reason_name, reason_time_over
+  use status, only: exit_bad_case, exit_done, reason_name, reason_time_over
   use strobe, only: coordinates_of
   use system, only: monotonic_seconds
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
+  use trajectory_report, only: counted_over, explained, report
   use trajectory, only: begin_course, begin_record, conclude, course_t, end_record, fit_window, go_on, is_recorded, &
     outcome_t, span_t
-  use turn_section, only: has_no_clock
   implicit none
   private
 
@@ -144,14 +142,14 @@ contains
     call session%journal%line('search', 'looking for the cycle that it came to; run.average = "window" leaves that out')
   end subroutine fly
 
-  !> Code 65 if the samples of so many drive periods are more than fit into memory.
+  !> Code 65 if the samples of so many periods are more than fit into memory.
   subroutine check_samples(the_case, periods, error)
     type(case_t), intent(in) :: the_case
     real(wp), intent(in) :: periods
     type(error_t), allocatable, intent(out) :: error
     if (periods*the_case%trajectory%samples_per_period <= most_samples) return
     call fail(error, exit_bad_case, "key 'trajectory.samples_per_period': found "// &
-              to_text(the_case%trajectory%samples_per_period)//' over '//to_text(periods, 6)//' drive periods, allowed '// &
+              to_text(the_case%trajectory%samples_per_period)//' over '//to_text(periods, 6)//' periods, allowed '// &
               'at most '//to_text(nint(most_samples))//' samples in all')
   end subroutine check_samples
 
@@ -178,6 +176,7 @@ contains
     stops = stops_of(moving)
     barriers = barrier_positions(stops)
     call schema%add_attribute('', 'drive_period', moving%machine%period)
+    call schema%add_attribute('', 'driven', merge(1, 0, has_drive_period(moving)))
     call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
     if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
     if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
@@ -194,7 +193,7 @@ contains
       call schema%add_attribute('', 'x_max', f%x_max)
       call schema%add_attribute('', 'x_min', f%x_min)
       call schema%add_attribute('', 'v_max', f%v_max)
-      call schema%add_attribute('', 'impacts', nint(f%impacts_per_period*span%window/moving%machine%period))
+      call schema%add_attribute('', 'impacts', nint(f%impacts_per_period*span%window/counted_over(moving, cycle)))
       call schema%add_attribute('', 'impacts_per_period', f%impacts_per_period)
       call schema%add_attribute('', 'mean_impact_speed', f%mean_impact_speed)
       if (moving%machine%turn > 0) then
@@ -255,10 +254,10 @@ contains
       associate (column => columns(i))
         if (len(column%meanings) > 0) then
           call schema%add_variable(prefix//column%name, type_int8, [dimension], units=column%units, long_name=column%text, &
-            flag_values=[(k, k=1, words_in(column%meanings))], flag_meanings=column%meanings, data=column%values)
+            own_units=.true., flag_values=[(k, k=1, words_in(column%meanings))], flag_meanings=column%meanings, data=column%values)
         else
           call schema%add_variable(prefix//column%name, type_float64, [dimension], units=column%units, long_name=column%text, &
-                                   data=column%values)
+                                   own_units=.true., data=column%values)
         end if
       end associate
     end do
@@ -335,32 +334,6 @@ contains
     if (len(command%record) > 0) call session%journal%line('written', 'wrote '//command%record)
   end subroutine report_files
 
-  subroutine report(session, moving, span, outcome, cycle, log)
-    type(session_t), intent(inout) :: session
-    type(motion_t), intent(in) :: moving
-    type(span_t), intent(in) :: span
-    type(outcome_t), intent(in) :: outcome
-    type(attractor_t), intent(in) :: cycle
-    type(log_t), intent(in) :: log
-    associate (f => outcome%window, journal => session%journal, is_angle => position_is_angle(session%the_case%laws))
-      if (outcome%reason /= reason_time_over) then
-        call journal%line('end', trim(merge('given up', 'ended   ', is_given_up(outcome%reason)))//' before the end: '// &
-          explained(outcome%reason)//'; '//to_text(log%events)//' events recorded until then')
-        return
-      end if
-      call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
-        ' '//unit_of('m', is_angle)//', v_max '//to_text(f%v_max, 6)//' '//unit_of('m/s', is_angle)//', '// &
-        to_text(f%impacts_per_period, 5)//' impacts per period at '//to_text(f%mean_impact_speed, 6)//' '// &
-        unit_of('m/s', is_angle)//' ('//taken_over(moving, span, cycle)//')', &
-        '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
-        to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
-        ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
-      call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, '// &
-        trim(merge('period of the slowest mode', 'drive period              ', has_no_clock(moving)))//' '// &
-        to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
-    end associate
-  end subroutine report
-
   !> Time of the last sample or event [s].
   pure real(wp) function recorded_until(log) result(time)
     type(log_t), intent(in) :: log
@@ -368,30 +341,5 @@ contains
     if (log%samples > 0) time = log%sample_data(1, log%samples)
     if (log%events > 0) time = max(time, log%event_data(1, log%events))
   end function recorded_until
-
-  !> What steady values are taken over.
-  pure function taken_over(moving, span, cycle) result(text)
-    type(motion_t), intent(in) :: moving
-    type(span_t), intent(in) :: span
-    type(attractor_t), intent(in) :: cycle
-    character(len=:), allocatable :: text
-    if (cycle%period > 0) then
-      text = 'over its cycle of period '//to_text(cycle%period)
-      if (cycle%by_event) text = 'over its limit cycle of '//to_text(cycle%duration, 10)//' s'
-      if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
-    else if (span%whole_periods) then
-      text = 'last '//to_text(nint(span%window/moving%machine%period))//' drive periods'
-    else
-      text = 'last '//to_text(span%window)//' s'
-    end if
-  end function taken_over
-
-  !> The reason, and what counts where that is not plain.
-  pure function explained(reason) result(text)
-    integer, intent(in) :: reason
-    character(len=:), allocatable :: text
-    text = reason_name(reason)
-    if (reason == reason_event_budget) text = text//' (flights count, those between samples of a controller, too)'
-  end function explained
 
 end module trajectory_driver

@@ -3,8 +3,9 @@
 
 !> What those who look at a motion have to know of the machine, whatever it is: one body, two or several.
 module machine_facts
-  use contact_law, only: contact_t
-  use jointed, only: jointed_t
+  use constants, only: unreachable
+  use contact_law, only: barrier_positions, contact_t
+  use jointed, only: is_stop, jointed_t
   use jointed_state, only: acts_as_spring
   use kinds, only: wp
   use motion, only: motion_t
@@ -12,7 +13,8 @@ module machine_facts
   implicit none
   private
 
-  public :: is_one_body, structure_in, has_driver, rides_along, rest_lasts, smallest_motion, stops_of, contact_sizes
+  public :: is_one_body, structure_in, has_drive_period, has_driver, has_stops, rides_along, rest_lasts, &
+    smallest_motion, stops_of, contact_sizes
 
 contains
 
@@ -28,6 +30,26 @@ contains
     allocate (machine%joints(0))
     if (allocated(moving%jointed)) machine = moving%jointed%machine
   end function structure_in
+
+  !> Whether a drive repeats, so that its period is the time between two sections.
+  pure logical function has_drive_period(moving)
+    type(motion_t), intent(in) :: moving
+    if (allocated(moving%jointed)) then
+      has_drive_period = moving%jointed%machine%driven
+    else
+      has_drive_period = moving%machine%drive%ratio > 0 .or. moving%machine%drive%interval > 0
+    end if
+  end function has_drive_period
+
+  !> Whether there is anything to hit.
+  pure logical function has_stops(moving)
+    type(motion_t), intent(in) :: moving
+    if (allocated(moving%jointed)) then
+      has_stops = any(is_stop(moving%jointed%machine%joints%kind))
+    else
+      has_stops = any(abs(barrier_positions(moving%machine%contact)) < unreachable)
+    end if
+  end function has_stops
 
   !> Whether there is a driving body beside the one that is looked at.
   pure logical function has_driver(moving)

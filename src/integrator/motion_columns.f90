@@ -4,6 +4,7 @@
 !> What is written down of a motion beside time, place and velocity of the body looked at, by the machine: the foot of the spring,
 !> the driving body, all coordinates of a structure and the joint of each event.
 module motion_columns
+  use angle_units, only: unit_of
   use jointed, only: joint_section, jointed_t
   use kinds, only: wp
   use machine_facts, only: has_driver
@@ -38,7 +39,8 @@ contains
       columns = coordinate_columns(moving%jointed%machine, log)
     else
       allocate (columns(1))
-      call set_column(columns(1), 'drive', 'm', 'position of the foot of the spring', foot_positions(moving, crank_angle, log))
+      call set_column(columns(1), 'drive', unit_of('m', moving%machine%restoring%turn > 0), 'position of the foot of the spring', &
+                      foot_positions(moving, crank_angle, log))
     end if
   end function sample_columns
 
@@ -72,6 +74,7 @@ contains
     type(motion_column_t), allocatable :: columns(:)
     character(len=:), allocatable :: name, column
     real(wp), allocatable :: samples(:, :)
+    character(len=5) :: units(2)
     logical :: inner
     integer :: i
     allocate (columns(2*machine%n), samples(2*machine%n, log%samples))
@@ -80,10 +83,12 @@ contains
       name = trim(machine%names(i))
       column = replace_all(name, '.', '_')
       inner = index(name, '.') > 0 .and. verify(name(index(name, '.') + 1:), '0123456789') == 0
-      call set_column(columns(2*i - 1), column//'_x', trim(merge('1', 'm', inner)), &
-                      trim(merge('coordinate', 'position  ', inner))//' of '//name, samples(i, :))
-      call set_column(columns(2*i), column//'_v', trim(merge('1/s', 'm/s', inner)), &
-                      trim(merge('rate    ', 'velocity', inner))//' of '//name, samples(machine%n + i, :))
+      units = [character(len=5) :: unit_of('m', is_angle(machine, i)), unit_of('m/s', is_angle(machine, i))]
+      if (inner) units = [character(len=5) :: '1', '1/s']
+      call set_column(columns(2*i - 1), column//'_x', trim(units(1)), trim(merge('coordinate', 'position  ', inner))//' of '// &
+                      name, samples(i, :))
+      call set_column(columns(2*i), column//'_v', trim(units(2)), trim(merge('rate    ', 'velocity', inner))//' of '//name, &
+                      samples(machine%n + i, :))
     end do
   end function coordinate_columns
 
@@ -95,6 +100,7 @@ contains
     character(len=:), allocatable :: names
     real(wp), allocatable :: joints(:, :)
     integer :: i, count_joints
+    logical :: turns
     allocate (columns(0))
     count_joints = count(machine%joints%kind /= joint_section)
     if (count_joints == 0) return
@@ -109,10 +115,27 @@ contains
     allocate (columns(4))
     call set_column(columns(1), 'joint', '1', 'joint', joints(1, :))
     columns(1)%meanings = trim(names)
-    call set_column(columns(2), 'joint_x', 'm', 'joint coordinate: second body minus first', joints(2, :))
-    call set_column(columns(3), 'joint_v_before', 'm/s', 'its rate just before the event', joints(3, :))
-    call set_column(columns(4), 'joint_v_after', 'm/s', 'its rate just after the event', joints(4, :))
+    turns = all([(joins_angles(machine, i), i=1, count_joints)])
+    call set_column(columns(2), 'joint_x', unit_of('m', turns), 'joint coordinate: second body minus first', joints(2, :))
+    call set_column(columns(3), 'joint_v_before', unit_of('m/s', turns), 'its rate just before the event', joints(3, :))
+    call set_column(columns(4), 'joint_v_after', unit_of('m/s', turns), 'its rate just after the event', joints(4, :))
   end function joint_columns
+
+  !> Whether a coordinate is an angle.
+  pure logical function is_angle(machine, i)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: i
+    is_angle = .false.
+    if (allocated(machine%angles)) is_angle = any(machine%angles == machine%names(i))
+  end function is_angle
+
+  !> Whether a joint acts between angles.
+  pure logical function joins_angles(machine, j)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j
+    integer :: i
+    joins_angles = any([(is_angle(machine, i) .and. abs(machine%joints(j)%row(i)) > 0, i=1, machine%n)])
+  end function joins_angles
 
   pure subroutine set_column(column, name, units, text, values)
     type(motion_column_t), intent(out) :: column

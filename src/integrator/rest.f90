@@ -6,6 +6,7 @@
 module rest
   use certified_step, only: departure_step, positive_step
   use contact_law, only: contact_constant, contact_force, restitution_at
+  use curve_law, only: piece_at, piece_limits
   use effect_law, only: break_away_level, change_over_bounce, friction_change, friction_factor
   use drive_law, only: foot_motion, measured_force, next_sample
   use friction_law, only: friction_t, power
@@ -130,7 +131,7 @@ contains
       step_down = huge(1.0_wp)
       if (up_open) step_up = holding_step(strongest_hold(machine, state%x, 1) - force, -rate, curvature)
       if (down_open) step_down = holding_step(strongest_hold(machine, state%x, -1) + force, rate, curvature)
-      step = min(step_up, step_down)
+      step = min(step_up, step_down, time_to_corner(machine, state))
       until = next_sample(machine%drive, state%time, time_end)
       if (step >= until - state%time) then
         state%time = until
@@ -140,6 +141,24 @@ contains
       end if
     end do
   end subroutine hold
+
+  !> Time [s] for which the stretch of the spring is proven to reach no sharp corner while the body rests.
+  pure real(wp) function time_to_corner(machine, state) result(time)
+    type(oscillator_t), intent(in) :: machine
+    type(state_t), intent(in) :: state
+    real(wp) :: foot, foot_rate, stretch, limits(2), room
+    integer :: i
+    time = huge(time)
+    if (.not. machine%effects%play%sharp) return
+    call foot_motion(machine%drive, machine%drive_frequency*state%time, foot, foot_rate)
+    stretch = machine%restoring%free_length + foot - state%x
+    limits = piece_limits(machine%effects%play, piece_at(machine%effects%play, stretch))
+    do i = 1, 2
+      if (.not. abs(limits(i)) < huge(1.0_wp)) cycle
+      room = abs(limits(i) - stretch)
+      time = min(time, positive_step(room, (3 - 2*i)*foot_rate*machine%drive_frequency, machine%foot_acceleration_bound))
+    end do
+  end function time_to_corner
 
   !> Time for which a reserve of force that changes at `rate` is proven to last. At the edge, where
   !> rounding hides which side it is on, the body was found to stay: step on at least a little.
@@ -181,6 +200,7 @@ contains
       if (shrink >= 1) return
       left = bounce/(1 - shrink)
       if (machine%drive%interval > 0 .and. left > next_sample(machine%drive, state%time, huge(left)) - state%time) left = -1
+      if (left > time_to_corner(machine, state)) left = -1
       if (left < 0) return
       change = (abs(rate)*left + curvature*left**2/2 + law%damping*speed &
                 + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &

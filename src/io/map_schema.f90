@@ -86,16 +86,17 @@ contains
     call push_dimension(self%dimensions, dimension)
   end subroutine add_dimension
 
-  !> Adds a variable. `dimensions`: names in C order. What is not given is absent from the file.
+  !> Adds a variable. `dimensions`: names in C order. What is not given is absent from the file. `own_units`: the units are known,
+  !> whatever positions are.
   subroutine add_variable(self, name, type, dimensions, units, long_name, flag_values, flag_meanings, &
-                          tiled, data, group)
+                          tiled, data, group, own_units)
     class(schema_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     integer, intent(in) :: type
     character(len=*), intent(in) :: dimensions(:)
     character(len=*), intent(in), optional :: units, long_name, flag_meanings, group
     integer, intent(in), optional :: flag_values(:)
-    logical, intent(in), optional :: tiled
+    logical, intent(in), optional :: tiled, own_units
     real(real64), intent(in), optional :: data(:)
     type(variable_t) :: variable
     call complete(self)
@@ -105,7 +106,9 @@ contains
     allocate (variable%dimensions(size(dimensions)))
     variable%dimensions = dimensions
     if (present(group)) variable%group = group
-    if (present(units)) variable%units = unit_of(units, self%positions_are_angles)
+    if (present(units)) then
+      variable%units = unit_of(units, self%positions_are_angles .and. .not. present(own_units))
+    end if
     if (present(long_name)) variable%long_name = long_name
     if (present(flag_values)) variable%flag_values = flag_values
     if (present(flag_meanings)) variable%flag_meanings = flag_meanings

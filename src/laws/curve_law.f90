@@ -19,6 +19,8 @@ module curve_law
     integer :: count = 0
     !> Knots, ascending; values and slopes there.
     real(wp) :: at(most_knots) = 0, value(most_knots) = 0, slope(most_knots) = 0
+    !> Straight from knot to knot, with the slope of a knot from there on, and constant before the first: corners, no curve.
+    logical :: sharp = .false.
   end type curve_t
 
 contains
@@ -96,6 +98,11 @@ contains
     i = -1
     if (present(piece)) i = piece
     if (i < 0) i = piece_at(curve, x)
+    if (curve%sharp) then
+      value = curve%value(max(1, i))
+      if (i > 0) value = value + curve%slope(i)*(x - curve%at(i))
+      return
+    end if
     if (i == 0 .or. i == curve%count) then
       i = max(1, i)
       value = curve%value(i) + curve%slope(i)*(x - curve%at(i))
@@ -116,12 +123,13 @@ contains
   end function piece_at
 
   !> Where a motion that is in a piece leaves it, downwards and upwards: beyond its knots by a small share of its width, so that
-  !> it begins the next piece inside; of the second derivative that changes there the square of that share remains.
+  !> it begins the next piece inside. Of the derivative that changes there, the second or at a corner the first, a power of that
+  !> share remains.
   pure function piece_limits(curve, piece) result(limits)
     type(curve_t), intent(in) :: curve
     integer, intent(in) :: piece
-    real(wp) :: limits(2)
-    real(wp), parameter :: overlap = 1e-6_wp
+    real(wp) :: limits(2), overlap
+    overlap = merge(1e-9_wp, 1e-6_wp, curve%sharp)
     limits = [-1, 1]*huge(1.0_wp)
     associate (at => curve%at, last => curve%count)
       if (piece > 0) limits(1) = at(piece) - overlap*(at(max(2, piece)) - at(max(2, piece) - 1))
@@ -129,7 +137,7 @@ contains
     end associate
   end function piece_limits
 
-  !> Derivative at `x` of the curve that goes straight on beyond the knots.
+  !> Derivative at `x` of the curve that goes straight on beyond the knots; at a corner that from there on.
   pure real(wp) function slope_of(curve, x) result(slope)
     type(curve_t), intent(in) :: curve
     real(wp), intent(in) :: x
@@ -137,6 +145,11 @@ contains
     integer :: i
     slope = 0
     if (curve%count == 0) return
+    if (curve%sharp) then
+      i = piece_at(curve, x)
+      if (i > 0) slope = curve%slope(i)
+      return
+    end if
     slope = curve%slope(1)
     if (x <= curve%at(1)) return
     slope = curve%slope(curve%count)
@@ -155,10 +168,10 @@ contains
     real(wp) :: c(0:3, 0:curve%count), width, mean
     integer :: i
     c = 0
-    c(:1, 0) = [curve%value(1), curve%slope(1)]
+    c(:1, 0) = [curve%value(1), merge(0.0_wp, curve%slope(1), curve%sharp)]
     do i = 1, curve%count
       c(:1, i) = [curve%value(i), curve%slope(i)]
-      if (i == curve%count) exit
+      if (i == curve%count .or. curve%sharp) cycle
       width = curve%at(i + 1) - curve%at(i)
       mean = (curve%value(i + 1) - curve%value(i))/width
       c(2:, i) = [(3*mean - 2*curve%slope(i) - curve%slope(i + 1))/width, &
@@ -174,6 +187,16 @@ contains
     integer :: i
     total = 0
     if (curve%count == 0) return
+    if (curve%sharp) then
+      total = min(0.0_wp, x - curve%at(1))*curve%value(1)
+      do i = 1, curve%count
+        beyond = x - curve%at(i)
+        if (beyond <= 0) exit
+        if (i < curve%count) beyond = min(beyond, curve%at(i + 1) - curve%at(i))
+        total = total + beyond*(curve%value(i) + curve%slope(i)*beyond/2)
+      end do
+      return
+    end if
     do i = 1, curve%count - 1
       width = curve%at(i + 1) - curve%at(i)
       s = min(1.0_wp, (x - curve%at(i))/width)
@@ -190,12 +213,13 @@ contains
     end associate
   end function integral_of
 
-  !> Largest second derivative in magnitude: that of a cubic is linear, so at a knot.
+  !> Largest second derivative in magnitude: that of a cubic is linear, so at a knot. Corners are none.
   pure real(wp) function most_bent(curve)
     type(curve_t), intent(in) :: curve
     real(wp) :: width, mean
     integer :: i
     most_bent = 0
+    if (curve%sharp) return
     do i = 1, curve%count - 1
       width = curve%at(i + 1) - curve%at(i)
       mean = (curve%value(i + 1) - curve%value(i))/width
@@ -244,6 +268,10 @@ contains
     type(curve_t), intent(in) :: curve
     integer :: i
     steepest = 0
+    if (curve%sharp) then
+      steepest = maxval(abs(curve%slope))
+      return
+    end if
     do i = 1, curve%count - 1
       steepest = max(steepest, 1.5_wp*abs(curve%value(i + 1) - curve%value(i))/(curve%at(i + 1) - curve%at(i)) &
                      + abs(curve%slope(i)) + abs(curve%slope(i + 1)))

@@ -14,9 +14,10 @@ module drive_law
   private
 
   !> Samples of a measured force closer than this share of the largest are the same.
-  real(wp), parameter, public :: same_force = 1e-9_wp
+  real(wp), parameter :: same_force = 1e-9_wp
 
-  public :: drive_of, add_harmonics, add_ripple, foot_motion, measured_force, next_sample, lever_foot, lever_assembles
+  public :: drive_of, add_harmonics, add_ripple, foot_motion, measured_force, ends_with_its_first, next_sample, lever_foot, &
+    lever_assembles
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
   integer, parameter :: max_harmonics = 1024
@@ -122,6 +123,13 @@ contains
     rate = (law%force(i + 2) - law%force(i + 1))/law%interval
     force = law%force(i + 1) + rate*(time - i*law%interval)
   end subroutine measured_force
+
+  !> Whether equidistant samples have the first once more at their end, where the next period begins.
+  pure logical function ends_with_its_first(samples)
+    real(wp), intent(in) :: samples(:)
+    ends_with_its_first = size(samples) > 1
+    if (ends_with_its_first) ends_with_its_first = abs(samples(size(samples)) - samples(1)) <= same_force*maxval(abs(samples))
+  end function ends_with_its_first
 
   !> The first sample of a measured force after `time` [s], where its rate changes, or `time_end` if that comes first.
   pure real(wp) function next_sample(law, time, time_end) result(next)

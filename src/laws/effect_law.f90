@@ -6,7 +6,7 @@
 !>   F - c s v^2 - c3 v^3 - b s v + k3 l^3 + q(l) + r(x) - (K + E)(h - 1) s - a h - g_s(|v|) s,  h = max(0, 1 + slope x + p(x)),
 !> K + E being the dry friction of the machine, g_+, g_-, p, q and r functions given by tables. Free play g in series with
 !> the linear spring k l makes its force k d(l): nothing within the play and l -+ g/2 beyond it, with corners that parabolas
-!> round within e of them. Dahl's friction -h z takes the
+!> may round within e of them. Dahl's friction -h z takes the
 !> place of all dry friction. As the velocity keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
 !>   z = s K + (z_0 - s K) exp(-sigma s (x - x_0)/K),  K the level in that direction.
 module effect_law
@@ -211,11 +211,19 @@ contains
             + effects%series_stiffness*continued_at(effects%play, stretch, in_play)
   end function play_and_table
 
-  !> d(l) - l [m] over the stretch l for a play of `gap` [m] whose corners are rounded within `rounding` times that: with the
-  !> slope 0 beyond the play and -1 within, a cubic between is a parabola.
+  !> d(l) - l [m] over the stretch l for a play of `gap` [m]. Its corners are sharp, or rounded within `rounding` times the gap:
+  !> with the slope 0 beyond the play and -1 within, a cubic between is a parabola.
   pure type(curve_t) function play_of(gap, rounding) result(play)
     real(wp), intent(in) :: gap, rounding
     real(wp) :: inner, outer
+    if (.not. rounding > 0) then
+      play%count = 2
+      play%sharp = .true.
+      play%at(:2) = [-gap/2, gap/2]
+      play%value(:2) = [gap/2, -gap/2]
+      play%slope(:2) = [-1, 0]
+      return
+    end if
     inner = (0.5_wp - rounding)*gap
     outer = (0.5_wp + rounding)*gap
     play%count = 4
@@ -233,12 +241,15 @@ contains
     slope = slope + slope_of(effects%spring, stretch) + effects%series_stiffness*slope_of(effects%play, stretch)
   end function stretch_slope
 
-  !> Bounds on the first [N/m] and second [N/m^2] derivative of the table over the stretch and of the play.
-  pure function stretch_bounds(effects) result(bounds)
+  !> Bounds on the first [N/m] and second [N/m^2] derivative of the table over the stretch and of the play. Those at a `stretch` [m]
+  !> hold up to the next sharp corner, the first with the sign of a sharp play.
+  pure function stretch_bounds(effects, stretch) result(bounds)
     type(effects_t), intent(in) :: effects
-    real(wp) :: bounds(2)
-    bounds = [steepest(effects%spring), most_bent(effects%spring)] &
-             + effects%series_stiffness*[steepest(effects%play), most_bent(effects%play)]
+    real(wp), intent(in), optional :: stretch
+    real(wp) :: bounds(2), of_play(2)
+    of_play = [steepest(effects%play), most_bent(effects%play)]
+    if (present(stretch) .and. effects%play%sharp) of_play = [slope_of(effects%play, stretch), 0.0_wp]
+    bounds = [steepest(effects%spring), most_bent(effects%spring)] + effects%series_stiffness*of_play
   end function stretch_bounds
 
   !> r [N], a force over the place `x` [m].

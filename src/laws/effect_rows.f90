@@ -92,8 +92,8 @@ module effect_rows
                     'force beyond that of the spring at these stretches', list=.true.), &
     parameter_row_t('effect', 'backlash', 'gap', 'm', not_negative, &
                     'g, stretch from one end of the play to the other'), &
-    parameter_row_t('effect', 'backlash', 'rounding', '1', range_t(1e-9_wp, 0.49_wp), &
-                    'e/g: parabolas round the corners of the force within e of them', optional=.true., default=0.05_wp), &
+    parameter_row_t('effect', 'backlash', 'rounding', '1', range_t(0.0_wp, 0.49_wp), &
+                    'e/g: parabolas round the corners of the force within e of them; 0 = sharp corners', optional=.true.), &
     parameter_row_t('effect', 'force_curve', 'place', 'm', any_value, &
                     'places, ascending; straight on beyond the first and the last', list=.true.), &
     parameter_row_t('effect', 'force_curve', 'force', 'N', any_value, 'force upwards at these places', list=.true.), &

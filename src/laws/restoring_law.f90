@@ -9,6 +9,7 @@ module restoring_law
   use elementary, only: sine_cosine
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
+  use part_angles, only: watched_is_angle
   implicit none
   private
 
@@ -45,11 +46,11 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     type(restoring_t) :: law
     integer :: i
-    position_is_angle = .false.
+    position_is_angle = watched_is_angle(choices)
     do i = 1, size(choices)
       if (choices(i)%family /= 'restoring') cycle
       law = restoring_of(choices(i))
-      position_is_angle = law%turn > 0
+      position_is_angle = position_is_angle .or. law%turn > 0
     end do
   end function position_is_angle
 

@@ -14,6 +14,7 @@ module build_jointed
   use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
     path_of, set_value, value_of
   use matrices, only: solve
+  use part_angles, only: names_of_angles
   use places, only: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of
   use status, only: exit_bad_case
   use waves, only: modulation_of, wave_of
@@ -49,6 +50,7 @@ contains
       if (choices(i)%family == 'body') machine%together = merge(together_sequence, together_newton, &
                                                                  value_of(choices(i), 'in_sequence') > 0.5_wp)
     end do
+    machine%angles = names_of_angles(choices)
     call add_bodies(choices, machine)
     call add_structures(choices, machine, rows, error)
     if (.not. allocated(error)) call set_frequency(choices, machine, error)

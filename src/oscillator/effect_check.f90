@@ -16,6 +16,9 @@ module effect_check
 
   public :: refuse_effects
 
+  !> Corners of a play that are rounded within less, in shares of its gap, are not resolved.
+  real(wp), parameter :: least_rounding = 1e-9_wp
+
 contains
 
   !> Refuses effects of one body that its laws have no place for. The message begins with the key.
@@ -46,6 +49,9 @@ contains
         problem = table_problem(choices(i), 'stretch', 'force')
       case ('backlash')
         problem = ''
+        if (value_of(choices(i), 'rounding') > 0 .and. value_of(choices(i), 'rounding') < least_rounding) problem = &
+          '.rounding: found '//number(value_of(choices(i), 'rounding'))//', allowed 0 (sharp corners) or at least '// &
+          number(least_rounding)
         if (name_of(choices, 'restoring') /= 'linear') problem = ': found with restoring.law = "'// &
           name_of(choices, 'restoring')//'", allowed with "linear"'
       case ('drive_harmonics')

@@ -207,7 +207,7 @@ contains
 
   !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
   !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
-  !> derivative [N/s^2] over all angles. Dahl's friction and a measured force are not in it.
+  !> derivative [N/s^2] over all angles, where a play has sharp corners up to the next of them. Dahl's friction and a measured force are not in it.
   pure subroutine holding_force(machine, x, phi, force, rate, curvature_bound)
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, phi
@@ -228,7 +228,7 @@ contains
       curvature_bound = curvature_bound + abs(cubic)*longest*(3*longest*machine%foot_acceleration_bound + 6*speed**2)
       if (.not. machine%effects%by_position) return
       force = force + place_force(machine%effects, x)
-      bounds = stretch_bounds(machine%effects)
+      bounds = stretch_bounds(machine%effects, stretch)
       curvature_bound = curvature_bound + bounds(1)*machine%foot_acceleration_bound + bounds(2)*speed**2
     end associate
   end subroutine holding_force

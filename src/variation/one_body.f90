@@ -49,7 +49,7 @@ contains
       else if (machine%drive%interval > 0) then
         why = 'drive.law: the variations of a body under a measured force are not known'
       else if (.not. machine%drive%ratio > 0) then
-        why = 'drive.law: one body without a drive has no section; as a structure it has one where it turns round'
+        why = 'drive.law: one body without a drive has no section; in parts, as [body.NAME], it has one where it turns round'
       else if (machine%effects%dahl_stiffness > 0) then
         why = 'effect.dahl: variations of this friction are not known'
       else if (machine%contact%by_impact) then

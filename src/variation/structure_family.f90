@@ -79,7 +79,7 @@ contains
     if (allocated(error)) return
     why = why_not_varied(moving%jointed)
     if (len(why) > 0) then
-      call fail(error, exit_bad_case, 'body: the variations of this structure are not known: '//why)
+      call fail(error, exit_bad_case, 'body: the variations of this machine are not known: '//why)
       return
     end if
     associate (scales => moving%jointed%machine)

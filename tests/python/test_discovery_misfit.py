@@ -64,9 +64,19 @@ def test_a_record_that_cannot_be_flown_along_is_missed_and_told():
     found.evaluation.failed[SEGMENTS:] = True
     found.good[SEGMENTS:] = found.good[0] = False
     assert missed(data(1, 1), found, Options()) == ["second (no segment of it can be flown)"]
-    assert unused(data(1, 1), found) == [
+    assert unused(data(1, 1), found, contacts=True) == [
         f"first: 1 of {SEGMENTS} segments are not used: the impacts of 1 are not steady",
         f"second: {SEGMENTS} of {SEGMENTS} segments are not used: {SEGMENTS} cannot be flown",
+    ]
+
+
+def test_a_machine_without_contacts_has_no_impacts_that_are_not_steady():
+    found = fit(1.0, 1.0)
+    found.good[:2] = False
+    found.counts[0] = 0
+    assert unused(data(1, 1), found, contacts=False) == [
+        f"first: 2 of {SEGMENTS} segments are not used: 1 have no sample that counts and "
+        "1 have no derivatives at some samples"
     ]
 
 

@@ -59,6 +59,29 @@ def test_a_record_is_its_harmonics(separatrix, tmp_path):
     assert motions[0][1] == pytest.approx(motions[1][1], abs=1e-9)
 
 
+def test_one_file_has_one_period(separatrix, tmp_path):
+    """A record of one body and of parts: a last sample that is the first once more begins the next period."""
+    one = '[body]\nmass = 1\n[restoring]\nlaw = "linear"\nstiffness = 4\n'
+    one += '[friction]\nlaw = "viscous"\ndamping = 0.3\n'
+    one += '[drive]\nlaw = "measured_force"\nforce = "force.csv"\n'
+    parts = '[body.ball]\nmass = 1\n[spring.s]\nbetween = ["ball"]\nstiffness = 4\ndamping = 0.3\n'
+    parts += '[drive.f]\nlaw = "force"\nbody = "ball"\nrecord = "force.csv"\n'
+    for more, period in ((1, STEP * SAMPLES), (0, STEP * SAMPLES)):
+        _write(tmp_path, np.sin(2 * np.pi * np.arange(SAMPLES + more) / SAMPLES))
+        amplitudes = []
+        for text in (one, parts):
+            (tmp_path / "case.toml").write_text(text + "[run]\nduration = 80\n")
+            ended = succeed(
+                separatrix, "trajectory", "case.toml", "--force", "-o", "motion.h5", folder=tmp_path
+            )
+            assert "assumed: " in ended.out
+            assert f"period {period:.5f} s" in ended.out.splitlines()[0]
+            with h5py.File(tmp_path / "motion.h5") as file:
+                assert file.attrs["drive_period"] == pytest.approx(period, rel=1e-12)
+                amplitudes.append(file.attrs["amplitude"])
+        assert amplitudes[0] == pytest.approx(amplitudes[1], rel=2e-3)
+
+
 def test_what_is_refused(separatrix, tmp_path):
     """What the harmonics leave is told; a record is not beside a series, and has to be there."""
     _write(tmp_path, np.where(np.arange(SAMPLES) == 3, 1.0, 0.0))

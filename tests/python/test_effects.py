@@ -65,8 +65,8 @@ def test_measured_force_drives_what_it_was_measured_on(separatrix, tmp_path):
     np.testing.assert_allclose(again["x"][:-1], first["x"][:-1], rtol=0, atol=1e-8)
 
 
-def test_a_force_that_jumps_where_it_repeats_is_warned_of(separatrix, tmp_path):
-    """Samples of one period, taken as a record that ends with its last, repeat a step too early."""
+def test_samples_of_a_force_repeat_as_one_period(separatrix, tmp_path):
+    """The first sample follows the last, which is said; one that ends with its last jumps, and is stated."""
     samples = [round(float(x), 12) for x in np.cos(2 * np.pi * np.arange(20) / 20)]
     text = (
         "[body]\nmass = 1\n[restoring]\nlaw = 'linear'\nstiffness = 4\n"
@@ -74,15 +74,18 @@ def test_a_force_that_jumps_where_it_repeats_is_warned_of(separatrix, tmp_path):
         f"[drive]\nlaw = 'measured_force'\ninterval = 0.1\nforce = {samples}\n[run]\nduration = {{}}\n"
     )
     for name, duration, settings, warned in (
-        ("whole", 1.9, [], False),
-        ("longer", 40, [], True),
-        ("periodic", 40, ["--set", "drive.periodic=1"], False),
+        ("whole", 1.9, ["--set", "drive.periodic=0"], False),
+        ("longer", 40, ["--set", "drive.periodic=0"], True),
+        ("periodic", 40, [], False),
     ):
         (tmp_path / "case.toml").write_text(text.format(duration))
         said = succeed(
             separatrix, "trajectory", "case.toml", *settings, "-o", f"{name}.h5", folder=tmp_path
         ).out
-        assert ("drive.periodic = 1" in said) == warned
+        assert ("say so: drive.periodic = 1" in said) == warned
+        assert ("assumed: drive.periodic = 1 (the first sample follows the last: period 2.0" in said) == (
+            not settings
+        )
     with h5py.File(tmp_path / "longer.h5") as file:
         assert file.attrs["drive_period"] == pytest.approx(1.9)
     with h5py.File(tmp_path / "periodic.h5") as file:

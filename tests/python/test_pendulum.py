@@ -42,6 +42,41 @@ def test_both_senses_of_rotation_are_found(run):
     assert "rotation number -1.000" in printed
 
 
+PARTS = """
+[body.first]
+mass = 1
+[body.second]
+mass = 1
+[spring.weight]
+law = "pendulum"
+between = ["first"]
+moment = 9.81
+[spring.coupling]
+between = ["first", "second"]
+stiffness = 0.5
+[start]
+x0 = "40 deg"
+[run]
+duration = 20
+"""
+
+
+def test_pendulums_in_parts_are_angles_and_have_no_drive(separatrix, tmp_path):
+    """Units of the log, the file and the figure; no drive period and no impacts where there is neither."""
+    (tmp_path / "case.toml").write_text(PARTS)
+    command = [separatrix, "trajectory", tmp_path / "case.toml", "-o", tmp_path / "out.h5"]
+    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert " rad, v_max " in printed
+    assert "impacts" not in printed
+    assert "drive" not in printed
+    assert "period of the slowest mode" in printed
+    with open_result(tmp_path / "out.h5") as result:
+        assert {result[name].attrs["units"] for name in ("x", "first_x", "second_x")} == {"rad"}
+        assert {result[name].attrs["units"] for name in ("v", "first_v", "second_v")} == {"rad/s"}
+        figure = trajectory.phase_portrait(result, "pendulums")
+        assert "rad" in figure.axes[0].get_xlabel()
+
+
 def test_a_trajectory_goes_on_and_its_portrait_goes_round(run):
     options = ["--set", 'start.x0="90 deg"', "--set", "run.duration=300.0"]
     out, printed = run("trajectory", *options)

@@ -95,7 +95,7 @@ contains
       'spring_curve stretch=-0.4,0,0.3,0.6 force=-5,0,2,9', 'force_curve place=0,0.3,0.5,1 force=1,-1,2,0', &
       'friction_place_curve place=0,0.5,1 change=0.3,-0.2,0.4', &
       'friction_place_curve place=0,0.5,1 change=0.3,-0.2,0.4; effect stribeck excess=1 velocity=0.2', &
-      'backlash gap=0.1 rounding=0.2', 'cubic_damping coefficient=0.1; effect spring_curve stretch=-0.4,0,0.3 force=-5,0,2', &
+      'backlash gap=0.1', 'cubic_damping coefficient=0.1; effect spring_curve stretch=-0.4,0,0.3 force=-5,0,2', &
       'friction_place_curve place=0.1,0.4,0.8,1.1 change=0.5,-1.2,-1.2,0.5', 'position_dependent_friction slope=-1.5']
     laws = laws_from('body point_mass mass=1 gravity=9.81; restoring linear stiffness=88.8 free_length=0.4; contact newton '// &
       'restitution=0.7 upper=1.1; friction coulomb kinetic_coefficient=0.1; drive fourier ratio=1 mean=0.31 '// &
@@ -117,7 +117,7 @@ contains
       'hunt_crossley_exact stiffness=3e3 restitution=0.46']
     character(len=*), parameter :: effects(0:10) = [character(len=110) :: 'cubic_spring stiffness=20', 'offset_force force=1', &
       'dahl stiffness=300', 'viscous damping=0.3', 'stribeck excess=0.3 velocity=0.1', 'offset_force force=-20', &
-      'stribeck excess=0.3 velocity=0.03 exponent=1', 'backlash gap=0.1', &
+      'stribeck excess=0.3 velocity=0.03 exponent=1', 'backlash gap=0.1 rounding=0.2', &
       'friction_curve speed=0,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3', &
       'spring_curve stretch=-1,0,1 force=-5,0,6; effect force_curve place=0,1.09,1.1,1.13 force=0,0,0.5,2', &
       'friction_place_curve place=0,0.5,1.1,1.14 change=0.3,-0.2,0.4,0']

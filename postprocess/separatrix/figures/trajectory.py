@@ -265,10 +265,10 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
     if attributes.get("rotation_number"):
         pieces.append(f"{attributes['rotation_number']:.4g} turns per drive period")
     if attributes["impacts_per_period"] > 0:
-        pieces.append(
-            f"impacts per drive period {attributes['impacts_per_period']:.4g}, their mean speed"
-            f" {attributes['mean_impact_speed']:.4g} {unit(result['v'])}"
-        )
+        rate = f"impacts per drive period {attributes['impacts_per_period']:.4g}"
+        if not attributes.get("driven", 1):
+            rate = f"{attributes['impacts']} impacts in {attributes['window']:.4g} s"
+        pieces.append(f"{rate}, their mean speed {attributes['mean_impact_speed']:.4g} {unit(result['v'])}")
     return [*pieces, plain(version_text(result))]
 
 

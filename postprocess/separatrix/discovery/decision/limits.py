@@ -16,6 +16,7 @@ from separatrix.discovery.wording import unit_of
 _LADDER = 4.0 ** np.arange(-3, 4)
 # usual sizes (some per cent of the machine's own) up to which a linearised size is told
 _BELIEVED = 100.0
+_CALIBRATE = "calibrate the sensor at two known positions"
 _ADVICE = {
     frozenset(
         ("offset_force", "asymmetric_friction")
@@ -28,9 +29,9 @@ _ADVICE = {
     frozenset(
         ("asymmetric_friction", "sensor_bias")
     ): "measure the place of the barrier: the sensor's error shifts it, friction does not",
-    frozenset(("sensor_gain", "sensor_bias")): "calibrate the sensor at two known positions",
-    frozenset(("sensor_gain", "offset_force")): "calibrate the sensor at two known positions",
-    frozenset(("sensor_gain", "asymmetric_friction")): "calibrate the sensor at two known positions",
+    frozenset(("sensor_gain", "sensor_bias")): _CALIBRATE,
+    frozenset(("sensor_gain", "offset_force")): _CALIBRATE,
+    frozenset(("sensor_gain", "asymmetric_friction")): _CALIBRATE,
     frozenset(("sensor_delay", "drive_ripple")): "record the crank angle phi with the position",
 }
 
@@ -102,7 +103,9 @@ def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
 def advice(one: Fitted, others: list[Fitted]) -> str:
     """What is known to tell two names of one motion apart, where no drive does; '' where nothing is."""
     pairs = (frozenset((one.names[-1], other.names[-1])) for other in others if one.names and other.names)
-    return next((_ADVICE[pair] for pair in pairs if pair in _ADVICE), "")
+    found = next((_ADVICE[pair] for pair in pairs if pair in _ADVICE), "")
+    has_barrier = any(path.startswith("contact.") for path in one.model.parameters)
+    return _CALIBRATE if "barrier" in found and not has_barrier else found
 
 
 def equivalents(names: list[str]) -> list[str]:

@@ -61,17 +61,22 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
     ]
 
 
-def unused(data: Data, fit: Fit) -> list[str]:
-    """Return in words how many segments of each record a machine is not judged by."""
+def unused(data: Data, fit: Fit, contacts: bool) -> list[str]:
+    """Return in words how many segments of each record a machine, with contacts or none, is not judged by."""
     record, evaluation = data.stages[data.last].record, fit.evaluation
     notes = []
     for number, one in enumerate(data.prepared):
         here = record == number
         lost = here & ~fit.good
-        failed = int((lost & evaluation.failed).sum())
-        unsteady = int(lost.sum()) - failed
-        why = [f"{failed} cannot be flown"] if failed else []
-        why += [f"the impacts of {unsteady} are not steady"] if unsteady else []
+        failed = lost & evaluation.failed
+        empty = lost & ~failed & (fit.counts == 0)
+        others = int((lost & ~failed & ~empty).sum())
+        why = [f"{failed.sum()} cannot be flown"] if failed.any() else []
+        why += [f"{empty.sum()} have no sample that counts"] if empty.any() else []
+        if others and contacts:
+            why.append(f"the impacts of {others} are not steady")
+        elif others:
+            why.append(f"{others} have no derivatives at some samples")
         if why:
             said = " and ".join(why)
             notes.append(f"{one.record.name}: {lost.sum()} of {here.sum()} segments are not used: {said}")

@@ -251,9 +251,9 @@ def _notes(findings: Findings) -> list[str]:
     added = findings.decision.added
     if added is not None and not added.fitted.fit.converged:
         notes.append(f"the fit of effect.{added.name} did not converge")
-    for _, data, fitted in fits:
-        notes += unused(data, fitted.fit)
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
+    for _, data, fitted in fits:
+        notes += unused(data, fitted.fit, contact)
     placed = any(one.record.has_place for one in bench.training.prepared)
     if contact and placed and not any(one.impacts.size for one in bench.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)

@@ -82,7 +82,7 @@ def _evened(t: np.ndarray, x: np.ndarray, pieces, where, notes: list[str]) -> np
         notes.append(f"{said}; x does not follow: even times are taken")
         return even
     follow = "and x follows" if follows - 2 * error > 0.5 else "and x does not tell whether it follows"
-    notes.append(f"{said}, {follow}: noise and impacts are found less well")
+    notes.append(f"{said}, {follow}: noise, and impacts if there are any, are found less well")
     return t
 
 

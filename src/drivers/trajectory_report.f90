@@ -1,0 +1,103 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What `separatrix trajectory` says of a motion at its end: of drive periods only where there is a drive, of impacts only where
+!> there is something to hit.
+module trajectory_report
+  use angle_units, only: unit_of
+  use attractors, only: attractor_t, features_t, kind_rest, regime_names
+  use kinds, only: wp
+  use machine_facts, only: has_drive_period, has_stops
+  use motion, only: motion_t
+  use motion_state, only: log_t
+  use restoring_law, only: position_is_angle
+  use session, only: session_t
+  use status, only: is_given_up, reason_event_budget, reason_name, reason_time_over
+  use text, only: to_text
+  use trajectory, only: outcome_t, span_t
+  implicit none
+  private
+
+  public :: report, counted_over, explained
+
+contains
+
+  !> Two lines: the steady motion, and how the run ended.
+  subroutine report(session, moving, span, outcome, cycle, log)
+    type(session_t), intent(inout) :: session
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(outcome_t), intent(in) :: outcome
+    type(attractor_t), intent(in) :: cycle
+    type(log_t), intent(in) :: log
+    associate (f => outcome%window, journal => session%journal, is_angle => position_is_angle(session%the_case%laws))
+      if (outcome%reason /= reason_time_over) then
+        call journal%line('end', trim(merge('given up', 'ended   ', is_given_up(outcome%reason)))//' before the end: '// &
+          explained(outcome%reason)//'; '//to_text(log%events)//' events recorded until then')
+        return
+      end if
+      call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
+        ' '//unit_of('m', is_angle)//', v_max '//to_text(f%v_max, 6)//' '//unit_of('m/s', is_angle)// &
+        impacts_text(moving, f, cycle, is_angle)//' ('//taken_over(moving, span, cycle)//')', &
+        '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
+        to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
+        ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
+      call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, '// &
+        trim(merge('drive period              ', 'period of the slowest mode', has_drive_period(moving)))//' '// &
+        to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
+    end associate
+  end subroutine report
+
+  !> ', 1.0 impacts per period at 0.2 m/s', of a machine that has something to hit; without a drive per second.
+  pure function impacts_text(moving, features, cycle, is_angle) result(text)
+    type(motion_t), intent(in) :: moving
+    type(features_t), intent(in) :: features
+    type(attractor_t), intent(in) :: cycle
+    logical, intent(in) :: is_angle
+    character(len=:), allocatable :: text
+    text = ''
+    if (.not. has_stops(moving)) return
+    if (has_drive_period(moving)) then
+      text = ', '//to_text(features%impacts_per_period, 5)//' impacts per period'
+    else
+      text = ', '//to_text(features%impacts_per_period/counted_over(moving, cycle), 5)//' impacts per second'
+    end if
+    text = text//' at '//to_text(features%mean_impact_speed, 6)//' '//unit_of('m/s', is_angle)
+  end function impacts_text
+
+  !> The time [s] for which `impacts_per_period` stands: of a limit cycle, one of its returns.
+  pure real(wp) function counted_over(moving, cycle) result(time)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: cycle
+    time = moving%machine%period
+    if (cycle%by_event .and. cycle%period > 0 .and. cycle%duration > 0) time = cycle%duration/cycle%period
+  end function counted_over
+
+  !> What steady values are taken over.
+  pure function taken_over(moving, span, cycle) result(text)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(attractor_t), intent(in) :: cycle
+    character(len=:), allocatable :: text
+    if (cycle%period > 0) then
+      text = 'over its cycle of period '//to_text(cycle%period)
+      if (.not. has_drive_period(moving)) text = 'over its cycle of '//to_text(cycle%period*moving%machine%period, 6)//' s'
+      if (cycle%by_event) text = 'over its limit cycle of '//to_text(cycle%duration, 10)//' s'
+      if (cycle%kind == kind_rest .and. .not. has_drive_period(moving)) text = 'at rest'
+      if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
+    else if (span%whole_periods .and. has_drive_period(moving)) then
+      text = 'last '//to_text(nint(span%window/moving%machine%period))//' drive periods'
+    else
+      text = 'last '//to_text(span%window, 6)//' s'
+    end if
+  end function taken_over
+
+  !> The reason, and what counts where that is not plain.
+  pure function explained(reason) result(text)
+    integer, intent(in) :: reason
+    character(len=:), allocatable :: text
+    text = reason_name(reason)
+    if (reason == reason_event_budget) text = text//' (flights count, those between samples of a controller, too)'
+  end function explained
+
+end module trajectory_report

@@ -1,0 +1,69 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Which places of a machine of several bodies have an angle for a position: those that a pendulum acts on, and those joined to
+!> them, as a joint takes the difference of two positions.
+module part_angles
+  use law_table, only: label_length, law_choice_t, part_family, value_of
+  implicit none
+  private
+
+  public :: names_of_angles, watched_is_angle
+
+contains
+
+  !> For each place, bodies and points of structures in the order of the choices, whether it is an angle.
+  pure function are_angles(choices) result(angles)
+    type(law_choice_t), intent(in) :: choices(:)
+    logical, allocatable :: angles(:)
+    integer :: ends(2), i, round
+    allocate (angles(count([(is_place(choices(i)), i=1, size(choices))])), source=.false.)
+    do round = 0, size(angles)
+      do i = 1, size(choices)
+        if (.not. is_joint(choices(i))) cycle
+        ends = nint([value_of(choices(i), 'first_end'), value_of(choices(i), 'second_end')])
+        if (any(ends > size(angles))) cycle
+        if (choices(i)%name == 'spring:pendulum') then
+          angles(pack(ends, ends > 0)) = .true.
+        else if (all(ends > 0)) then
+          angles(ends) = any(angles(ends))
+        end if
+      end do
+    end do
+  end function are_angles
+
+  !> Names of the places that are angles.
+  pure function names_of_angles(choices) result(names)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=label_length), allocatable :: names(:)
+    integer :: i
+    names = pack(choices%label, [(is_place(choices(i)), i=1, size(choices))])
+    names = pack(names, are_angles(choices))
+  end function names_of_angles
+
+  !> Whether the position that the start and the results refer to is an angle.
+  pure logical function watched_is_angle(choices) result(is_angle)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=label_length), allocatable :: names(:)
+    integer :: i
+    is_angle = .false.
+    if (.not. any(choices%name == 'spring:pendulum')) return
+    names = names_of_angles(choices)
+    do i = 1, size(choices)
+      if (choices(i)%name == 'body:watched' .or. choices(i)%name == 'point:watched') is_angle = any(names == choices(i)%label)
+    end do
+  end function watched_is_angle
+
+  pure logical function is_place(choice)
+    type(law_choice_t), intent(in) :: choice
+    is_place = choice%family == part_family .and. (index(choice%name, 'body:') == 1 .or. index(choice%name, 'point:') == 1)
+  end function is_place
+
+  !> Whether a part acts between two places, or one and the ground.
+  pure logical function is_joint(choice)
+    type(law_choice_t), intent(in) :: choice
+    is_joint = choice%family == part_family .and. (index(choice%name, 'spring:') == 1 .or. &
+                                                   index(choice%name, 'friction:') == 1 .or. index(choice%name, 'contact:') == 1)
+  end function is_joint
+
+end module part_angles
