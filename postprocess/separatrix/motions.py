@@ -11,7 +11,16 @@ import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
 from separatrix.cases import Case, as_case, number
 from separatrix.errors import USAGE, GivenUpError, SeparatrixError
-from separatrix.variables import EVENTS, FORMAT_VERSION, KINDS, REASONS, REGIMES, SAMPLES, attributes
+from separatrix.variables import (
+    EVENTS,
+    FORMAT_VERSION,
+    KINDS,
+    REASONS,
+    REGIMES,
+    SAMPLES,
+    attributes,
+    position_is_angle,
+)
 from separatrix.version import __version__
 
 _BOOK = (
@@ -112,9 +121,14 @@ def _dataset(case: Case, motion: simulate.Motion, cycle: dict[str, float] | None
     events["kind"] = events["kind"].astype(np.int8)
     if not two_bodies:
         del events["driver_x"], events["driver_v"]
-    data = {name: ("time", columns[name], attributes(SAMPLES[name])) for name in SAMPLES if name in columns}
+    angle = position_is_angle(case.resolved)
+    data = {
+        name: ("time", columns[name], attributes(row, angle))
+        for name, row in SAMPLES.items()
+        if name in columns
+    }
     data |= {
-        f"event_{name}": ("event", events[name], attributes(EVENTS[name]))
+        f"event_{name}": ("event", events[name], attributes(EVENTS[name], angle))
         for name in EVENTS
         if name in events
     }
@@ -130,6 +144,14 @@ def _window(run: dict, period: float) -> float:
     return min(max(1.0, np.floor(run["window"] / period + 0.5)), np.floor(run["duration"] / period)) * period
 
 
+def _driven(resolved: dict) -> int:
+    """Whether the drive period is that of a drive, and not of the slowest mode."""
+    drive = resolved.get("drive", {})
+    if "law" in drive:
+        return int(drive["law"] not in ("none", "velocity", "pid_velocity"))
+    return int(any(part.get("frequency", 0) > 0 for part in drive.values()))
+
+
 def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None) -> dict[str, object]:
     resolved = case.resolved
     steady = cycle or summary
@@ -138,7 +160,7 @@ def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None
     about: dict[str, object] = {
         "format": "separatrix", "format_version": FORMAT_VERSION, "kind": "trajectory", "complete": 1,
         "title": case.title, "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
-        "drive_period": summary["drive_period"], "drive_ratio": ratio,
+        "drive_period": summary["drive_period"], "driven": _driven(resolved), "drive_ratio": ratio,
         "window": _window(resolved["run"], summary["drive_period"]),
         "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],
         "regime": REGIMES[int(steady["regime"])],

@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from separatrix.figures import trajectory
 from separatrix.open import open_result
 
@@ -70,7 +71,11 @@ def test_pendulums_in_parts_are_angles_and_have_no_drive(separatrix, tmp_path):
     assert "impacts" not in printed
     assert "drive" not in printed
     assert "period of the slowest mode" in printed
+    told = sx.trajectory(tmp_path / "case.toml", duration=1.0)
+    assert [told[name].attrs["units"] for name in ("x", "event_x", "v")] == ["rad", "rad", "rad/s"]
+    assert told.attrs["driven"] == 0
     with open_result(tmp_path / "out.h5") as result:
+        assert result.attrs["driven"] == 0
         assert {result[name].attrs["units"] for name in ("x", "first_x", "second_x")} == {"rad"}
         assert {result[name].attrs["units"] for name in ("v", "first_v", "second_v")} == {"rad/s"}
         figure = trajectory.phase_portrait(result, "pendulums")

@@ -13,6 +13,7 @@ from separatrix.errors import CaseError
 from separatrix.figures.look import Look
 from separatrix.figures.parts import numbers_of_parts, parts, several_bodies
 from separatrix.library import Model
+from separatrix.variables import position_is_angle
 
 # Symbols are those of docs/start.md and docs/theory.md: m, c, k, e, omega.
 # symbol and unit of the parameters that matter for a caption, in this order; the library knows better units
@@ -216,22 +217,13 @@ def start_pieces(result: xr.Dataset) -> list[str]:
     if not isinstance(start, dict):
         return []
     symbols = _START
-    if _is_angle(result):
+    if position_is_angle(resolved_case(result)):
         symbols = {key: (symbol, unit.replace("m", "rad")) for key, (symbol, unit) in _START.items()}
     varying = {str(name) for name in result.dims} | set(str(result.attrs.get("axes", "")).split())
     pieces = _values(start, symbols, "", varying, {})
     if start.get("crank_angle") and "crank_angle" not in varying:
         pieces += _values(start, {"crank_angle": (r"$\varphi_0$", "rad")}, "", set(), {})
     return [", ".join(pieces)] if pieces else []
-
-
-def _is_angle(result: xr.Dataset) -> bool:
-    """Whether the position is an angle, by the unit that the file has for it."""
-    restoring = resolved_case(result).get("restoring")
-    if isinstance(restoring, dict):
-        return restoring.get("law") == "pendulum"
-    positions = ("x", "x0", "amplitude", "x_max", "orbit_x")
-    return any(result[name].attrs.get("units") == "rad" for name in positions if name in result.variables)
 
 
 def version_text(result: xr.Dataset) -> str:

@@ -267,7 +267,9 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
     if attributes["impacts_per_period"] > 0:
         rate = f"impacts per drive period {attributes['impacts_per_period']:.4g}"
         if not attributes.get("driven", 1):
-            rate = f"{attributes['impacts']} impacts in {attributes['window']:.4g} s"
+            windows = attributes["window"] / attributes["drive_period"]
+            impacts = attributes.get("impacts", round(attributes["impacts_per_period"] * windows))
+            rate = f"{impacts} impacts in {attributes['window']:.4g} s"
         pieces.append(f"{rate}, their mean speed {attributes['mean_impact_speed']:.4g} {unit(result['v'])}")
     return [*pieces, plain(version_text(result))]
 
