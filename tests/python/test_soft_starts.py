@@ -5,9 +5,9 @@
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from program import run, succeed
 from scipy.integrate import solve_ivp
-import separatrix as sx
 from separatrix import simulate
 from separatrix.library import CaseError, Model
 
@@ -79,7 +79,10 @@ def one_body(law: str, side: int) -> str:
 
 def in_parts(law: str, side: int) -> str:
     """The same as a machine in parts: the foot of the spring is a force."""
-    return PARTS + f'[contact.wall]\nbetween = ["block"]\n{law}\n{"upper" if side > 0 else "lower"} = {side * GAP}\n'
+    return (
+        PARTS
+        + f'[contact.wall]\nbetween = ["block"]\n{law}\n{"upper" if side > 0 else "lower"} = {side * GAP}\n'
+    )
 
 
 def referee(force, side: int, x0: float, v0: float) -> tuple[float, float]:
@@ -168,7 +171,7 @@ upper = 0.1
 
 @pytest.mark.parametrize("name", ["pulls", "hunt_crossley"])
 def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeypatch) -> None:
-    """Starts of a map lie on both sides of the surface: with lanes of any width the same bits, without the same ends."""
+    """Starts on both sides of the surface: lanes of any width have the same bits, no lanes the same ends."""
     axes = "".join(
         f'[[axis]]\nname = "{axis}"\nfrom = {-end}\nto = {end}\ncount = 4\n'
         for axis, end in (("x0", 0.02), ("v0", 0.2))
@@ -181,7 +184,12 @@ def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeyp
         settings += ["--set", "run.duration=15"]
         succeed(separatrix, "basin", "case.toml", *settings, "-o", f"{run_with}.h5", folder=tmp_path)
         with h5py.File(tmp_path / f"{run_with}.h5") as file:
-            maps.append({key: file[key][()] for key in ("attractor", "reason", "amplitude", "v_max", "impacts_per_period")})
+            maps.append(
+                {
+                    key: file[key][()]
+                    for key in ("attractor", "reason", "amplitude", "v_max", "impacts_per_period")
+                }
+            )
     assert (maps[0]["reason"] <= 2).all()
     for key, values in maps[0].items():
         np.testing.assert_array_equal(values, maps[1][key], err_msg=key)
@@ -194,7 +202,7 @@ def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeyp
 
 
 def test_all_points_of_a_motion_are_marked_in_its_map() -> None:
-    """One of two section points lies inside the wall: marked where the map goes so far, else the figure says so."""
+    """One of two section points is inside the wall: marked where the map goes so far, else said."""
     case = sx.Case.from_text(
         """
 [body]
