@@ -177,8 +177,8 @@ contains
     end associate
   end subroutine bring_back
 
-  !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `reason` is not 0 if it had to be given up;
-  !> `smooth` where a transition is not known to be smooth.
+  !> Takes a motion on to its next section, `lasted` [s] later, with the events on the way. `reason` is not 0 if it had to be given
+  !> up; `smooth` where a transition is not known to be smooth.
   subroutine advance_alone(structure, state, events, lasted, reason, smooth)
     type(structure_t), intent(in) :: structure
     type(jointed_state_t), intent(inout) :: state
@@ -199,8 +199,8 @@ contains
     if (present(smooth)) smooth = certain
   end subroutine advance_alone
 
-  !> The same with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `reason` is not 0 also where
-  !> the derivatives are not known.
+  !> The same with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `reason` is not 0 also
+  !> where the derivatives are not known.
   subroutine advance_with_frame(machines, structure, state, frame, growth, events, lasted, reason)
     type(neighbourhood_t), intent(in) :: machines
     type(structure_t), intent(in) :: structure

@@ -20,8 +20,6 @@ module audit
     integer :: changes = 0
     !> Points of a boundary whose labels are right a little further from them than the file says.
     integer :: wider = 0
-    !> Points whose rerun was given up as well.
-    integer :: given_up = 0
     !> Every point was run again.
     logical :: whole = .false.
     !> Points whose impacts and states were compared with those in quadruple precision: settled ones.

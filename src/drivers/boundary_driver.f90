@@ -17,7 +17,7 @@ module boundary_driver
   use checksum, only: crc32
   use command_line, only: command_t
   use edge_state, only: edge_names, edge_texts
-  use endings, only: judge_given_up
+  use endings, only: judge_file
   use errors, only: error_t, fail
   use event_words, only: word_text
   use grid, only: grid_t, point_slice, two_axes
@@ -28,7 +28,7 @@ module boundary_driver
   use map_reader, only: reader_t
   use map_schema, only: schema_t
   use session, only: describe_file, identity_of, session_t
-  use status, only: exit_bad_case, exit_done, is_given_up
+  use status, only: exit_bad_case, exit_done
   use stored_map, only: open_map_session, read_labels, restore_catalogues
   use text, only: replace_all, to_text
   use trajectories, only: describe_regime
@@ -63,7 +63,7 @@ contains
                                 ' edges between points of different labels')
       call session%end_with(exit_done)
     end if
-    call judge_map(session, reader, error)
+    call judge_file(session%journal, reader, command%partial, error)
     call session%stop_if(error)
     call session%begin(path, tiled=.true.)
     call restore_catalogues(reader, session%team, session%journal, grid, session%the_case, catalogues, error)
@@ -99,17 +99,6 @@ contains
     call session%journal%line('written', 'wrote '//path)
     call session%end_with(exit_done)
   end subroutine run_boundary
-
-  !> Code 78 where every point of the map was given up: there is no label between which a boundary could run.
-  subroutine judge_map(session, reader, error)
-    type(session_t), intent(inout) :: session
-    type(reader_t), intent(inout) :: reader
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: reasons(:)
-    call reader%read_values('/reason', reasons, error)
-    if (.not. allocated(error)) call judge_given_up(session%journal, count(is_given_up(nint(reasons)), kind=int64), &
-                                                    size(reasons, kind=int64), 'points of the map', session%command%partial, error)
-  end subroutine judge_map
 
   !> The planes of a map, one for each value of its other axes: their labels, and the edges between neighbours of different ones.
   subroutine open_planes(session, reader, grid, planes)

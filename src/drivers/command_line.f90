@@ -32,7 +32,7 @@ module command_line
     character(len=:), allocatable :: catalogue
     !> `--set` arguments.
     character(len=longest_argument), allocatable :: overrides(:)
-    logical :: help = .false., version = .false., validate = .false., dry_run = .false.
+    logical :: help = .false., partial = .false., version = .false., validate = .false., dry_run = .false.
     logical :: force = .false., resume = .false., json = .false., quiet = .false., search_only = .false.
     real(wp) :: time_limit = 0
     !> Seconds between lines of progress; 0 = as the journal thinks fit.
@@ -58,8 +58,6 @@ module command_line
     integer :: sample = 200, seed = 1
     !> `verify`: share of the labels that may change, in per cent.
     real(wp) :: max_changes = 1
-    !> Motions that were given up are no error.
-    logical :: partial = .false.
     !> Options that were given.
     logical :: given(size(options)) = .false.
   end type command_t
@@ -118,8 +116,7 @@ contains
       call fail(error, exit_usage, 'a command is missing; the commands are '//join(commands, ', ')// &
                 ' (see separatrix --help)')
     else if (len(command%path) == 0 .and. command%name /= 'laws') then
-      call fail(error, exit_usage, command%name//': the file is missing (see separatrix '//command%name// &
-                ' --help)')
+      call fail(error, exit_usage, command%name//': the file is missing (see separatrix '//command%name//' --help)')
     else if (len(command%path) > 0 .and. command%name == 'laws') then
       call fail(error, exit_usage, "laws takes no file; found '"//command%path//"'")
     else if (command%name == 'merge' .and. size(command%shards) == 0) then

@@ -4,14 +4,16 @@
 !> How trajectories ended, as every command that runs many says it, and whether that is an error.
 module endings
   use errors, only: error_t, fail
+  use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64
-  use status, only: exit_given_up, is_given_up, last_reason, reason_names
+  use map_reader, only: reader_t
+  use status, only: exit_given_up, is_given_up, last_reason, reason_names, reason_not_run
   use text, only: to_text
   implicit none
   private
 
-  public :: report_reasons, judge_reasons, judge_given_up, judge_motion
+  public :: report_reasons, judge_reasons, judge_given_up, judge_file, judge_motion
 
 contains
 
@@ -52,6 +54,27 @@ contains
                         '"given_up": '//to_text(given_up)//', "of": '//to_text(motions))
     end if
   end subroutine judge_given_up
+
+  !> As `judge_reasons`, of the points of a file.
+  subroutine judge_file(journal, reader, partial, error)
+    type(journal_t), intent(inout) :: journal
+    type(reader_t), intent(in) :: reader
+    logical, intent(in) :: partial
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: names(2) = [character(len=14) :: '/reason', '/branch_reason']
+    integer(int64), dimension(0:last_reason) :: counts, reasons
+    integer :: i
+    reasons = 0
+    do i = 1, size(names)
+      if (.not. reader%has(trim(names(i)))) cycle
+      call count_codes(reader, trim(names(i)), counts, error)
+      if (allocated(error)) return
+      reasons = reasons + counts
+    end do
+    ! A sweep that runs one way has no holds of the other.
+    reasons(reason_not_run) = 0
+    call judge_reasons(journal, reasons, partial, error)
+  end subroutine judge_file
 
   !> Code 78 where the one motion that was asked for was given up, as `words` say, unless `partial` results are asked for.
   pure subroutine judge_motion(reason, words, partial, error)

@@ -17,7 +17,7 @@ module list_audit
   use points_driver, only: open_list_journey, read_further
   use reference, only: run_reference
   use span_check, only: check_periods
-  use status, only: exit_io, is_given_up
+  use status, only: exit_io
   use text, only: to_text
   use trajectories, only: journey_t, run_trajectories
   use trajectory, only: outcome_t
@@ -67,7 +67,6 @@ contains
       call run_trajectories(journey, none%attractors, start, outcomes)
       associate (outcome => outcomes(1))
         audit%points = audit%points + 1
-        if (is_given_up(outcome%reason)) audit%given_up = audit%given_up + 1
         if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &
             .or. outcome%impacts /= nint(table(point, 6)) .or. outcome%reason /= nint(table(point, 7))) then
           audit%differing = audit%differing + 1

@@ -14,7 +14,7 @@ module verify_driver
   use case_setup, only: grid_of, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use endings, only: judge_given_up, judge_motion
+  use endings, only: judge_file, judge_motion
   use errors, only: error_t, fail
   use grid, only: grid_t, point_laws, point_slice, point_start
   use info_driver, only: count_codes
@@ -30,7 +30,7 @@ module verify_driver
   use restoring_law, only: position_is_angle
   use serial_team, only: serial_team_t
   use statistics, only: share_upper_limit
-  use status, only: exit_io, exit_uncertain, is_given_up, reason_code, reason_settled
+  use status, only: exit_io, exit_uncertain, reason_code, reason_settled
   use stored_map, only: restore_catalogues
   use sweep_driver, only: sweep_axes
   use text, only: to_text
@@ -57,7 +57,7 @@ contains
     type(journal_t) :: journal
     character(len=:), allocatable :: kind, resolved, reason
     type(case_t) :: the_case
-    type(error_t), allocatable :: ignored
+    type(error_t), allocatable :: ignored, given_up
     character(len=128) :: no_overrides(0)
     integer :: datasets
     integer(int64) :: points
@@ -90,6 +90,7 @@ contains
         call reader%text_attribute('/', 'reason', reason, error)
       end select
     end if
+    if (.not. allocated(error)) call judge_file(journal, reader, command%partial, given_up)
     call reader%close(ignored)
     if (allocated(error)) return
     call report(command, kind, datasets, points, audit)
@@ -97,7 +98,7 @@ contains
       ' of '//to_text(audit%points)//' points rerun differ from the file, first '//audit%first_difference)
     if (.not. allocated(error)) call judge_changes(command, audit, error)
     if (allocated(error)) return
-    call judge_given_up(journal, int(audit%given_up, int64), int(audit%points, int64), 'points', command%partial, error)
+    if (allocated(given_up)) call move_alloc(given_up, error)
     if (allocated(reason)) call judge_motion(reason_code(reason), reason//'; the file is whole', command%partial, &
                                              error)
   end subroutine run_verify
@@ -205,7 +206,6 @@ contains
     integer :: k
     logical :: same, inferred
     audit%points = audit%points + 1
-    if (is_given_up(nint(values(3)))) audit%given_up = audit%given_up + 1
     inferred = .false.
     if (reader%has('/origin')) then
       call reader%read_block('/origin', place, spread(1_int64, 1, size(place)), stored, error)

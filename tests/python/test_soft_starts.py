@@ -171,7 +171,7 @@ upper = 0.1
 
 @pytest.mark.parametrize("name", ["pulls", "hunt_crossley"])
 def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeypatch) -> None:
-    """Starts of a map lie on both sides of the surface: same bits for lanes of any width, same ends without."""
+    """Starts on both sides of the surface: lanes of any width have the same bits, no lanes the same ends."""
     axes = "".join(
         f'[[axis]]\nname = "{axis}"\nfrom = {-end}\nto = {end}\ncount = 4\n'
         for axis, end in (("x0", 0.02), ("v0", 0.2))
@@ -202,7 +202,7 @@ def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeyp
 
 
 def test_all_points_of_a_motion_are_marked_in_its_map() -> None:
-    """One of two section points lies inside the wall: marked where the map goes so far, else told."""
+    """One of two section points is inside the wall: marked where the map goes so far, else said."""
     case = sx.Case.from_text(
         """
 [body]

@@ -23,8 +23,8 @@ _PLANE = 2
 def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Yield label, positions and velocities of each periodic attractor of one slice.
 
-    They are those at the crank angle of the starts, not numbers where they cannot be computed. `place`: the
-    position on the axes that are not x0 and v0.
+    They are those at the crank angle of the starts, not numbers where they cannot be computed.
+    `place`: the position on the axes that are not x0 and v0.
     Nothing comes of several bodies, whose section has more coordinates, of a file without a case, and without
     the library.
     """
