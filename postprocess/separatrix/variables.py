@@ -14,7 +14,7 @@ import numpy as np
 FORMAT_VERSION = 2
 
 _REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
-_REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget"
+_REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget mode_cycle"
 _EVENTS = (
     "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release "
     "touch_upper touch_lower separation blow"

@@ -16,7 +16,7 @@ module status
   ! Why a trajectory ended. The codes add up to the number of points; there is no catch-all.
   integer, parameter, public :: reason_not_run = 0, reason_settled = 1, reason_time_over = 2, &
     reason_left_domain = 3, reason_not_finite = 4, reason_event_budget = 5, &
-    reason_step_failed = 6, reason_step_budget = 7, last_reason = 7
+    reason_step_failed = 6, reason_step_budget = 7, reason_mode_cycle = 8, last_reason = 8
 
   !> No end of a trajectory: it went on, but how it changes with its start is not known.
   integer, parameter, public :: reason_not_smooth = -1
@@ -24,7 +24,7 @@ module status
   !> Texts of the reason codes, index = code.
   character(len=*), parameter, public :: reason_names(0:last_reason) = [character(len=14) :: &
     'not_run', 'settled', 'time_over', 'left_domain', 'not_finite', 'event_budget', 'step_failed', &
-    'step_budget']
+    'step_budget', 'mode_cycle']
 
 contains
 

@@ -7,8 +7,7 @@ module coordinate_segments
   use jointed, only: is_stop, joint_elastic
   use jointed_motion, only: advance_jointed, advance_jointed_period, jointed_motion_t
   use jointed_section, only: start_of_jointed
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
-  use jointed_transition, only: rounding_of_speed
+  use jointed_state, only: joint_motion, jointed_state_t, rounding_of_speed, turning_at
   use kinds, only: wp
   use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
     tally_t

@@ -65,7 +65,7 @@ module session
 
 contains
 
-  !> Starts the log and reads the case; under mpirun also starts the team. Ends the program if the case is bad.
+  !> Starts the log and reads the case, which is warned of if that is all; under mpirun also starts the team. Ends the program if the case is bad.
   subroutine open_session(command, session)
     type(command_t), intent(in) :: command
     type(session_t), intent(out) :: session
@@ -88,6 +88,7 @@ contains
                                                    wants_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
     if (len(command%draw) > 0) call draw_machine(session)
+    if (command%validate) call warn_about(command%name, session%the_case, session%journal)
     if (.not. any(command%name == [character(len=10) :: 'basin', 'sweep', 'points'])) return
     ! What computes nothing, or a sample on one core, looks for a GPU only to refuse what would be refused.
     if ((command%validate .or. command%dry_run) .and. command%device /= 'gpu') return

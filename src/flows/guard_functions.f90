@@ -30,8 +30,10 @@ module guard_functions
     real(wp) :: power(0:3, most_functions)
     !> Bounds from the powers and harmonics on derivatives 0 to 6.
     real(wp) :: steady(0:6, most_functions)
-    !> Size of the sums that the amplitudes are, as the value, rate and curvature of a guard have it.
-    real(wp) :: blur(0:2, most_guards)
+    !> Size of the sums that the amplitudes are, as the value and first three derivatives of a guard have it.
+    real(wp) :: blur(0:3, most_guards)
+    !> By how much guards are raised that are nothing but rounding at the start, 0 for the others.
+    real(wp) :: lift(most_guards) = 0
   end type search_t
 
 contains
@@ -77,8 +79,9 @@ contains
           largest = (abs(guard%place) + abs(guard%speed)*flow%size_of_exponent(k))*flow%size_of_joint(k, guard%joint)
           if (guard%held > 0) largest = largest + abs(guard%force)*flow%size_of_force(k, guard%held)
           search%blur(:, g) = search%blur(:, g) &
-                              + largest*path%size_of_amplitude(k)*flow%size_of_exponent(k)**[(order, order=0, 2)]
+                              + largest*path%size_of_amplitude(k)*flow%size_of_exponent(k)**[(order, order=0, 3)]
         end do
+        if (guard%held > 0) search%blur(:, g) = search%blur(:, g) + blur_of_drive(machine, flow, path, guard)
       end associate
     end do
     g = search%functions
@@ -98,6 +101,24 @@ contains
       end do
     end do
   end subroutine prepare_search
+
+  !> What a force of a constraint, as the value and first three derivatives of a guard have it, is a sum of beside the exponentials.
+  pure function blur_of_drive(machine, flow, path, guard) result(blur)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: guard
+    real(wp) :: blur(0:3)
+    integer :: m, order
+    blur = 0
+    blur(0) = sum(abs(flow%reaction(guard%held, :))*abs(path%force(:machine%n)))
+    blur(1) = sum(abs(flow%reaction(guard%held, :))*abs(path%force_rate(:machine%n)))
+    do m = 1, size(path%turning)
+      blur = blur + flow%size_of_force_response(m, guard%held)*modulus(path%turning(m)) &
+             *(m*machine%frequency)**[(order, order=0, 3)]
+    end do
+    blur = abs(guard%force)*blur
+  end function blur_of_drive
 
   !> Exponentials and harmonics at `t` [s] after the start.
   pure subroutine bases_at(search, t, growth, turning)

@@ -5,9 +5,9 @@
 !> and curvature at both ends, in Bernstein's form, and a bound on the sixth derivative show that a guard stays positive;
 !> where they do not, steps certified by the third derivative lead to its zero from the left.
 module guard_search
-  use certified_step, only: positive_step
   use elementary, only: exponential, logarithm
   use guard_functions, only: bases_at, bound, derivatives, search_t
+  use guard_zero, only: approach, stays_positive, walk
   use guards, only: joint_guard_t, meets_lower, meets_upper, most_guards
   use kinds, only: wp
   implicit none
@@ -17,9 +17,7 @@ module guard_search
 
   !> Rounding of sums, as a share of the sum of absolute values.
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
-  !> Remainder of the quintic: |y - H| <= max|y^(6)| L^6/46080 in the middle of a panel.
-  real(wp), parameter :: remainder = 46080
-  integer, parameter :: most_steps = 200, most_turning_steps = 20
+  integer, parameter :: most_turning_steps = 20
   !> After so many panels their length is looked at again: what was fast may have died away.
   integer, parameter :: panels_between = 8
   !> Where misses are noted a panel is no longer than so many radians of the fastest part: a rate turns once within.
@@ -33,7 +31,7 @@ contains
   !> `wants_margin`.
   pure subroutine find_first(search, list, origin, duration, wants_speed, wants_margin, time, fallen, extremes, top_speed, &
                              margin, evaluations)
-    type(search_t), intent(in) :: search
+    type(search_t), intent(inout) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: origin, duration
     logical, intent(in) :: wants_speed, wants_margin
@@ -45,7 +43,6 @@ contains
     real(wp), dimension(0:3, search%functions) :: here, there
     real(wp), dimension(most_guards) :: certified, root
     real(wp) :: a, b, length, longest, tie
-    logical :: idle(most_guards)
     integer :: g, panels
     evaluations = 1
     fallen = .false.
@@ -62,7 +59,7 @@ contains
     panels = 0
     tie = 8*spacing(max(origin, origin + duration))
     time = duration
-    call look_at_start(search, list, here, length, certified, idle, fallen)
+    call look_at_start(search, list, here, length, certified, fallen)
     if (any(fallen)) time = 0
     call note_extremes(search, here(:, search%functions), extremes, top_speed)
     if (any(fallen)) return
@@ -74,7 +71,7 @@ contains
       do g = 1, search%functions
         there(:, g) = derivatives(search, g, b, growth, turning)
       end do
-      call search_panel(search, a, b, here, there, tie, certified, idle, time, root, evaluations)
+      call search_panel(search, a, b, here, there, tie, certified, time, root, evaluations)
       if (any(root(:search%guards) <= time)) then
         fallen(:search%guards) = root(:search%guards) <= time + tie
         call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
@@ -97,45 +94,52 @@ contains
 
   !> The zeros of the guards, each its `root` [s], on the panel from `a` to `b` [s], where the values are `here` and `there`;
   !> huge where there is none before `time`, which becomes that of the first. Zeros within `tie` of it are found too.
-  pure subroutine search_panel(search, a, b, here, there, tie, certified, idle, time, root, evaluations)
+  pure subroutine search_panel(search, a, b, here, there, tie, certified, time, root, evaluations)
     type(search_t), intent(in) :: search
     real(wp), intent(in) :: a, b, here(0:, :), there(0:, :), tie, certified(:)
-    logical, intent(in) :: idle(:)
     real(wp), intent(inout) :: time
     real(wp), intent(out) :: root(:)
     integer, intent(inout) :: evaluations
     integer :: g
     root = huge(1.0_wp)
     do g = 1, search%guards
-      if (idle(g)) cycle
       if (certified(g) >= b) cycle
       if (certified(g) <= a) then
         if (stays_positive(search, g, a, b, here(:, g), there(:, g))) cycle
       end if
-      call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
+      if (search%lift(g) > 0) then
+        call walk(search, g, a, min(b, time + tie), root(g), evaluations)
+      else
+        call approach(search, g, max(a, certified(g)), min(b, time + tie), root(g), evaluations)
+      end if
       if (root(g) < time) time = root(g)
     end do
   end subroutine search_panel
 
-  !> Guards that are zero at the start, where the values are `here`: those that fall at once, those that are nothing but rounding
-  !> (`idle`), and how long within `length` [s] the others are `certified` not to fall.
-  pure subroutine look_at_start(search, list, here, length, certified, idle, fallen)
-    type(search_t), intent(in) :: search
+  !> Guards that are zero at the start, where the values are `here`: those that fall at once, and how long within `length` [s] the
+  !> others are `certified` not to fall. One that is nothing but rounding falls when it is below that.
+  pure subroutine look_at_start(search, list, here, length, certified, fallen)
+    type(search_t), intent(inout) :: search
     type(joint_guard_t), intent(in) :: list(:)
-    real(wp), intent(in) :: here(0:, :), length
+    real(wp), intent(inout) :: here(0:, :)
+    real(wp), intent(in) :: length
     real(wp), intent(out) :: certified(:)
-    logical, intent(out) :: idle(:)
     logical, intent(inout) :: fallen(:)
-    integer :: g
+    real(wp) :: none, sizes(0:3)
+    logical :: idle
+    integer :: g, order
     certified = 0
-    idle = .false.
     do g = 1, search%guards
-      if (.not. (list(g)%from_zero .or. here(0, g) <= rounding*(bound(search, g, 0, 0.0_wp, 0.0_wp) + search%blur(0, g)))) cycle
-      call departure(here(1:3, g), [bound(search, g, 1, 0.0_wp, length) + search%blur(1, g), &
-                                    bound(search, g, 2, 0.0_wp, length) + search%blur(2, g), &
-                                    bound(search, g, 3, 0.0_wp, length)], bound(search, g, 4, 0.0_wp, length), length, &
-                     certified(g), idle(g))
-      fallen(g) = .not. idle(g) .and. certified(g) <= 0
+      sizes(0) = bound(search, g, 0, 0.0_wp, 0.0_wp) + search%blur(0, g)
+      none = rounding*sizes(0)
+      if (.not. (list(g)%from_zero .or. here(0, g) <= none)) cycle
+      sizes(1:) = [(bound(search, g, order, 0.0_wp, length) + search%blur(order, g), order=1, 3)]
+      call departure(here(1:3, g), sizes, bound(search, g, 4, 0.0_wp, length), length, certified(g), idle)
+      fallen(g) = .not. idle .and. certified(g) <= 0
+      if (.not. idle) cycle
+      search%lift(g) = none - min(here(0, g), 0.0_wp) + tiny(none)
+      search%power(0, g) = search%power(0, g) + search%lift(g)
+      here(0, g) = here(0, g) + search%lift(g)
     end do
   end subroutine look_at_start
 
@@ -260,10 +264,10 @@ contains
   end function panel_length
 
   !> A time up to which a function that is zero at 0 stays positive, from its first three derivatives and a bound on the
-  !> fourth, `longest` at most; `sizes` bound the derivatives for their rounding. 0 if it falls at once; `idle` if nothing
-  !> but rounding is there.
+  !> fourth, `longest` at most; `sizes` bound the value and the derivatives for their rounding. 0 if it falls at once; `idle` if
+  !> nothing but rounding is there, or what departs is no more by then and does not come back before.
   pure subroutine departure(d, sizes, fourth, longest, certified, idle)
-    real(wp), intent(in) :: d(3), sizes(3), fourth, longest
+    real(wp), intent(in) :: d(3), sizes(0:3), fourth, longest
     real(wp), intent(out) :: certified
     logical, intent(out) :: idle
     real(wp), parameter :: factorial(4) = [1.0_wp, 2.0_wp, 6.0_wp, 24.0_wp]
@@ -296,61 +300,14 @@ contains
         end select
       end associate
     end do
+    if (d(first)*certified**first/factorial(first) > rounding*sizes(0)) return
+    if (first == 1 .and. d(2) < -rounding*sizes(2)) then
+      associate (back => -2*d(1)/d(2))
+        if (abs(d(3))*back**2/6 + fourth*back**3/24 <= 0.5_wp*d(1)) return
+      end associate
+    end if
+    certified = 0
+    idle = .true.
   end subroutine departure
-
-  !> Whether Bernstein's coefficients of the quintic lie above its remainder.
-  pure logical function stays_positive(search, g, a, b, here, there)
-    type(search_t), intent(in) :: search
-    integer, intent(in) :: g
-    real(wp), intent(in) :: a, b, here(0:3), there(0:3)
-    real(wp) :: h, least, miss
-    h = b - a
-    least = min(here(0), here(0) + h*here(1)/5, here(0) + h*(2*here(1)/5 + h*here(2)/20), &
-                there(0) - h*(2*there(1)/5 - h*there(2)/20), there(0) - h*there(1)/5, there(0))
-    stays_positive = .false.
-    if (.not. least > 0) return
-    miss = bound(search, g, 6, a, h)*h**6/remainder
-    stays_positive = least > miss
-  end function stays_positive
-
-  !> From `a`, where guard `g` is positive, to its first zero before `b`; huge if there is none.
-  pure subroutine approach(search, g, a, b, root, evaluations)
-    type(search_t), intent(in) :: search
-    integer, intent(in) :: g
-    real(wp), intent(in) :: a, b
-    real(wp), intent(out) :: root
-    integer, intent(inout) :: evaluations
-    complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
-    real(wp) :: d(0:3), third, t, step, falling
-    integer :: i
-    root = huge(root)
-    if (a >= b) return
-    third = bound(search, g, 3, a, b - a)
-    t = a
-    do i = 1, most_steps
-      call bases_at(search, t, growth, turning)
-      evaluations = evaluations + 1
-      d = derivatives(search, g, t, growth, turning)
-      if (d(0) <= 0) then
-        root = t
-        if (d(1) < 0) root = max(a, t - d(0)/d(1))
-        return
-      end if
-      ! Within the next stretch no curvature is below this.
-      falling = max(0.0_wp, -d(2) + third*(b - t)/3)
-      step = positive_step(d(0), d(1), falling)
-      if (t + step > b) return
-      if (step <= 1e-9_wp*(b - a) .and. d(1) < 0) then
-        root = t - d(0)/d(1)
-        return
-      end if
-      if (t + step <= t) then
-        root = t
-        return
-      end if
-      t = t + step
-    end do
-    root = t
-  end subroutine approach
 
 end module guard_search

@@ -29,9 +29,9 @@ module guards
     integer :: held = 0
     !> It is zero now and rises.
     logical :: from_zero = .false.
-    !> Size of the terms that its value, rate and curvature are sums of, beyond what the motion shows: large coordinates
+    !> Size of the terms that its value and first three derivatives are sums of, beyond what the motion shows: large coordinates
     !> that cancel.
-    real(wp) :: blur(0:2) = 0
+    real(wp) :: blur(0:3) = 0
   end type joint_guard_t
 
 contains
@@ -118,10 +118,11 @@ contains
         place = sum(row*abs(state%q(:n)))
         speed = sum(row*abs(state%v(:n)))
         change = sum(row*acceleration)
-        guard%blur = abs(guard%place)*[place, speed, change] + abs(guard%speed)*[speed, change, change*machine%frequency]
+        guard%blur = abs(guard%place)*[place, speed, change, change*machine%frequency] &
+                     + abs(guard%speed)*[speed, change, change*machine%frequency, change*machine%frequency**2]
         if (guard%held > 0) then
           change = sum(abs(flow%reaction(guard%held, :))*force)
-          guard%blur = guard%blur + change*[1.0_wp, machine%frequency, machine%frequency**2]
+          guard%blur = guard%blur + change*[1.0_wp, machine%frequency, machine%frequency**2, machine%frequency**3]
         end if
       end associate
     end do

@@ -11,7 +11,7 @@ module linear_flight
   use jointed_state, only: jointed_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use path_rows, only: guard_row
+  use path_rows, only: guard_row, size_of_row
   use series_zero, only: first_zero, order
   implicit none
   private
@@ -75,8 +75,9 @@ contains
     real(wp), intent(out) :: time
     logical, intent(out) :: fallen(:)
     type(watch_t), intent(inout) :: watch
-    real(wp) :: y(size(path%unknowns)), powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
-    real(wp) :: length, p(0:order), gap(0:terms, most_guards), root(most_guards), first, fraction
+    real(wp), dimension(size(path%unknowns)) :: y, size_of_y
+    real(wp) :: powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
+    real(wp) :: length, p(0:order), gap(0:terms, most_guards), root(most_guards), lift(most_guards), first, fraction
     integer :: g, i, k, n, stretches
     n = machine%n
     fallen = .false.
@@ -87,16 +88,20 @@ contains
     stretches = max(1, ceiling(flow%rate*duration))
     length = duration/stretches
     time = 0
+    lift = 0
     do i = 1, stretches
       call series_step(path%matrix, y, length, powers)
+      size_of_y = abs(y)
+      ! A place on its way through zero has the rounding of its swing.
+      size_of_y(:n) = size_of_y(:n) + length*size_of_y(n + 1:2*n)
       root = 2
       do g = 1, count_guards
         p = 0
         p(:terms) = matmul(row(:, g), powers)
-        if (i == 1) then
-          if (list(g)%from_zero) p(0) = 0
-          call drop_rounding(row(:, g), path%matrix, y, length, p)
-        end if
+        if (i == 1 .and. list(g)%from_zero) p(0) = 0
+        if (i == 1 .or. lift(g) > 0) call drop_rounding(size_of_row(machine, flow, path, list(g)), path%matrix, size_of_y, &
+                                                        length, i == 1, p, lift(g))
+        p(0) = p(0) + lift(g)
         root(g) = first_zero(p)
         gap(:, g) = p(:terms)
       end do
@@ -192,18 +197,26 @@ contains
     end do
   end function value
 
-  !> Drops the leading terms of a series that are no more than the rounding of what they are sums of.
-  pure subroutine drop_rounding(row, matrix, y, length, p)
-    real(wp), intent(in) :: row(:), matrix(:, :), y(:), length
-    real(wp), intent(inout) :: p(0:)
-    real(wp) :: term(size(y))
+  !> Drops the leading terms of a series, where it `starts`, that are no more than the rounding of what they are sums of: `sizes` times
+  !> those of the unknowns. One that is nothing else is raised by its rounding, `lift`: it falls when it is below that.
+  pure subroutine drop_rounding(sizes, matrix, unknowns, length, starts, p, lift)
+    real(wp), intent(in) :: sizes(:), matrix(:, :), unknowns(:), length
+    logical, intent(in) :: starts
+    real(wp), intent(inout) :: p(0:), lift
+    real(wp) :: term(size(unknowns)), none(0:3)
     integer :: k
-    term = abs(y)
+    term = unknowns
     do k = 0, 3
       if (k > 0) term = matmul(abs(matrix), term)*(length/k)
-      if (abs(p(k)) > rounding*sum(abs(row)*term)) return
-      p(k) = 0
+      none(k) = rounding*sum(sizes*term)
     end do
+    if (starts) then
+      do k = 0, 3
+        if (abs(p(k)) > none(k)) return
+        p(k) = 0
+      end do
+    end if
+    lift = max(lift, sum(none) + tiny(lift))
   end subroutine drop_rounding
 
 end module linear_flight

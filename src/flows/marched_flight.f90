@@ -12,9 +12,9 @@ module marched_flight
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use linear_flight, only: watch_t
-  use marched_system, only: digits_of_forces, forces_at, marched_t, place_now, set_system, unknowns
+  use marched_system, only: digits_of_forces, forces_at, marched_t, place_now, set_system, sizes_of_guards, unknowns
   use mode_flow, only: harmonics_of, mode_flow_t
-  use path_rows, only: guard_row
+  use path_rows, only: guard_row, size_of_row
   use polynomial, only: degree, maximum_until
   implicit none
   private
@@ -53,7 +53,7 @@ contains
     type(marched_flight_t), intent(out) :: flight
     type(path_t) :: path
     real(wp) :: y(2*machine%n), scale(2*machine%n), contact_time, duration
-    integer :: n
+    integer :: g, n
     n = machine%n
     call guards_of(machine, flow, state, flight%list, flight%count_guards)
     path%start = state%time
@@ -66,6 +66,9 @@ contains
     y(:n) = 0
     y(n + 1:) = state%v(:n)
     call set_sizes(machine, flight%system, state, y, scale, flight%depth, contact_time)
+    do g = 1, flight%count_guards
+      if (flight%guards(g)%is_left) flight%guards(g)%blur = tolerance*sum(abs(flight%system%guard(:n, g))*scale(:n))
+    end do
     duration = machine%period
     ! Held bodies move as they are told: only the force of the contact knows how fast that is.
     if (size(flow%held) > 0) duration = min(duration, 3*contact_time)
@@ -79,7 +82,8 @@ contains
     type(jointed_state_t), intent(in) :: state
     type(path_t), intent(in) :: path
     type(marched_flight_t), intent(inout) :: flight
-    real(wp) :: row(size(path%unknowns)), y(2*machine%n), start, rate, accelerations(machine%n)
+    real(wp), dimension(size(path%unknowns)) :: row, sizes
+    real(wp) :: y(2*machine%n), start, rate, accelerations(machine%n)
     integer :: g, n, one, k, j
     n = machine%n
     one = 2*n + 1
@@ -89,20 +93,28 @@ contains
                     + matmul(abs(flight%system%push), abs(forces_at(flight%system, unknowns(flight%system, 0.0_wp, y))) &
                                                       + digits_of_forces(machine, flight%system, state, path%turning))
     associate (system => flight%system)
-      allocate (system%guard(size(path%unknowns), flight%count_guards), &
-                system%lean(system%count_joints, flight%count_guards), source=0.0_wp)
+      allocate (system%guard(size(path%unknowns), flight%count_guards), system%size_of_guard(size(path%unknowns), &
+                flight%count_guards), system%lean(system%count_joints, flight%count_guards), &
+                system%size_of_lean(system%count_joints, flight%count_guards), source=0.0_wp)
       do g = 1, flight%count_guards
         associate (guard => flight%list(g))
           row = guard_row(machine, flow, path, guard)
-          flight%size_of_guard(g) = sum(abs(row*path%unknowns)) + guard%blur(0)
+          sizes = size_of_row(machine, flow, path, guard)
+          flight%size_of_guard(g) = sum(sizes*abs(path%unknowns)) + guard%blur(0)
           row(one) = row(one) + sum(row(:n)*state%q(:n))
           system%guard(:, g) = row
           k = 0
           do j = 1, size(machine%joints)
             if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
             k = k + 1
-            if (guard%held > 0) system%lean(k, g) = -guard%force*sum(flow%reaction(guard%held, :)*machine%joints(j)%row)
+            if (guard%held == 0) cycle
+            system%lean(k, g) = -guard%force*sum(flow%reaction(guard%held, :)*machine%joints(j)%row)
+            system%size_of_lean(k, g) = abs(guard%force)*sum(abs(flow%reaction(guard%held, :)*machine%joints(j)%row))
           end do
+          if (guard%held > 0) then
+            system%size_of_guard(:, g) = sizes
+            system%size_of_guard(one, g) = sizes(one) + sum(sizes(:n)*abs(state%q(:n)))
+          end if
           start = system%margin(g, 0.0_wp, y)
           flight%guards(g)%margin = g
           flight%guards(g)%from_zero = guard%from_zero .or. abs(start) <= rounding*flight%size_of_guard(g)
@@ -196,6 +208,7 @@ contains
     integer :: fell, g, n
     n = machine%n
     if (maxval(abs(flight%march%y(:n))) > far*flight%depth) call count_anew(flight)
+    call measure_noise(flight, min(flight%march%next_length, until - flight%system%start - flight%march%time))
     y = flight%march%y(:2*n)
     do g = 1, flight%count_guards
       before(g) = value_of(flight, g, flight%march%time, y)
@@ -228,6 +241,27 @@ contains
     if (fell == march_time_over) state%time = until
   end subroutine step_flight
 
+  !> Rounding of the forces of constraints, by what they are sums of now and, roughly, after the next step of `h` [s].
+  pure subroutine measure_noise(flight, h)
+    type(marched_flight_t), intent(inout) :: flight
+    real(wp), intent(in) :: h
+    real(wp), dimension(2*flight%system%n) :: y, ahead
+    real(wp), dimension(flight%count_guards) :: sizes
+    integer :: g
+    if (.not. any(flight%list(:flight%count_guards)%held > 0)) return
+    associate (system => flight%system, march => flight%march, n => flight%system%n)
+      y = march%y(:2*n)
+      ahead = y + h*march%slopes(:2*n, 1)
+      ahead(:n) = ahead(:n) + 0.5_wp*h**2*march%slopes(n + 1:2*n, 1)
+      sizes = max(sizes_of_guards(system, unknowns(system, march%time, y)), &
+                  sizes_of_guards(system, unknowns(system, march%time + h, ahead)))
+      do g = 1, flight%count_guards
+        if (flight%list(g)%held > 0) flight%guards(g)%noise = noise_share*(flight%size_of_guard(g) + sizes(g)) &
+                                                                  + tiny(1.0_wp)
+      end do
+    end associate
+  end subroutine measure_noise
+
   !> Counts displacements and time from where the flight has come to: where a body leans on a contact that moves, both go far, and
   !> their difference is as thin as the contact.
   pure subroutine count_anew(flight)
@@ -249,6 +283,7 @@ contains
       end do
       do g = 1, flight%count_guards
         system%guard(c - 1, g) = system%guard(c - 1, g) + behind(system%guard(:, g))
+        system%size_of_guard(c - 1, g) = system%size_of_guard(c - 1, g) + sum(system%size_of_guard(:n, g)*abs(z(:n)))
         if (flight%guards(g)%margin == 0) flight%guards(g)%constant = flight%guards(g)%constant + behind(system%guard(:, g))
       end do
       flight%guards%is_left = .false.

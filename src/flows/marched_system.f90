@@ -15,7 +15,7 @@ module marched_system
   implicit none
   private
 
-  public :: marched_t, set_system, unknowns, forces_at, place_now, digits_of_forces
+  public :: marched_t, set_system, unknowns, forces_at, place_now, digits_of_forces, sizes_of_guards
 
   !> Displacements and speeds, 1, the time since the start, cosines and sines of the drive are what rows refer to.
   type, extends(watched_system_t) :: marched_t
@@ -29,6 +29,8 @@ module marched_system
     integer :: phase(most_joints) = 0
     real(wp) :: touch_speed(most_joints) = 0
     real(wp), allocatable :: place(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
+    !> Sizes of what the forces of constraints are sums of, as `guard` and `lean`; 0 for other guards.
+    real(wp), allocatable :: size_of_guard(:, :), size_of_lean(:, :)
   contains
     procedure :: slope => marched_slope
     procedure :: margin => marched_margin
@@ -193,6 +195,14 @@ contains
     margin = sum(self%guard(:, number)*z)
     if (any(abs(self%lean(:, number)) > 0)) margin = margin + sum(self%lean(:, number)*forces_at(self, z))
   end function marched_margin
+
+  !> Sizes of what the guards that are forces of constraints are sums of, with what rows refer to at `z`; 0 for the others.
+  pure function sizes_of_guards(system, z) result(sizes)
+    type(marched_t), intent(in) :: system
+    real(wp), intent(in) :: z(:)
+    real(wp) :: sizes(size(system%guard, 2))
+    sizes = matmul(abs(z), system%size_of_guard) + matmul(abs(forces_at(system, z)), system%size_of_lean)
+  end function sizes_of_guards
 
   !> Forces [N], one for each joint that is not linear, of which rounding takes a share: a displacement is known to a share of the
   !> places it is the difference of, and the force to that times its slope.

@@ -35,13 +35,16 @@ module mode_flow_type
     complex(wp), allocatable :: response(:, :)
     !> Shapes and responses along the rows of the joints, and of the forces of the constraints.
     complex(wp), allocatable :: joint_shape(:, :), joint_response(:, :), force_shape(:, :), force_response(:, :)
-    !> Bounds on what rounding of the shapes takes for its measure there: the largest entry of each.
-    real(wp), allocatable :: size_of_joint(:, :), size_of_force(:, :)
+    !> Bounds on what rounding of the shapes and responses takes for its measure there: the largest entry of each, and no force that
+    !> others cancel.
+    real(wp), allocatable :: size_of_joint(:, :), size_of_force(:, :), size_of_force_response(:, :)
     !> Matrix of the coordinates, their speeds, 1, the time, cosines and sines; bound on its rate [1/s].
     real(wp), allocatable :: matrix(:, :)
     real(wp) :: rate = 0
     !> Rows of the joint coordinates, their speeds, and the forces of the constraints over the same unknowns.
     real(wp), allocatable :: place_row(:, :), speed_row(:, :), force_row(:, :)
+    !> Sizes of what the rows of the forces are sums of.
+    real(wp), allocatable :: size_of_force_row(:, :)
   end type mode_flow_t
 
 end module mode_flow_type

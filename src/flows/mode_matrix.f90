@@ -3,6 +3,7 @@
 
 !> The motion of a jointed structure in one mode as y' = A y: for the exponential series, which every linear structure has.
 module mode_matrix
+  use eigen, only: modulus
   use jointed, only: jointed_t, offset_of
   use kinds, only: wp
   use mode_flow_type, only: mode_flow_t
@@ -68,13 +69,15 @@ contains
     n = machine%n
     unknowns = size(flow%matrix, 1)
     allocate (flow%place_row(unknowns, size(machine%joints)), flow%speed_row(unknowns, size(machine%joints)), &
-              flow%force_row(unknowns, size(flow%held)), source=0.0_wp)
+              flow%force_row(unknowns, size(flow%held)), flow%size_of_force_row(unknowns, size(flow%held)), source=0.0_wp)
     do j = 1, size(machine%joints)
       flow%place_row(:n, j) = machine%joints(j)%row
       flow%speed_row(n + 1:2*n, j) = machine%joints(j)%row
     end do
     flow%force_row(:n, :) = transpose(matmul(flow%reaction, flow%stiffness))
     flow%force_row(n + 1:2*n, :) = transpose(matmul(flow%reaction, flow%damping))
+    flow%size_of_force_row(:n, :) = transpose(matmul(abs(flow%reaction), abs(flow%stiffness)))
+    flow%size_of_force_row(n + 1:2*n, :) = transpose(matmul(abs(flow%reaction), abs(flow%damping)))
     do m = 1, size(forcing, 2)
       c = 2*n + 1 + 2*m
       w = m*machine%frequency
@@ -87,6 +90,9 @@ contains
       driven = -matmul(flow%reaction, forcing(:, m)) + w**2*matmul(flow%hold, surface(:, m))
       flow%force_row(c, :) = real(driven)
       flow%force_row(c + 1, :) = -aimag(driven)
+      flow%size_of_force_row(c, :) = matmul(abs(flow%reaction), modulus(forcing(:, m))) &
+                                     + w**2*matmul(abs(flow%hold), modulus(surface(:, m)))
+      flow%size_of_force_row(c + 1, :) = flow%size_of_force_row(c, :)
     end do
   end subroutine set_matrix_rows
 

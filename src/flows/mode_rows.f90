@@ -20,7 +20,7 @@ contains
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     complex(wp) :: iw
-    real(wp) :: largest
+    real(wp) :: largest, by_place(size(flow%held)), by_speed(size(flow%held))
     integer :: j, k, m, count_shapes, harmonics
     count_shapes = size(flow%exponent)
     harmonics = size(forcing, 2)
@@ -35,11 +35,13 @@ contains
       end do
     end do
     allocate (flow%size_of_joint(count_shapes, size(machine%joints)), flow%size_of_force(count_shapes, size(flow%held)))
+    allocate (flow%size_of_force_response(harmonics, size(flow%held)))
+    by_place = sum(matmul(abs(flow%reaction), abs(flow%stiffness)), dim=2)
+    by_speed = sum(matmul(abs(flow%reaction), abs(flow%damping)), dim=2)
     do k = 1, count_shapes
       largest = maxval(modulus(flow%shape(:, k)))
       flow%size_of_joint(k, :) = largest*[(sum(abs(machine%joints(j)%row)), j=1, size(machine%joints))]
-      flow%size_of_force(k, :) = largest*sum(abs(matmul(flow%reaction, flow%stiffness)) &
-                                             + flow%size_of_exponent(k)*abs(matmul(flow%reaction, flow%damping)), dim=2)
+      flow%size_of_force(k, :) = largest*(by_place + flow%size_of_exponent(k)*by_speed)
       flow%force_shape(k, :) = matmul(flow%reaction, matmul(flow%stiffness, flow%shape(:, k)) &
                                       + flow%exponent(k)*matmul(flow%damping, flow%shape(:, k)))
     end do
@@ -48,6 +50,10 @@ contains
       flow%force_response(m, :) = matmul(flow%reaction, matmul(flow%stiffness, flow%response(:, m)) &
                                          + iw*matmul(flow%damping, flow%response(:, m)) - forcing(:, m)) &
                                   - iw**2*matmul(flow%hold, surface(:, m))
+      largest = maxval(modulus(flow%response(:, m)))
+      flow%size_of_force_response(m, :) = largest*(by_place + m*machine%frequency*by_speed) &
+                                          + matmul(abs(flow%reaction), modulus(forcing(:, m))) &
+                                          + (m*machine%frequency)**2*matmul(abs(flow%hold), modulus(surface(:, m)))
     end do
   end subroutine set_rows
 

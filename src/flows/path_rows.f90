@@ -11,7 +11,7 @@ module path_rows
   implicit none
   private
 
-  public :: place_powers, force_powers, guard_row
+  public :: place_powers, force_powers, guard_row, size_of_row
 
 contains
 
@@ -65,5 +65,26 @@ contains
       end if
     end associate
   end function guard_row
+
+  !> Sizes of what the row of a guard is a sum of, for its rounding.
+  pure function size_of_row(machine, flow, path, guard) result(row)
+    type(jointed_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: guard
+    real(wp) :: row(size(path%unknowns))
+    integer :: one
+    one = 2*machine%n + 1
+    associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
+      row = abs(guard%place*flow%place_row(:, guard%joint)) + abs(guard%speed*flow%speed_row(:, guard%joint))
+      row(one) = row(one) + abs(guard%constant) + abs(guard%place)*(abs(offset%mean) + abs(offset%rate*path%start)) &
+                 + abs(guard%speed*offset%rate)
+      row(one + 1) = row(one + 1) + abs(guard%place*offset%rate)
+      if (guard%held == 0) return
+      row = row + abs(guard%force)*flow%size_of_force_row(:, guard%held)
+      row(one) = row(one) + abs(guard%force)*sum(abs(flow%reaction(guard%held, :))*abs(path%force(:n)))
+      row(one + 1) = row(one + 1) + abs(guard%force)*sum(abs(flow%reaction(guard%held, :))*abs(path%force_rate(:n)))
+    end associate
+  end function size_of_row
 
 end module path_rows

@@ -13,7 +13,7 @@ module jointed_state
   private
 
   public :: turning_at, joint_motion, joint_force, spring_force, strength_now, joint_energy, free_force, &
-    running_control, key_of, is_held, acts_as_spring, is_curved, is_marched
+    running_control, rounding_of_speed, key_of, is_held, acts_as_spring, is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not
@@ -69,6 +69,16 @@ contains
       u = sum(joint%row*v(:machine%n)) + rate
     end associate
   end subroutine joint_motion
+
+  !> Rounding of the speed of a joint [m/s].
+  pure real(wp) function rounding_of_speed(machine, j, state) result(negligible)
+    type(jointed_t), intent(in) :: machine
+    integer, intent(in) :: j
+    type(jointed_state_t), intent(in) :: state
+    associate (joint => machine%joints(j), n => machine%n)
+      negligible = 64*epsilon(1.0_wp)*(sum(abs(joint%row*state%v(:n))) + abs(joint%offset%rate))
+    end associate
+  end function rounding_of_speed
 
   !> Whether a joint is a constraint: friction that sticks, a contact that is closed.
   pure logical function is_held(joint, phase)

@@ -10,7 +10,7 @@ module blow
   use boxed_forces, only: solve_boxed
   use contact_law, only: restitution_at
   use jointed, only: joint_contact, jointed_t, most_joints, together_sequence
-  use jointed_state, only: joint_motion, jointed_state_t
+  use jointed_state, only: joint_motion, jointed_state_t, rounding_of_speed
   use kinds, only: wp
   implicit none
   private
@@ -69,7 +69,41 @@ contains
     end do
     lost = -sum(kick*matmul(machine%mass, state%v(:n) + kick/2))
     state%v(:n) = state%v(:n) + kick
+    call still(machine, turning, list(:count_touching), impulse(:count_touching), state)
   end subroutine strike
+
+  !> Takes from the speeds what the rounding of the impulses has left of those of contacts in `list` that have none. Impulses that
+  !> go through a row leave bodies at rest with no speed that would tell what rounding is.
+  pure subroutine still(machine, turning, list, impulse, state)
+    type(jointed_t), intent(in) :: machine
+    complex(wp), intent(in) :: turning(:)
+    integer, intent(in) :: list(:)
+    real(wp), intent(in) :: impulse(:)
+    type(jointed_state_t), intent(inout) :: state
+    real(wp), dimension(size(list)) :: left, r, y, none
+    real(wp) :: g(size(list), size(list)), swing(machine%n), kick(machine%n, size(list)), s, u
+    logical :: moves(size(list)), blurred, ok
+    integer :: i, k, side(size(list))
+    swing = abs(state%v(:machine%n))
+    do i = 1, size(list)
+      kick(:, i) = matmul(machine%mobility, machine%joints(list(i))%row)
+      swing = swing + abs(impulse(i)*kick(:, i))
+    end do
+    blurred = .false.
+    do i = 1, size(list)
+      g(:, i) = [(sum(machine%joints(list(k))%row*kick(:, i)), k=1, size(list))]
+      call joint_motion(machine, list(i), state%q, state%v, state%time, turning, s, u)
+      left(i) = u
+      moves(i) = abs(u) > 64*epsilon(u)*(sum(abs(machine%joints(list(i))%row)*swing) + abs(machine%joints(list(i))%offset%rate))
+      if (moves(i)) cycle
+      blurred = blurred .or. abs(u) > machine%negligible_speed + rounding_of_speed(machine, list(i), state)
+    end do
+    if (.not. blurred) return
+    none = huge(1.0_wp)
+    side = 0
+    call solve_boxed(g, left, -none, none, moves, 0.0_wp, side, r, y, ok)
+    state%v(:machine%n) = state%v(:machine%n) + matmul(kick, r)
+  end subroutine still
 
   !> Impulses of contacts with the opening speeds `gamma` and restitutions `e`.
   pure subroutine speeds_after(g, gamma, e, in_sequence, impulse, ok)

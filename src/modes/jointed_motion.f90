@@ -9,14 +9,15 @@ module jointed_motion
   use jointed, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
   use jointed_flight, only: fly
   use jointed_flows, only: jointed_motion_t, prepare_jointed, ready, with_matrix
-  use jointed_state, only: joint_motion, jointed_state_t, key_of, turning_at
-  use jointed_transition, only: rounding_of_speed, settle, transition
+  use jointed_state, only: joint_motion, jointed_state_t, key_of, rounding_of_speed, turning_at
+  use jointed_transition, only: settle, transition
   use kinds, only: int64, wp
   use linear_flight, only: watch_t
   use mode_flow, only: build_flow, mode_flow_t
   use motion_state, only: append_word, log_t, tally_t, word_period
-  use status, only: reason_event_budget, reason_left_domain, reason_not_finite, reason_step_budget, reason_step_failed, &
-    reason_time_over
+  use stall_watch, only: goes_round, note_flight, note_hold, stall_watch_t
+  use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
+    reason_step_failed, reason_time_over
   use timed_actions, only: act, acts_on_time, next_action
   use transition_list, only: note_transition, transition_t, transitions_t
   use transition_log, only: log_action, log_transition
@@ -26,8 +27,6 @@ module jointed_motion
 
   public :: jointed_motion_t, prepare_jointed, start_jointed, advance_jointed, advance_jointed_period, advance_to_turn
 
-  !> Events without progress in time after which the phases are held for an instant, and how often that may be.
-  integer, parameter :: most_stalls = 8, most_holds = 100
   !> An impact within this share of a period after the last belongs to a burst.
   real(wp), parameter :: burst_gap = 1e-6_wp
   !> After a flight of so many gaps no burst goes on.
@@ -101,11 +100,10 @@ contains
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
     real(wp) :: before, until, from
-    integer :: stalls, holds, key
-    logical :: fallen(most_guards), turned, counts_on, timed, slips
+    type(stall_watch_t) :: stalls
+    integer :: key
+    logical :: fallen(most_guards), turned, counts_on, timed, slips, held
     reason = 0
-    stalls = 0
-    holds = 0
     counts_on = .false.
     if (present(one_event)) counts_on = one_event
     if (.not. counts_on) state%burst = 0
@@ -121,7 +119,7 @@ contains
       do while (state%time < time_end .and. .not. state%at_section)
         tally%events = tally%events + 1
         if (tally%events > moving%options%event_budget) reason = reason_event_budget
-        if (holds >= most_holds) reason = reason_step_failed
+        if (goes_round(stalls)) reason = reason_mode_cycle
         if (reason /= 0) exit
         before = state%time
         until = time_end
@@ -139,16 +137,13 @@ contains
         if (reason /= 0) exit
         if (slips .and. state%time > before) tally%slips = tally%slips + 1
         if (state%time > before) state%left = 0
-        stalls = merge(0, stalls + 1, state%time > before)
+        call note_flight(stalls, machine, before, state, held)
         if (.not. state%time - before < burst_gap*machine%period) state%burst = 0
         turned = any(fallen .and. list%meaning == turns_round)
         fallen = fallen .and. list%meaning /= turns_round
         if (any(fallen)) then
-          call change_mode(moving, state, list, fallen, stalls >= most_stalls, tally, reason, log, transitions)
-          if (stalls >= most_stalls) then
-            stalls = 0
-            holds = holds + 1
-          end if
+          call change_mode(moving, state, list, fallen, held, tally, reason, log, transitions)
+          if (held) call note_hold(stalls, machine, state%time)
         end if
         if (present(transitions)) start = state
         if (moving%section > 0) call follow_section(moving, turned, state)

@@ -9,30 +9,21 @@ module jointed_transition
     slides_down, slides_up
   use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_joints
   use jointed_flows, only: jointed_motion_t
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use jointed_state, only: joint_motion, jointed_state_t, rounding_of_speed, turning_at
   use kinds, only: int64, wp
   use mode_choice, only: accelerations_of, choose_mode, project
   use motion_state, only: append_word, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_stick, word_upper
+  use touching_contacts, only: add_near, add_tied, close_gaps
   use two_bodies, only: slides_on
   implicit none
   private
 
-  public :: transition, settle, rounding_of_speed, judge_friction
+  public :: transition, settle, judge_friction
 
   !> So many impacts, each within this share of a period after the last, are the end of a chatter of several contacts.
   integer, parameter :: long_burst = 60
 
 contains
-
-  !> Rounding of the sliding speed of a joint [m/s].
-  pure real(wp) function rounding_of_speed(machine, j, state) result(negligible)
-    type(jointed_t), intent(in) :: machine
-    integer, intent(in) :: j
-    type(jointed_state_t), intent(in) :: state
-    associate (joint => machine%joints(j), n => machine%n)
-      negligible = 64*epsilon(1.0_wp)*(sum(abs(joint%row*state%v(:n))) + abs(joint%offset%rate))
-    end associate
-  end function rounding_of_speed
 
   !> Rigid contacts in `touching` that do not open stay closed if the forces say so; joints at rest stick or slide. `at_level`: a
   !> guard says that their force has come to its limit.
@@ -55,6 +46,7 @@ contains
         state%left(j) = touching(j)
         if (abs(u) <= machine%negligible_speed + rounding_of_speed(machine, j, state)) slow(j) = touching(j)
       end do
+      call close_gaps(machine, state, turning, slow)
       call choose_mode(machine, state, turning, at_rest, slow, ok, at_level)
       do j = 1, size(machine%joints)
         if (at_rest(j)) state%left(j) = abs(state%phase(j))
@@ -93,7 +85,8 @@ contains
       ok = .true.
       if (any(hit /= 0)) then
         call judge_burst(machine, hit, turning, state, plastic)
-        if (plastic) call add_near(moving, state, turning, touching)
+        call add_tied(machine, state, turning, touching)
+        if (plastic) call add_near(machine, state, turning, touching)
         call strike(machine, state, turning, touching, plastic, speed, lost, ok)
         do j = 1, size(machine%joints)
           if (hit(j) /= 0) call count_impact(tally, hit(j), abs(speed(j)))
@@ -268,24 +261,6 @@ contains
     tally%last_impact_speed = speed
     call append_word(tally, merge(word_upper, word_lower, side > 0))
   end subroutine count_impact
-
-  !> Contacts that are all but closed take part in the end of a chatter of several.
-  pure subroutine add_near(moving, state, turning, touching)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
-    complex(wp), intent(in) :: turning(:)
-    integer, intent(inout) :: touching(:)
-    real(wp) :: s, u
-    integer :: j
-    do j = 1, size(moving%machine%joints)
-      associate (joint => moving%machine%joints(j))
-        if (joint%kind /= joint_contact) cycle
-        call joint_motion(moving%machine, j, state%q, state%v, state%time, turning, s, u)
-        if (joint%upper - s < 1e-9_wp*moving%machine%length_scale) touching(j) = 1
-        if (s - joint%lower < 1e-9_wp*moving%machine%length_scale) touching(j) = -1
-      end associate
-    end do
-  end subroutine add_near
 
   !> Completes the chatter of one contact that has just rebounded from the state `before`, if the forces do not change until
   !> its end: then the state there is that of an impact without rebound now, and of the closed contact from then on, in all

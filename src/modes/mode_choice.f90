@@ -4,12 +4,14 @@
 !> Which joints stick and which contacts stay closed: of all that may, at once, by the accelerations and forces at an instant.
 !> With a break-away level equal to that of sliding it is a convex problem, whose accelerations are unique (Gauss'
 !> principle). Where the level at rest is higher, all joints that it cannot hold go together, with the force of sliding.
-!> Ties are settled by the same problem for the next derivative, twice; what is still tied sticks, or stays closed.
+!> Ties are settled by the same problem for the next derivative, twice; what is still tied sticks, or stays closed, unless its guard
+!> has just fallen.
 module mode_choice
   use jointed, only: joint_contact, jointed_t, most_joints
   use jointed_state, only: free_force, is_held, joint_force, joint_motion, jointed_state_t
   use kinds, only: wp
-  use mode_question, only: ask, drift_of, is_tied, keep_loaded, narrow, question_t, second_rate, set_mobility, sizes, solve
+  use mode_question, only: ask, drift_of, is_tied, keep_loaded, narrow, question_t, second_rate, set_mobility, settle_ties, &
+    sizes, solve
   implicit none
   private
 
@@ -219,7 +221,7 @@ contains
       call solve(question, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
       call keep_loaded(question, y, side, 4096*rounding*size_of_y)
-      where (side(:n) /= 0 .and. abs(y(:n)) <= 4096*rounding*size_of_y(:n) .and. .not. question%fixed(:n)) side(:n) = 0
+      call settle_ties(machine, question, r, y, near, 4096*rounding*size_of_y, side)
       call classify(machine, question, side, verdict)
     end associate
   end subroutine answer

@@ -5,13 +5,13 @@
 !> acceleration along its joint unless it is at a limit. Derivatives of it settle ties.
 module mode_question
   use boxed_forces, only: depends_on, solve_boxed
-  use jointed, only: joint_contact, joint_friction, jointed_t, most_joints
+  use jointed, only: joint_contact, joint_friction, joint_spring, jointed_t, most_joints
   use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t, running_control, spring_force, strength_now
   use kinds, only: wp
   implicit none
   private
 
-  public :: ask, set_mobility, drift_of, sizes, second_rate, solve, is_tied, narrow, keep_loaded
+  public :: ask, set_mobility, drift_of, sizes, second_rate, solve, is_tied, narrow, keep_loaded, settle_ties
 
   !> What the choice is made of: the joints in question, their rows, and the drift of the free structure along them.
   type, public :: question_t
@@ -94,11 +94,13 @@ contains
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: force(:)
-    real(wp) :: size_of_y(most_joints), parts(machine%n), s, u, r, by_place, by_speed, strength
+    real(wp) :: size_of_y(most_joints), parts(machine%n), places(machine%n), s, u, r, by_place, by_speed, strength, energy
     integer :: i, n
     n = machine%n
+    places = abs(state%q(:n)) + abs(state%v(:n)*state%time)
+    energy = energy_of_swing(machine, state)
     parts = abs(force) + abs(machine%load) + matmul(abs(machine%damping), abs(state%v(:n))) &
-            + matmul(abs(machine%stiffness), abs(state%q(:n)))
+            + matmul(abs(machine%stiffness), places)
     if (allocated(machine%controller)) then
       call running_control(machine%controller, state, s, u)
       parts = parts + (abs(state%control) + abs(s))*abs(machine%controller%row)
@@ -117,7 +119,13 @@ contains
                        by_speed)
       associate (row => abs(machine%joints(i)%row))
         parts = parts + row*(abs(by_place)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
+        if (machine%joints(i)%kind /= joint_spring) cycle
+        parts = parts + row*(abs(by_place)*sum(row*places) + swing_of_force(energy, abs(by_place), &
+                                                                          sum(row*matmul(abs(machine%mobility), row)), order))
       end associate
+    end do
+    do i = 1, n
+      parts(i) = parts(i) + swing_of_force(energy, max(machine%stiffness(i, i), 0.0_wp), machine%mobility(i, i), order)
     end do
     size_of_y = 0
     do i = 1, question%count
@@ -125,6 +133,24 @@ contains
                      + swing_of(machine, question%joint(i), order)
     end do
   end function sizes
+
+  !> What the modes of a motion may bring to one place, whatever of them is there now [J].
+  pure real(wp) function energy_of_swing(machine, state) result(energy)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    associate (q => abs(state%q(:machine%n)), v => abs(state%v(:machine%n)))
+      energy = 0.5_wp*sum(v*matmul(abs(machine%mass), v)) + 0.5_wp*sum(q*matmul(abs(machine%stiffness), q))
+    end associate
+  end function energy_of_swing
+
+  !> Largest force, or a rate of it (derivative number `order` - 2), of a spring [N/m] under a body with a mobility [1/kg] that has an
+  !> energy [J]: what places on their way through zero are the rounding of.
+  pure real(wp) function swing_of_force(energy, stiffness, mobility, order) result(force)
+    real(wp), intent(in) :: energy, stiffness, mobility
+    integer, intent(in) :: order
+    force = sqrt(2*energy*stiffness)
+    if (order > 2) force = force*sqrt(stiffness*mobility)**(order - 2)
+  end function swing_of_force
 
   !> Bound on derivative number `order` of the given part of a joint coordinate.
   pure real(wp) function swing_of(machine, j, order) result(swing)
@@ -208,6 +234,21 @@ contains
       end do
     end associate
   end subroutine keep_loaded
+
+  !> What no derivative decides sticks, or stays closed; a contact whose force a guard has seen end (`ends`) opens.
+  pure subroutine settle_ties(machine, question, r, y, ends, tolerance, side)
+    type(jointed_t), intent(in) :: machine
+    type(question_t), intent(in) :: question
+    real(wp), intent(in) :: r(:), y(:), tolerance(:)
+    logical, intent(in) :: ends(:)
+    integer, intent(inout) :: side(:)
+    integer :: i, limit
+    do i = 1, question%count
+      limit = tied_at(question, i, r, y, side, tolerance(i))
+      if (limit == 0) cycle
+      side(i) = merge(limit, 0, ends(question%joint(i)) .and. machine%joints(question%joint(i))%kind == joint_contact)
+    end do
+  end subroutine settle_ties
 
   !> The limit at which joint number `i` in question is tied, 0 if it is not.
   pure integer function tied_at(question, i, r, y, side, tolerance) result(limit)

@@ -56,6 +56,7 @@ contains
             kind = merge(event_touch_upper, event_touch_lower, list(g)%meaning == meets_upper)
           end if
         case (lets_go)
+          if (after%phase(j) /= 0) cycle
           kind = event_barrier_release
         case (leaves)
           kind = event_separation

@@ -282,10 +282,18 @@ contains
       if (.not. log%event_data(1, k) < log%event_data(1, k - 1)) exit
       log%event_kind(k - 1:k) = log%event_kind(k:k - 1:-1)
       log%event_data(:, k - 1:k) = log%event_data(:, k:k - 1:-1)
-      if (allocated(log%event_driver)) log%event_driver(:, k - 1:k) = log%event_driver(:, k:k - 1:-1)
-      if (allocated(log%event_joint)) log%event_joint(:, k - 1:k) = log%event_joint(:, k:k - 1:-1)
+      call swap_columns(log%event_driver, k)
+      call swap_columns(log%event_joint, k)
     end do
   end subroutine put_in_order
+
+  !> Swaps a column with the one before it, where there is one: a machine without a driving body has room for it and fills none.
+  pure subroutine swap_columns(columns, k)
+    real(wp), allocatable, intent(inout) :: columns(:, :)
+    integer, intent(in) :: k
+    if (.not. allocated(columns)) return
+    if (k <= size(columns, 2)) columns(:, k - 1:k) = columns(:, k:k - 1:-1)
+  end subroutine swap_columns
 
   !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two, `book` the energy.
   pure subroutine record_sample(log, state, driver, book)

@@ -9,7 +9,7 @@ import numpy as np
 from separatrix.variables import FORMAT_VERSION
 
 REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
-REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget"
+REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget mode_cycle"
 EVENTS = (
     "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release"
     " touch_upper touch_lower separation blow"

@@ -26,7 +26,7 @@ EVENTS = (
 REGIMES = ("unresolved", "non_impact", "impact", "sticking", "mixed", "chattering", "at_rest", "stuck")
 REASONS = (
     "not_run", "settled", "time_over", "left_domain", "not_finite", "event_budget", "step_failed",
-    "step_budget",
+    "step_budget", "mode_cycle",
 )  # fmt: skip
 _FAMILY = 1 + KINDS.index("family")
 _KEPT = 64  # catalogues
