@@ -168,9 +168,25 @@ contains
       call take_as_one_point(moving, found)
       call tell_equilibrium(found)
     else
-      call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
+      call recognise_equilibrium(moving, strobe, found, ok)
+      if (.not. ok) call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
     end if
   end subroutine identify
+
+  !> The equilibrium that a state approaches: what is left of its motion shrinks with the motion, and never looks like a return.
+  pure subroutine recognise_equilibrium(moving, strobe, found, ok)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    type(attractor_t), intent(out) :: found
+    logical, intent(out) :: ok
+    real(wp) :: point(most_coordinates)
+    point = section_point(moving, strobe)
+    call refine_cycle(moving, point(:coordinates_of(moving)), 1, found, ok)
+    if (.not. ok) return
+    found%section = section_state(moving, found%points(:, 1))
+    call tell_equilibrium(found)
+    ok = found%kind == kind_rest .and. find_capture([found], point, .true.) > 0
+  end subroutine recognise_equilibrium
 
   !> Rest that nothing but the springs decides is one point, which attracts from all around, not a set held by friction.
   pure subroutine take_as_one_point(moving, found)
@@ -217,6 +233,8 @@ contains
     call advance_strobe_period(turning, later, unused, reason)
     ok = reason == 0
     if (ok) call recognise(turning, later, max_period, found, ok)
+    ! What turns round by rounding alone is on no cycle.
+    if (ok) ok = found%features%amplitude > 1e-9_wp*max(abs(found%features%x_max), abs(found%features%x_min))
   end subroutine recognise_by_event
 
   !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
