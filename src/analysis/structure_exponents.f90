@@ -27,8 +27,10 @@ module structure_exponents
 
   !> Section points within this share of the natural size are one.
   real(wp), parameter :: fixed = 1e-9_wp
-  !> Rate of change in natural sizes below which nothing moves.
-  real(wp), parameter :: still = 1e-5_wp
+  !> Rate of change in natural sizes below which nothing moves; as a share of the largest, on so many sections in a row: that of a
+  !> motion whose turns go on in the rounding.
+  real(wp), parameter :: still = 1e-5_wp, died_away = 1e-9_wp
+  integer, parameter :: quiet_sections = 8
 
 contains
 
@@ -96,12 +98,15 @@ contains
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
     real(wp) :: frame(structure%n, structure%n), batch(batches, structure%n), growth(structure%n), duration, lasted
+    real(wp) :: rate, largest_rate
     type(event_t), allocatable :: events(:)
-    integer :: i, k, part, mode, left
+    integer :: i, k, part, mode, left, quiet
     series = 0
     batch = 0
     duration = 0
     left = structure%n
+    largest_rate = 0
+    quiet = 0
     frame = 0
     do k = 1, structure%n
       frame(k, k) = 1
@@ -115,7 +120,12 @@ contains
       call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
       spectrum%passed = transient + i
-      spectrum%at_rest = is_at_rest(structure, mode, coordinates_of(structure, state))
+      rate = rate_at(structure, mode, coordinates_of(structure, state))
+      largest_rate = max(largest_rate, rate)
+      quiet = merge(quiet + 1, 0, rate <= died_away*largest_rate)
+      spectrum%at_rest = .not. structure%has_clock .and. (rate < still .or. quiet >= quiet_sections)
+      spectrum%known = structure%has_clock .or. quiet < quiet_sections
+      if (.not. spectrum%known) return
       call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%known)
       if (.not. spectrum%known) return
       if (i < 1) cycle
@@ -133,14 +143,14 @@ contains
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
 
-  !> Whether a structure without a clock all but rests at a point of its section, where the next section may be one of rounding.
-  pure logical function is_at_rest(structure, mode, point)
+  !> Rate of change at a point of the section, in natural sizes: where next to nothing is left of it, the next section of a structure
+  !> without a clock may be one of rounding.
+  pure real(wp) function rate_at(structure, mode, point) result(rate)
     type(structure_t), intent(in) :: structure
     integer, intent(in) :: mode
     real(wp), intent(in) :: point(:)
-    is_at_rest = .not. structure%has_clock
-    if (is_at_rest) is_at_rest = norm2(structure%slope(mode, 0.0_wp, point)/structure%size_of)*structure%size_of_time() < still
-  end function is_at_rest
+    rate = norm2(structure%slope(mode, 0.0_wp, point)/structure%size_of)*structure%size_of_time()
+  end function rate_at
 
   !> Takes from a structure that nothing ties to the ground the drift of the whole, which would run out of its digits.
   pure subroutine bring_back(structure, state)

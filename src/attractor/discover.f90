@@ -22,7 +22,7 @@ module discover
   use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
     start_strobe, strobe_at, strobe_t, turn_of, without_stops
   use trajectory, only: span_t
-  use turn_section, only: has_no_clock
+  use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
 
@@ -163,13 +163,13 @@ contains
     if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, strobe, returns%period, found, ok)
     if (.not. ok) call recognise(moving, strobe, min(max_period, longest_period), found, ok)
     if (.not. ok .and. returns%period > 0) call exact_cycle(moving, strobe, returns%period, found, ok)
-    if (.not. has_no_clock(moving)) return
+    if (.not. is_undriven(moving)) return
     if (ok) then
       call take_as_one_point(moving, found)
       call tell_equilibrium(found)
     else
       call recognise_equilibrium(moving, strobe, found, ok)
-      if (.not. ok) call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
+      if (.not. ok .and. has_no_clock(moving)) call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
     end if
   end subroutine identify
 
