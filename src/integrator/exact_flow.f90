@@ -26,6 +26,8 @@ module exact_flow
   !> Damping ratio from which on the exponents are far enough apart to be taken one by one; below it they are no stiff system. Times
   !> shorter than this share of the period are rounding.
   real(wp), parameter :: overdamped_from = 4, shortest_decay = 1e-12_wp
+  !> An exponential of minus this is 0.
+  real(wp), parameter :: gone = 746
   !> Above it [rad/s] the fourth power of a frequency, which the bounds of a motion take, is not finite.
   real(wp), parameter :: fastest = sqrt(sqrt(huge(1.0_wp)))
 
@@ -230,8 +232,9 @@ contains
     type(segment_t), intent(in) :: segment
     real(wp), intent(in) :: elapsed
     integer, intent(in) :: order
-    bound = (flow%slow**order*exponential(-flow%slow*elapsed)*abs(segment%z_re) &
-             + flow%fast**order*exponential(-flow%fast*elapsed)*abs(segment%z_im))/(flow%fast - flow%slow)
+    bound = flow%slow**order*abs(segment%z_re)
+    if (flow%fast*elapsed < gone) bound = bound + flow%fast**order*exponential(-flow%fast*elapsed)*abs(segment%z_im)
+    bound = bound/(flow%fast - flow%slow)
   end function free_bound
 
   !> Kinematics at `elapsed` [s] after the start of the flight.
@@ -293,7 +296,8 @@ contains
     associate (slow => flow%slow, fast => flow%fast)
       apart = fast - slow
       u = exponential(-slow*elapsed)*segment%z_re/apart
-      w = exponential(-fast*elapsed)*segment%z_im/apart
+      w = 0
+      if (fast*elapsed < gone) w = exponential(-fast*elapsed)*segment%z_im/apart
       now%x = segment%equilibrium + (u - w)
       now%v = fast*w - slow*u
       now%a = slow**2*u - fast**2*w
