@@ -44,6 +44,13 @@ contains
     reason = 0
     if (.not. (options%flight == flight_adaptive .or. is_marched(machine, state%phase))) then
       start = state
+      ! Stretches of a series, of which a stiff structure has many.
+      if (.not. flow%modal .and. flow%rate*(until - state%time) > options%step_budget) then
+        fallen = .false.
+        count_guards = 0
+        reason = reason_step_budget
+        return
+      end if
       call fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
       if (present(log)) call log_flight(machine, flow, path, start, state%time - start%time, log)
       steps = steps + watch%evaluations
