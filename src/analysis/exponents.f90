@@ -22,6 +22,8 @@ module exponents
   integer, parameter, public :: batches = 32
   !> Section points that the 0-1 test looks at, at most.
   integer, parameter, public :: most_points = 5000
+  !> An area that shrinks to less than this share of its sides in a period is a difference of which rounding has left nothing.
+  real(wp), parameter :: digits_of_areas = 1e-13_wp
   !> Frequencies of the 0-1 test.
   integer, parameter :: frequencies = 100
   !> Periods in which a direction turns to where it grows most.
@@ -79,7 +81,7 @@ contains
     type(event_t), allocatable :: events(:)
     real(wp) :: by_start(2, 2), direction(2), growth, batch(batches), lost(batches), determinant, duration
     integer :: i, part
-    logical :: singular, dead
+    logical :: singular, dead, drowned
     section = 0
     spectrum%exponents = [0.0_wp, 0.0_wp]
     spectrum%errors = [0.0_wp, 0.0_wp]
@@ -88,6 +90,7 @@ contains
     lost = 0
     singular = .false.
     dead = .false.
+    drowned = .false.
     select type (body => machines%centre)
     type is (one_body_t)
       call open_log(log, 0.0_wp)
@@ -111,7 +114,8 @@ contains
         if (i < 1) cycle
         dead = dead .or. .not. growth > 0
         determinant = abs(by_start(1, 1)*by_start(2, 2) - by_start(1, 2)*by_start(2, 1))
-        singular = singular .or. .not. determinant > 0 .or. any(loses_direction(events))
+        singular = singular .or. any(loses_direction(events))
+        drowned = drowned .or. .not. determinant > digits_of_areas*sum(by_start**2)
         part = 1 + int((int(i - 1, int64)*batches)/periods)
         if (growth > 0) batch(part) = batch(part) + logarithm(growth)
         if (determinant > 0) lost(part) = lost(part) + logarithm(determinant)
@@ -121,7 +125,9 @@ contains
       end do
       duration = periods*body%period
       spectrum%sum_exact = spectrum%sum_exact/duration - body%moving%machine%friction%damping/body%moving%machine%mass
-      call conclude(batch*batches/duration, lost*batches/duration, singular, dead, spectrum)
+      call conclude(batch*batches/duration, lost*batches/duration, singular .or. (drowned .and. .not. spectrum%has_sum), dead, &
+                    spectrum)
+      if (drowned .and. spectrum%has_sum .and. .not. dead) call take_exact_sum(spectrum)
     end select
     spectrum%known = .true.
     spectrum%periods = periods
@@ -172,6 +178,14 @@ contains
     if (singular) spectrum%exponents(2) = -huge(1.0_wp)
     if (dead) spectrum%exponents = -huge(1.0_wp)
   end subroutine conclude
+
+  !> The second exponent from the sum that the formula gives.
+  pure subroutine take_exact_sum(spectrum)
+    type(spectrum_t), intent(inout) :: spectrum
+    spectrum%sum_found = spectrum%sum_exact
+    spectrum%exponents(2) = spectrum%sum_exact - spectrum%exponents(1)
+    spectrum%errors(2) = spectrum%errors(1)
+  end subroutine take_exact_sum
 
   pure real(wp) function error_of(values)
     real(wp), intent(in) :: values(batches)

@@ -28,8 +28,10 @@ module structure_exponents
 
   !> Section points within this share of the natural size are one.
   real(wp), parameter :: fixed = 1e-9_wp
-  !> Rate of change in natural sizes below which nothing moves.
-  real(wp), parameter :: still = 1e-5_wp
+  !> Rate of change in natural sizes below which nothing moves; as a share of the largest, on so many sections in a row: that of a
+  !> motion whose turns go on in the rounding.
+  real(wp), parameter :: still = 1e-5_wp, died_away = 1e-9_wp
+  integer, parameter :: quiet_sections = 8
 
 contains
 
@@ -97,12 +99,15 @@ contains
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
     real(wp) :: frame(structure%n, structure%n), batch(batches, structure%n), growth(structure%n), duration, lasted, pace(sections)
+    real(wp) :: rate, largest_rate
     type(event_t), allocatable :: events(:)
-    integer :: i, k, part, mode, left
+    integer :: i, k, part, mode, left, quiet
     series = 0
     batch = 0
     duration = 0
     left = structure%n
+    largest_rate = 0
+    quiet = 0
     frame = 0
     do k = 1, structure%n
       frame(k, k) = 1
@@ -116,8 +121,12 @@ contains
       call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
       spectrum%passed = transient + i
-      pace(max(1, i)) = pace_of(structure, mode, coordinates_of(structure, state))
-      spectrum%at_rest = .not. structure%has_clock .and. pace(max(1, i)) < still
+      rate = pace_of(structure, mode, coordinates_of(structure, state))
+      pace(max(1, i)) = rate
+      largest_rate = max(largest_rate, rate)
+      quiet = merge(quiet + 1, 0, rate <= died_away*largest_rate)
+      spectrum%at_rest = .not. structure%has_clock .and. (rate < still .or. quiet >= quiet_sections)
+      if (.not. structure%has_clock .and. quiet >= quiet_sections) return
       call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%reason)
       if (spectrum%reason /= 0) return
       if (i < 1) cycle

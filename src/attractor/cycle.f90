@@ -17,7 +17,7 @@ module cycle
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
   use section_slopes, only: slopes_of
   use strobe, only: advance_strobe_period, begin_tally, scales_of, section_point, strobe_at, strobe_t, turn_of
-  use turn_section, only: has_no_clock
+  use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
 
@@ -288,7 +288,7 @@ contains
     do i = 1, attractor%period
       call map_point(moving, attractor%points(:attractor%coordinates, i), attractor%period, image, reference(i), ok)
       ! A neighbour of an equilibrium never comes to rest.
-      if (has_no_clock(moving) .and. reference(i)%slips == 0) reference(i)%sticks = 0
+      if (is_undriven(moving) .and. reference(i)%slips == 0) reference(i)%sticks = 0
     end do
     call halve_radius(moving, attractor, reference, found)
     if (found .or. attractor%coordinates /= 2 .or. has_no_clock(moving)) return

@@ -22,7 +22,7 @@ module discover
   use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
     start_strobe, strobe_at, strobe_t, turn_of, without_stops
   use trajectory, only: span_t
-  use turn_section, only: has_no_clock
+  use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
 
@@ -163,14 +163,30 @@ contains
     if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, strobe, returns%period, found, ok)
     if (.not. ok) call recognise(moving, strobe, min(max_period, longest_period), found, ok)
     if (.not. ok .and. returns%period > 0) call exact_cycle(moving, strobe, returns%period, found, ok)
-    if (.not. has_no_clock(moving)) return
+    if (.not. is_undriven(moving)) return
     if (ok) then
       call take_as_one_point(moving, found)
       call tell_equilibrium(found)
     else
-      call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
+      call recognise_equilibrium(moving, strobe, found, ok)
+      if (.not. ok .and. has_no_clock(moving)) call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
     end if
   end subroutine identify
+
+  !> The equilibrium that a state approaches: what is left of its motion shrinks with the motion, and never looks like a return.
+  pure subroutine recognise_equilibrium(moving, strobe, found, ok)
+    type(motion_t), intent(in) :: moving
+    type(strobe_t), intent(in) :: strobe
+    type(attractor_t), intent(out) :: found
+    logical, intent(out) :: ok
+    real(wp) :: point(most_coordinates)
+    point = section_point(moving, strobe)
+    call refine_cycle(moving, point(:coordinates_of(moving)), 1, found, ok)
+    if (.not. ok) return
+    found%section = section_state(moving, found%points(:, 1))
+    call tell_equilibrium(found)
+    ok = found%kind == kind_rest .and. find_capture([found], point, .true.) > 0
+  end subroutine recognise_equilibrium
 
   !> Rest that nothing but the springs decides is one point, which attracts from all around, not a set held by friction.
   pure subroutine take_as_one_point(moving, found)
@@ -217,6 +233,8 @@ contains
     call advance_strobe_period(turning, later, unused, reason)
     ok = reason == 0
     if (ok) call recognise(turning, later, max_period, found, ok)
+    ! What turns round by rounding alone is on no cycle.
+    if (ok) ok = found%features%amplitude > 1e-9_wp*max(abs(found%features%x_max), abs(found%features%x_min))
   end subroutine recognise_by_event
 
   !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.

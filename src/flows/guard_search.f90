@@ -22,6 +22,8 @@ module guard_search
   integer, parameter :: panels_between = 8
   !> Where misses are noted a panel is no longer than so many radians of the fastest part: a rate turns once within.
   real(wp), parameter, public :: most_radians = 2.5_wp
+  !> An exponential of minus this is nothing.
+  real(wp), parameter :: gone = 40
 
 contains
 
@@ -53,8 +55,7 @@ contains
     end do
     length = panel_length(search, 0.0_wp, duration)
     longest = huge(longest)
-    if (wants_margin) longest = most_radians/max(size(search%turn, 1)*search%frequency, &
-                                                 maxval(search%size_of_exponent(:search%terms)), tiny(longest))
+    if (wants_margin) longest = longest_panel(search, 0.0_wp)
     length = min(length, longest)
     panels = 0
     tie = 8*spacing(max(origin, origin + duration))
@@ -87,10 +88,24 @@ contains
       panels = panels + 1
       if (mod(panels, panels_between) == 0 .and. time > a) then
         b = panel_length(search, a, time - a)
+        if (wants_margin) longest = longest_panel(search, a)
         if (b > 2*length) length = min(b, longest)
       end if
     end do
   end subroutine find_first
+
+  !> Length of a panel from the time `t` on where misses are noted [s]; what has died away turns no rate.
+  pure real(wp) function longest_panel(search, t) result(length)
+    type(search_t), intent(in) :: search
+    real(wp), intent(in) :: t
+    real(wp) :: fastest
+    integer :: k
+    fastest = max(size(search%turn, 1)*search%frequency, tiny(fastest))
+    do k = 1, search%terms
+      if (-search%decay(k)*t < gone) fastest = max(fastest, search%size_of_exponent(k))
+    end do
+    length = most_radians/fastest
+  end function longest_panel
 
   !> The zeros of the guards, each its `root` [s], on the panel from `a` to `b` [s], where the values are `here` and `there`;
   !> huge where there is none before `time`, which becomes that of the first. Zeros within `tie` of it are found too.

@@ -12,7 +12,7 @@ module marched_flight
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use linear_flight, only: watch_t
-  use marched_system, only: digits_of_forces, forces_at, marched_t, place_now, set_system, sizes_of_guards, unknowns
+  use marched_system, only: digits_of_forces, forces_at, marched_t, place_now, set_system, sizes_of_guards, sizes_of_terms, unknowns
   use mode_flow, only: harmonics_of, mode_flow_t
   use path_rows, only: guard_row, size_of_row
   use polynomial, only: degree, maximum_until
@@ -25,6 +25,8 @@ module marched_flight
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
   !> That of a guard along a step.
   real(wp), parameter :: noise_share = 4096*epsilon(1.0_wp)
+  !> That of an acceleration, as a share of the sizes of its terms.
+  real(wp), parameter :: force_rounding = 8*epsilon(1.0_wp)
   !> Displacements of so many depths of a contact leave that digits enough.
   real(wp), parameter :: far = 1e2_wp
 
@@ -213,6 +215,7 @@ contains
     do g = 1, flight%count_guards
       before(g) = value_of(flight, g, flight%march%time, y)
     end do
+    flight%march%slope_rounding(n + 1:2*n) = force_rounding*sizes_of_terms(flight%system, flight%origin, flight%march%time, y)
     call take_step(flight%march, flight%system, flight%guards(:flight%count_guards), until - flight%system%start, fell)
     watch%evaluations = watch%evaluations + 1
     fallen = .false.

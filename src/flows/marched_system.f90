@@ -8,14 +8,14 @@ module marched_system
   use elementary, only: sine_cosine
   use flight_path, only: path_t
   use guarded_march, only: watched_system_t
-  use jointed, only: joint_soft, joint_t, jointed_t, most_joints
-  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, strength_now
+  use jointed, only: joint_soft, joint_spring, joint_t, jointed_t, most_joints
+  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, spring_terms, strength_now
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
   private
 
-  public :: marched_t, set_system, unknowns, forces_at, place_now, digits_of_forces, sizes_of_guards
+  public :: marched_t, set_system, unknowns, forces_at, place_now, digits_of_forces, sizes_of_guards, sizes_of_terms
 
   !> Displacements and speeds, 1, the time since the start, cosines and sines of the drive are what rows refer to.
   type, extends(watched_system_t) :: marched_t
@@ -184,6 +184,31 @@ contains
       slope(self%n + 1:) = slope(self%n + 1:) + self%push(:, i)*force(i)
     end do
   end function marched_slope
+
+  !> Accelerations with the size of each term in its place, those of a force that is not linear and what its slopes make of the sizes
+  !> of its coordinate and speed: near an equilibrium the terms cancel, and their rounding is left. `origin` are the coordinates at
+  !> the start [m].
+  pure function sizes_of_terms(self, origin, time, y) result(sizes)
+    class(marched_t), intent(in) :: self
+    real(wp), intent(in) :: origin(:), time, y(:)
+    real(wp) :: sizes(self%n), z(2*self%n + 2 + 2*self%harmonics), term, force, by_place, by_speed, strength, s
+    integer :: i, k
+    z = unknowns(self, time, y)
+    do i = 1, self%n
+      sizes(i) = sum(abs(self%acceleration(:, i)*z))
+    end do
+    do k = 1, self%count_joints
+      s = place_now(self, k, z)
+      strength = sum(self%strength(:, k)*z)
+      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), s, sum(self%speed(:, k)*z), strength, force, &
+                       by_place, by_speed)
+      term = abs(force)
+      if (self%joints(k)%kind == joint_spring) term = spring_terms(self%joints(k), s, strength)
+      term = term + abs(by_place)*(abs(s) + sum(abs(self%joints(k)%row)*(abs(origin) + abs(y(:self%n))))) &
+             + abs(by_speed)*sum(abs(self%speed(:, k)*z))
+      sizes = sizes + abs(self%push(:, k))*term
+    end do
+  end function sizes_of_terms
 
   !> Guard `number`.
   pure real(wp) function marched_margin(self, number, time, y) result(margin)

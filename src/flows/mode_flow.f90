@@ -7,7 +7,7 @@
 !> the motion is the exponential series of `matrix`, which every linear structure has.
 module mode_flow
   use boxed_forces, only: dependent, shared_inverse
-  use eigen, only: general_eigen, modulus, solve_complex, symmetric_eigen, undamped_modes
+  use eigen, only: general_eigen, modulus, refine_mode, solve_complex, symmetric_eigen, undamped_modes
   use jointed, only: harmonics_in, integral_of, joint_contact, joint_soft, jointed_t, offset_of
   use jointed_state, only: is_held
   use kinds, only: wp
@@ -22,6 +22,8 @@ module mode_flow
 
   !> Modes nearer to each other than this share are left to the series; stiffness and damping below this share are none.
   real(wp), parameter :: worst_condition = 1e5_wp, none_at_all = 1e-12_wp, nearest_resonance = 1e-5_wp
+  !> Exponents below this share of the largest have lost digits to it.
+  real(wp), parameter :: stiff = 1e-3_wp
 
 contains
 
@@ -273,10 +275,10 @@ contains
   pure subroutine set_exponentials(flow, squares, damping)
     type(mode_flow_t), intent(inout) :: flow
     real(wp), intent(in) :: squares(:), damping(:, :)
-    real(wp), allocatable :: a(:, :)
+    real(wp), allocatable :: a(:, :), level(:)
     complex(wp), allocatable :: values(:), vectors(:, :), inverse(:, :), unit(:, :)
     integer, allocatable :: kept(:)
-    real(wp) :: largest, twice
+    real(wp) :: smallest, twice
     integer :: f, d, order, i, k
     logical :: ok
     f = flow%flexible
@@ -298,27 +300,27 @@ contains
     allocate (values(order), vectors(order, order), inverse(order, order), unit(order, order))
     call general_eigen(a, values, vectors, flow%modal)
     if (.not. flow%modal) return
+    call refine_modes(flow, squares, damping(:f + d, :f + d), values, vectors, smallest, level)
     unit = 0
     do i = 1, order
       unit(i, i) = 1
     end do
     call solve_complex(vectors, unit, inverse, flow%modal)
     if (.not. flow%modal) return
-    largest = maxval([0.0_wp, modulus(values)])
     do k = 1, order
       if (sqrt(sum(modulus(vectors(:, k))**2)*sum(modulus(inverse(k, :))**2)) > worst_condition) flow%modal = .false.
-      if (modulus(values(k)) < 1e-9_wp*largest) flow%modal = .false.
+      if (modulus(values(k)) < smallest) flow%modal = .false.
     end do
-    if (count(aimag(values) > none_at_all*largest) /= count(aimag(values) < -none_at_all*largest)) flow%modal = .false.
+    if (count(aimag(values) > level) /= count(aimag(values) < -level)) flow%modal = .false.
     if (.not. flow%modal) return
-    kept = pack([(k, k=1, order)], aimag(values) > -none_at_all*largest)
+    kept = pack([(k, k=1, order)], aimag(values) > -level)
     allocate (flow%shape(size(flow%basis, 1), size(kept)), flow%drift(d, size(kept)))
     flow%exponent = values(kept)
     flow%left = inverse(kept, :)
     do i = 1, size(kept)
       k = kept(i)
-      if (abs(aimag(values(k))) <= none_at_all*largest) flow%exponent(i) = real(values(k))
-      twice = merge(2.0_wp, 1.0_wp, aimag(values(k)) > none_at_all*largest)
+      if (abs(aimag(values(k))) <= level(k)) flow%exponent(i) = real(values(k))
+      twice = merge(2.0_wp, 1.0_wp, aimag(values(k)) > level(k))
       flow%drift(:, i) = twice*vectors(2*f + 1:, k)/flow%exponent(i)
       flow%shape(:, i) = matmul(flow%basis(:, :f), twice*vectors(f + 1:2*f, k)/flow%exponent(i)) &
                          + matmul(flow%basis(:, f + 1:f + d), flow%drift(:, i))
@@ -326,6 +328,33 @@ contains
     flow%size_of_exponent = modulus(flow%exponent)
     flow%size_of_left = modulus(flow%left)
   end subroutine set_exponentials
+
+  !> Refines exponents and vectors where the smallest have lost digits beside the largest. Exponents below `smallest` are none,
+  !> imaginary parts below the `level` of each.
+  pure subroutine refine_modes(flow, squares, damping, values, vectors, smallest, level)
+    type(mode_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: squares(:), damping(:, :)
+    complex(wp), intent(inout) :: values(:), vectors(:, :)
+    real(wp), intent(out) :: smallest
+    real(wp), allocatable, intent(out) :: level(:)
+    real(wp) :: stiffness(size(damping, 1)), largest
+    integer :: k
+    largest = maxval([0.0_wp, modulus(values)])
+    smallest = 1e-9_wp*largest
+    level = spread(none_at_all*largest, 1, size(values))
+    if (.not. any(modulus(values) < stiff*largest)) return
+    smallest = 1e-14_wp*largest
+    associate (f => flow%flexible)
+      stiffness = 0
+      stiffness(:f) = squares(:f)
+      do k = 1, size(values)
+        call refine_mode(stiffness, damping, values(k), vectors(f + 1:, k))
+        vectors(:f, k) = flow%frequency*vectors(f + 1:2*f, k)/values(k)
+        vectors(:, k) = vectors(:, k)/sqrt(sum(modulus(vectors(:, k))**2))
+      end do
+    end associate
+    level = none_at_all*modulus(values)
+  end subroutine refine_modes
 
   !> Periodic response to the harmonics of the drive.
   pure subroutine set_response(machine, flow, damping, squares, forcing, surface)

@@ -15,6 +15,7 @@ module adaptive_flight
     flight_time_over
   use friction_law, only: sliding_friction
   use kinds, only: wp
+  use march_pace, only: pace_t, watch_pace
   use motion_state, only: book_t, log_t, mode_slip_plus, options_t, sample_due, sample_time, state_t, tally_t
   use oscillator, only: extra_force, system_t => oscillator_t
   use polynomial, only: degree, first_fall, interpolate, maximum_until, value_at
@@ -47,8 +48,10 @@ contains
     type(log_t), intent(inout), optional :: log
     type(march_t) :: march
     type(guard_t) :: guards(most_guards)
+    type(pace_t) :: pace
     integer :: ends(most_guards), count_guards, fallen, plain_guards
     real(wp) :: direction, until
+    logical :: hopeless
     direction = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
     march%context = context_t(direction, state%x, state%z)
     call list_guards(direction, barrier, exit_speed, guards, ends, plain_guards)
@@ -62,6 +65,9 @@ contains
       until = next_sample(machine%drive, march%time, time_end)
       call step_on(2, march, machine, guards(:count_guards), until, fallen)
       tally%steps = tally%steps + march%tries
+      call watch_pace(march%time, time_end, options%step_budget, pace, hopeless)
+      ! What it would take is more than there is.
+      if (hopeless) tally%steps = options%step_budget + 1
       if (fallen == march_failed .or. tally%steps > options%step_budget) then
         outcome = flight_failed
         exit

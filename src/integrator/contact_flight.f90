@@ -14,6 +14,7 @@ module contact_flight
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step, &
     watched_system_t
   use kinds, only: wp
+  use march_pace, only: pace_t, watch_pace
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, options_t, sample_due, &
     sample_time, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
@@ -71,8 +72,10 @@ contains
     type(pressed_t) :: pressed
     type(march_t) :: march
     type(guard_t) :: guards(most_guards)
+    type(pace_t) :: pace
     real(wp) :: y(3), scale(3), duration, time, until
     integer :: fallen, count_guards
+    logical :: hopeless
     pressed%machine = machine
     pressed%machine%contact = contact_at_speed(machine%contact, state%touch_speed)
     pressed%side = side
@@ -90,6 +93,9 @@ contains
       call take_step(march, pressed, guards(:count_guards), until - pressed%start, fallen)
       if (fallen == march_time_over .and. until < time_end) fallen = march_goes_on
       tally%steps = tally%steps + 1
+      call watch_pace(pressed%start + march%time, time_end, options%step_budget, pace, hopeless)
+      ! What it would take is more than there is.
+      if (hopeless) tally%steps = options%step_budget + 1
       if (tally%steps > options%step_budget) fallen = march_failed
       call look_along(march, pressed, state%touch_speed, tally, log)
       if (fallen >= cut) then

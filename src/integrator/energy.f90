@@ -31,6 +31,8 @@ module energy
 
   !> Longest piece over which the powers of an exact flight are integrated, in radians of its fastest part.
   real(wp), parameter :: longest_piece = 1.0_wp
+  !> After so many of its times nothing is left of the fast decay of an overdamped motion.
+  real(wp), parameter :: fast_decays = 40
 
 contains
 
@@ -129,19 +131,41 @@ contains
     type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: start, from, until
     type(book_t), intent(inout) :: book
+    real(wp) :: fast_until
+    if (flow%overdamped) then
+      ! The fast part has gone by then.
+      fast_until = min(until, max(from, fast_decays/flow%fast))
+      call book_part(machine, flow, segment, slip, start, [from, fast_until], flow%fast, book)
+      call book_part(machine, flow, segment, slip, start, [fast_until, until], &
+                     max(flow%slow, flow%harmonics*flow%drive_frequency), book)
+    else
+      call book_part(machine, flow, segment, slip, start, [from, until], &
+                     max(flow%natural, flow%harmonics*flow%drive_frequency), book)
+    end if
+  end subroutine book_piece
+
+  !> The same where nothing changes faster than `rate` [1/s].
+  pure subroutine book_part(machine, flow, segment, slip, start, span, rate, book)
+    type(oscillator_t), intent(in) :: machine
+    type(flow_t), intent(in) :: flow
+    type(segment_t), intent(in) :: segment
+    type(slip_memory_t), intent(in) :: slip
+    real(wp), intent(in) :: start, span(2), rate
+    type(book_t), intent(inout) :: book
     type(kinematics_t) :: now
     real(wp) :: piece, elapsed
     integer :: pieces, i, k
-    pieces = max(1, ceiling((until - from)*max(flow%natural, flow%harmonics*flow%drive_frequency)/longest_piece))
-    piece = (until - from)/pieces
+    if (.not. span(2) > span(1)) return
+    pieces = max(1, ceiling((span(2) - span(1))*rate/longest_piece))
+    piece = (span(2) - span(1))/pieces
     do i = 1, pieces
       do k = 1, gauss_points
-        elapsed = from + (i - 1 + gauss_place(k))*piece
+        elapsed = span(1) + (i - 1 + gauss_place(k))*piece
         call evaluate(flow, segment, elapsed, now)
         call book_instant(machine, slip, start + elapsed, now%x, now%v, gauss_weight(k)*piece, book)
       end do
     end do
-  end subroutine book_piece
+  end subroutine book_part
 
   !> A body at rest from `before` to `now`: what the drive does to the spring.
   pure subroutine book_rest(machine, before, now, book)

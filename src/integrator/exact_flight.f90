@@ -6,7 +6,7 @@
 !> the velocity keeps its sign, so the barrier is crossed at most once and a crossing cannot hide.
 module exact_flight
   use certified_step, only: departure_step, positive_step, single_root_limit, taylor_root
-  use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
+  use exact_flow, only: begin_segment, evaluate, flow_t, jerk_bound_at, kinematics_t, segment_t, snap_bound_at
   use exact_samples, only: evaluate_row
   use kinds, only: wp
   use motion_state, only: log_t, make_room, mode_slip_plus, record_sample, sample_due, sample_time, samples_before, state_t, &
@@ -69,7 +69,7 @@ contains
     real(wp), intent(out) :: before, elapsed
     type(kinematics_t), intent(out) :: now
     integer, intent(out) :: outcome
-    real(wp) :: w, step, limit, smallest
+    real(wp) :: w, step, limit, smallest, jerk_bound
     logical :: falls
     smallest = 4*epsilon(1.0_wp)*max(span, abs(segment%start))
     elapsed = 0
@@ -78,11 +78,11 @@ contains
     now%x = state%x
     now%v = state%v
     w = direction*now%v - level
+    jerk_bound = segment%jerk_bound
     if (w <= 0) then
-      step = departure_step(max(0.0_wp, direction*now%a), direction*now%j, segment%jerk_bound, &
-                            segment%snap_bound)
+      step = departure_step(max(0.0_wp, direction*now%a), direction*now%j, jerk_bound, segment%snap_bound)
     else
-      step = positive_step(w, direction*now%a, segment%jerk_bound)
+      step = positive_step(w, direction*now%a, jerk_bound)
     end if
     do
       outcome = flight_speed_reached
@@ -90,7 +90,7 @@ contains
       before = elapsed
       falls = .false.
       if (w > 0) then
-        limit = single_root_limit(w, direction*now%a, segment%jerk_bound)
+        limit = single_root_limit(w, direction*now%a, jerk_bound)
         falls = elapsed + limit <= span
       end if
       if (falls) then
@@ -108,7 +108,8 @@ contains
       end if
       if (elapsed >= span) return
       step = 0
-      if (w > 0) step = positive_step(w, direction*now%a, segment%jerk_bound)
+      if (flow%overdamped) jerk_bound = jerk_bound_at(flow, segment, elapsed)
+      if (w > 0) step = positive_step(w, direction*now%a, jerk_bound)
     end do
   end subroutine find_level
 
@@ -180,7 +181,7 @@ contains
       call evaluate(flow, segment, elapsed, now)
       v_max = max(v_max, now%v)
       if (elapsed >= last) exit
-      step = positive_step(abs(now%a), sign(1.0_wp, now%a)*now%j, segment%snap_bound)
+      step = positive_step(abs(now%a), sign(1.0_wp, now%a)*now%j, snap_bound_at(flow, segment, elapsed))
       elapsed = min(elapsed + max(step, smallest), last)
     end do
   end subroutine raise_v_max

@@ -6,7 +6,7 @@
 !> than `evaluate`.
 module exact_samples
   use elementary, only: exponential, sine_cosine
-  use exact_flow, only: flow_t, secular_factor, segment_t
+  use exact_flow, only: evaluate, flow_t, kinematics_t, secular_factor, segment_t
   use kinds, only: wp
   implicit none
   private
@@ -32,7 +32,16 @@ contains
     real(wp), intent(out) :: x(:), v(:)
     type(table_t) :: table
     real(wp) :: x_block(block), v_block(block)
+    type(kinematics_t) :: now
     integer :: first, count
+    if (flow%overdamped) then
+      do first = 1, size(x)
+        call evaluate(flow, segment, from + (first - 1)*interval, now)
+        x(first) = now%x
+        v(first) = now%v
+      end do
+      return
+    end if
     call fill_table(flow, interval, table)
     do first = 1, size(x), block
       count = min(block, size(x) - first + 1)

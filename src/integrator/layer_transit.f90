@@ -54,7 +54,7 @@ contains
     integer :: which, k, n, i, delta
     associate (law => machine%friction)
       delta = nint(law%stribeck_exponent)
-      transit%available = precise_enough .and. flow%available .and. law%layer_speed > 0 &
+      transit%available = precise_enough .and. flow%available .and. .not. flow%overdamped .and. law%layer_speed > 0 &
         .and. .not. abs(law%stribeck_exponent - delta) > 0 .and. (delta == 1 .or. delta == 2) .and. law%second_excess <= 0
       if (.not. transit%available) return
       transit%entry = law%layer_speed

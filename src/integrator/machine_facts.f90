@@ -76,7 +76,7 @@ contains
   pure real(wp) function smallest_motion(moving) result(smallest)
     type(motion_t), intent(in) :: moving
     smallest = 1e-3_wp
-    if (moving%machine%restoring%stiffness > 0) then
+    if (moving%machine%restoring%stiffness > 0 .and. moving%machine%force_scale > 0) then
       smallest = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
     end if
     if (has_driver(moving)) then

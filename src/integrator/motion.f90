@@ -74,13 +74,14 @@ contains
     moving%layer = machine%friction%layer_speed
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive
+    if (moving%exact .and. moving%flow%overdamped) moving%options%lane_width = 0
     if (moving%exact) call prepare_transit(machine, moving%flow, layer_exit*moving%layer, moving%transit)
     if (options%flight /= flight_adaptive) call prepare_pressed(machine, moving%pressed)
     if (options%flight == flight_exact .and. .not. (moving%exact .and. moving%layer <= 0 .and. &
                                                     (moving%pressed%available .or. .not. machine%contact%soft))) then
       call fail(error, exit_bad_case, 'integrator.flight = "exact": this machine has modes without a '// &
-                'closed form (Stribeck layer, nonlinear or missing spring, effect, damping ratio above 0.9, soft barrier '// &
-                'other than kelvin_voigt that pulls); use "auto"')
+                'closed form (Stribeck layer, nonlinear or missing spring, effect, damping ratio between 0.9 and 4, soft '// &
+                'barrier other than kelvin_voigt that pulls); use "auto"')
     end if
   end subroutine prepare_motion
 

@@ -18,13 +18,26 @@ module turn_section
   implicit none
   private
 
-  public :: has_no_clock, coordinates_of_turn, body_at_turn, body_turn_point, jointed_at_turn, jointed_turn_point, scales_of_turn, &
-    advance_body_to_turn, advance_jointed_to_turn
+  public :: has_no_clock, is_undriven, coordinates_of_turn, body_at_turn, body_turn_point, jointed_at_turn, jointed_turn_point, &
+    scales_of_turn, advance_body_to_turn, advance_jointed_to_turn
 
   !> Longest return to the section, in periods of the slowest mode: a belt may carry a body for long.
   integer, parameter, public :: longest_return = 256
 
 contains
+
+  !> Whether nothing depends on the time: what does not move at one instant never will.
+  pure logical function is_undriven(moving)
+    type(motion_t), intent(in) :: moving
+    if (allocated(moving%jointed)) then
+      is_undriven = has_no_clock(moving)
+    else
+      associate (drive => moving%machine%drive)
+        is_undriven = .not. any([drive%ratio, drive%interval, moving%machine%effects%dahl_stiffness] > 0) .and. &
+                      .not. any(abs([drive%cosine, drive%sine]) > 0)
+      end associate
+    end if
+  end function is_undriven
 
   !> Whether no drive gives a time: several bodies without one, or an angle under forces that turn it.
   pure logical function has_no_clock(moving)

@@ -12,7 +12,7 @@ module jointed_state
   implicit none
   private
 
-  public :: turning_at, joint_motion, joint_force, spring_force, strength_now, joint_energy, free_force, &
+  public :: turning_at, joint_motion, joint_force, spring_force, spring_terms, strength_now, joint_energy, free_force, &
     running_control, rounding_of_speed, key_of, is_held, acts_as_spring, is_curved, is_marched
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
@@ -191,6 +191,17 @@ contains
     if (abs(joint%attraction) > 0) by_place = by_place + 2*pull/(joint%gap - s)
     by_place = strength*by_place
   end subroutine spring_force
+
+  !> The terms of the force of a spring without their signs, of which rounding takes a share [N].
+  pure real(wp) function spring_terms(joint, s, strength) result(terms)
+    type(joint_t), intent(in) :: joint
+    real(wp), intent(in) :: s, strength
+    real(wp) :: sine, cosine
+    call sine_cosine(s, sine, cosine)
+    terms = abs(s)*(abs(joint%stiffness) + abs(s)*(abs(joint%quadratic) + abs(s*joint%cubic))) + abs(joint%moment*sine)
+    if (abs(joint%attraction) > 0) terms = terms + abs(joint%attraction)/(joint%gap - s)**2
+    terms = abs(strength)*terms
+  end function spring_terms
 
   !> What the force of a spring is multiplied by, with its first two derivatives by the time.
   pure subroutine strength_now(joint, frequency, turning, strength, rate, curvature)

@@ -12,6 +12,7 @@ module jointed_flight
   use kinds, only: int64, wp
   use linear_flight, only: fly_linear, watch_t
   use marched_flight, only: begin_flight, marched_flight_t, step_flight
+  use march_pace, only: pace_t, watch_pace
   use mode_flow, only: mode_flow_t
   use motion_state, only: flight_adaptive, log_t, options_t
   use status, only: reason_left_domain, reason_step_budget, reason_step_failed
@@ -38,10 +39,18 @@ contains
     type(log_t), intent(inout), optional :: log
     type(jointed_state_t) :: start
     type(path_t) :: path
-    logical :: ended, failed
+    type(pace_t) :: pace
+    logical :: ended, failed, hopeless
     reason = 0
     if (.not. (options%flight == flight_adaptive .or. is_marched(machine, state%phase))) then
       start = state
+      ! Stretches of a series, of which a stiff structure has many.
+      if (.not. flow%modal .and. flow%rate*(until - state%time) > options%step_budget) then
+        fallen = .false.
+        count_guards = 0
+        reason = reason_step_budget
+        return
+      end if
       call fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
       if (present(log)) call log_flight(machine, flow, path, start, state%time - start%time, log)
       steps = steps + watch%evaluations
@@ -60,7 +69,8 @@ contains
         if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
         steps = steps + 1
         if (failed) reason = reason_step_failed
-        if (steps > options%step_budget) reason = reason_step_budget
+        call watch_pace(state%time, until, options%step_budget, pace, hopeless)
+        if (hopeless .or. steps > options%step_budget) reason = reason_step_budget
         if (.not. all(abs(state%q(:machine%n)) <= options%domain)) reason = reason_left_domain
         if (ended .or. reason /= 0) exit
       end do

@@ -16,7 +16,6 @@ module jointed_log
   use two_bodies, only: contact_at, driver_now, mode_of_two
   implicit none
   private
-
   public :: energy_of_jointed, watched_state, log_flight, log_event, log_sample, record_change, book_change
 
   !> Gauss-Legendre nodes on (0, 1) and weights.
@@ -24,7 +23,6 @@ module jointed_log
     0.66999052179242813240133287955162_wp, 0.93056815579702628761197324444640_wp]
   real(wp), parameter :: weight(4) = [0.17392742256872692868653197461100_wp, 0.32607257743127307131346802538900_wp, &
     0.32607257743127307131346802538900_wp, 0.17392742256872692868653197461100_wp]
-
   !> Decay times after which nothing is left of an exponential.
   real(wp), parameter :: gone = merge(70, 140, epsilon(1.0_wp) > 1e-20_wp)
 
@@ -120,23 +118,29 @@ contains
     !> Looks in a panel; what is left of a panel at every step of a golden section, and the steps.
     integer, parameter :: looks = 8, steps = 50
     real(wp), parameter :: golden = 0.61803398874989484820458683436564_wp
-    real(wp) :: low, high, length, found(2), best(2), at(2)
-    integer :: j, i, k, count_looks
+    real(wp) :: low, high, from, until, length, width(2), found(2), best(2), at(2)
+    integer :: j, i, k, panels
     j = contact_at(machine)
     if (j == 0) return
-    if (machine%joints(j)%kind /= joint_soft .or. start%phase(j) == 0) return
-    count_looks = looks*panels_of(machine, flow, path, 0.0_wp, duration)
-    length = duration/count_looks
+    if (machine%joints(j)%kind /= joint_soft .or. start%phase(j) == 0 .or. .not. duration > 0) return
     best = 0
     at = 0
-    do i = 0, count_looks
-      found = pressed(i*length)
-      where (found > best) at = i*length
-      best = max(best, found)
+    width = 0
+    from = 0
+    do while (from < duration)
+      call next_stretch(machine, flow, path, from, duration, until, panels)
+      length = (until - from)/(looks*panels)
+      do i = 0, looks*panels
+        found = pressed(from + i*length)
+        at = merge(from + i*length, at, found > best)
+        width = merge(length, width, found > best)
+        best = max(best, found)
+      end do
+      from = until
     end do
     do k = 1, 2
-      low = max(0.0_wp, at(k) - length)
-      high = min(duration, at(k) + length)
+      low = max(0.0_wp, at(k) - width(k))
+      high = min(duration, at(k) + width(k))
       do i = 1, steps
         associate (left => high - golden*(high - low), right => low + golden*(high - low))
           found = pressed(left) - pressed(right)
@@ -190,47 +194,57 @@ contains
     type(jointed_state_t), intent(in) :: start
     real(wp), intent(in) :: first, last
     type(log_t), intent(inout) :: log
-    real(wp) :: length, friction, damping, contact, work
+    real(wp) :: length, friction, damping, contact, work, from, until, t
     type(jointed_state_t) :: state
     integer :: panels, i, k
-    if (.not. last > first) return
-    panels = panels_of(machine, flow, path, first, last)
-    length = (last - first)/panels
     state = start
-    do i = 1, panels
-      do k = 1, size(node)
-        associate (t => first + (i - 1 + node(k))*length)
+    from = first
+    do while (from < last)
+      call next_stretch(machine, flow, path, from, last, until, panels)
+      length = (until - from)/panels
+      do i = 1, panels
+        do k = 1, size(node)
+          t = from + (i - 1 + node(k))*length
           call path_at(machine, flow, path, t, state%q, state%v)
           state%time = path%start + t
-        end associate
-        call powers(machine, flow, state, friction, damping, contact, work)
-        log%book%friction = log%book%friction + weight(k)*length*friction
-        log%book%damping = log%book%damping + weight(k)*length*damping
-        log%book%contact = log%book%contact + weight(k)*length*contact
-        log%contact_work = log%contact_work + weight(k)*length*contact
-        log%book%work = log%book%work + weight(k)*length*work
+          call powers(machine, flow, state, friction, damping, contact, work)
+          log%book%friction = log%book%friction + weight(k)*length*friction
+          log%book%damping = log%book%damping + weight(k)*length*damping
+          log%book%contact = log%book%contact + weight(k)*length*contact
+          log%contact_work = log%contact_work + weight(k)*length*contact
+          log%book%work = log%book%work + weight(k)*length*work
+        end do
       end do
+      from = until
     end do
   end subroutine book_flight
 
-  !> Panels from `first` to `last` [s after the start of the path], by what is still fast there.
-  pure integer function panels_of(machine, flow, path, first, last) result(panels)
+  !> A stretch from `first` [s after the start of the path] to `last` at most, `until` the fastest part has died away, and its panels.
+  pure subroutine next_stretch(machine, flow, path, first, last, until, panels)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     real(wp), intent(in) :: first, last
+    real(wp), intent(out) :: until
+    integer, intent(out) :: panels
     real(wp) :: fastest
+    integer :: k
+    until = last
     fastest = machine%frequency*max(1, size(path%turning))
     if (path%length > 0) then
       ! A step of a marched flight is a polynomial.
       fastest = 0
     else if (flow%modal) then
-      fastest = max(fastest, maxval([0.0_wp, pack(flow%size_of_exponent, -real(flow%exponent)*first < gone)]))
+      k = maxloc(flow%size_of_exponent, 1, -real(flow%exponent)*first < gone)
+      if (k > 0) then
+        fastest = max(fastest, flow%size_of_exponent(k))
+        if (-real(flow%exponent(k))*last > gone) until = min(last, max(gone/(-real(flow%exponent(k))), first + spacing(first)))
+      end if
     else
       fastest = max(fastest, flow%rate)
     end if
-    panels = max(1, ceiling(3*fastest*(last - first)))
-  end function panels_of
+    panels = max(1, ceiling(3*fastest*(until - first)))
+  end subroutine next_stretch
 
   !> Powers lost to friction, dampers and contacts, and put in by forces and moving surfaces [W].
   pure subroutine powers(machine, flow, state, friction, damping, contact, work)

@@ -8,7 +8,7 @@ module eigen
   implicit none
   private
 
-  public :: undamped_modes, symmetric_eigen, general_eigen, solve_complex, modulus
+  public :: undamped_modes, symmetric_eigen, general_eigen, refine_mode, solve_complex, modulus
 
   integer, parameter :: most_sweeps = 60, most_iterations = 60
 
@@ -277,6 +277,40 @@ contains
       t(i, i) = t(i, i) + shift
     end do
   end subroutine qr_step
+
+  !> Refines a damped mode, l^2 w + l D w + K w = 0 with a diagonal K, by Newton's method: beside a large exponent a small one has
+  !> lost its digits in any method for all of them at once. What does not converge stays as it is.
+  pure subroutine refine_mode(stiffness, damping, exponent, shape)
+    real(wp), intent(in) :: stiffness(:), damping(:, :)
+    complex(wp), intent(inout) :: exponent, shape(:)
+    complex(wp) :: m(size(shape) + 1, size(shape) + 1), miss(size(shape) + 1, 1), step(size(shape) + 1, 1), w(size(shape)), l
+    integer, parameter :: most_steps = 8
+    integer :: i, k, n, largest
+    logical :: ok
+    n = size(shape)
+    largest = maxloc(modulus(shape), 1)
+    l = exponent
+    w = shape/shape(largest)
+    do i = 1, most_steps
+      m = 0
+      m(:n, :n) = l*damping
+      do k = 1, n
+        m(k, k) = m(k, k) + (l**2 + stiffness(k))
+      end do
+      miss = 0
+      miss(:n, 1) = -(l**2*w + l*matmul(damping, w) + stiffness*w)
+      m(:n, n + 1) = 2*l*w + matmul(damping, w)
+      m(n + 1, largest) = 1
+      call solve_complex(m, miss, step, ok)
+      if (.not. ok) return
+      w = w + step(:n, 1)
+      l = l + step(n + 1, 1)
+      if (modulus(step(n + 1, 1)) > 4*epsilon(1.0_wp)*modulus(l)) cycle
+      exponent = l
+      shape = w
+      return
+    end do
+  end subroutine refine_mode
 
   !> a x = b for several right-hand sides by elimination with partial pivoting; `ok` is false for a singular matrix.
   pure subroutine solve_complex(a, b, x, ok)

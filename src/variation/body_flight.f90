@@ -138,6 +138,15 @@ contains
     type(flow_t), intent(in) :: flow
     real(wp), intent(in) :: span
     real(wp) :: flight(2, 2), s, c
+    if (flow%overdamped) then
+      associate (slow => flow%slow, fast => flow%fast)
+        s = exponential(-slow*span)/(fast - slow)
+        c = exponential(-fast*span)/(fast - slow)
+        flight(:, 1) = [fast*s - slow*c, -slow*fast*(s - c)]
+        flight(:, 2) = [s - c, fast*c - slow*s]
+      end associate
+      return
+    end if
     call sine_cosine(flow%damped*span, s, c)
     s = s/flow%damped
     flight(:, 1) = [c + flow%decay*s, -flow%natural**2*s]

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Derivatives of the map from section to section by the point, from the variations of the motion, where those are known: of one
-!> body between sections of its drive, and of a structure with a clock.
+!> body between sections of its drive, and of a structure from one time to a later one.
 module section_slopes
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
@@ -10,7 +10,7 @@ module section_slopes
   use motion, only: motion_t
   use motion_state, only: tally_t
   use one_body, only: one_body_of, why_not_varied
-  use structure, only: structure_of
+  use structure, only: structure_of, structure_t
   use structure_family, only: why_structure_not_varied => why_not_varied
   use variations, only: neighbourhood_t
   implicit none
@@ -49,11 +49,16 @@ contains
     real(wp), intent(in) :: sizes(2)
     type(neighbourhood_t), intent(out) :: machines
     class(hybrid_t), allocatable :: machine
+    type(structure_t) :: structure
     if (moving%by_event) return
     if (.not. allocated(moving%jointed)) then
       if (len(why_not_varied(moving)) == 0) allocate (machine, source=one_body_of(moving, sizes(1)))
     else if (len(why_structure_not_varied(moving%jointed)) == 0) then
-      allocate (machine, source=structure_of(moving%jointed, sizes))
+      structure = structure_of(moving%jointed, sizes)
+      ! The sections are times here, of a machine without a clock too.
+      structure%has_clock = .true.
+      structure%frame%moving%section = 0
+      allocate (machine, source=structure)
     end if
     if (allocated(machine)) call move_alloc(machine, machines%centre)
   end subroutine varied_machine
