@@ -123,11 +123,10 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
     if alike:
         words = {one: _catalogue_word(catalogue, ids == one) for one in (identity, *alike)}
         mine = words.pop(identity)
-        apart = (
-            f", {mine}"
-            if mine and mine not in words.values()
-            else _amplitude_text(catalogue, ids == identity)
-        )
+        if mine.strip(".") and mine not in words.values():
+            apart = f", {mine}"
+        else:
+            apart = _size_text(catalogue, ids, identity, alike)
     return f"attractor {identity}: {texts[identity]}{apart}"
 
 
@@ -149,13 +148,22 @@ def _catalogue_word(catalogue: xr.Dataset, mine: np.ndarray) -> str:
     return decode_word(int(words[0])) if len(words) == 1 else ""
 
 
-def _amplitude_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
-    """Return ', amplitude 0.0155 m', or its range over the slices."""
-    if "amplitude" not in catalogue:
-        return ""
-    values = catalogue["amplitude"].values[mine]
-    ends = dict.fromkeys(f"{value:.4g}" for value in (values.min(), values.max()))
-    return f", amplitude {' to '.join(ends)} {unit(catalogue['amplitude'])}".rstrip()
+def _size_text(catalogue: xr.Dataset, ids: np.ndarray, identity: int, alike: list[int]) -> str:
+    """Return ', amplitude 0.0155 m', or where amplitudes agree, as those of places of rest do, ', x = 1 m'."""
+    for name, sign in (("amplitude", ""), ("x", "= ")):
+        if name not in catalogue:
+            continue
+        texts = {one: _range_text(catalogue[name], ids == one) for one in (identity, *alike)}
+        if texts[identity] not in [texts[one] for one in alike]:
+            return f", {name} {sign}{texts[identity]}"
+    return ""
+
+
+def _range_text(values: xr.DataArray, mine: np.ndarray) -> str:
+    """Return '0.0155 m', or the range over the slices."""
+    chosen = values.values[mine]
+    ends = dict.fromkeys(f"{value:.4g}" for value in (chosen.min(), chosen.max()))
+    return f"{' to '.join(ends)} {unit(values)}".rstrip()
 
 
 def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:

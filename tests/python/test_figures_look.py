@@ -236,12 +236,14 @@ def test_attractors_of_one_class_are_told_apart(library: Path) -> None:
             [0o711, 0o711, 0o711],
             ["impact, period 2, amplitude 0.1 m", "impact, period 2, amplitude 0.25 m", "impact, period 1"],
         ),
+        ([0, 0, 0], ["impact, period 2, x = -1 m", "impact, period 2, x = 1 m", "impact, period 1"]),
     ):
         catalogue = {name: ("entry", np.array(values)) for name, values in attractors.items()}
         catalogue |= {
             "event_word": ("entry", np.array(words)),
             "regime": ("entry", np.full(3, 2)),
-            "amplitude": ("entry", np.array([0.1, 0.25, 0.3]), {"units": "m"}),
+            "amplitude": ("entry", np.array([0.1, 0.25, 0.3]) * any(words), {"units": "m"}),
+            "x": ("entry", np.array([-1.0, 1.0, 1.0]), {"units": "m"}),
         }
         plain = result.drop_vars([name for name in result.variables if str(name).startswith("catalogue_")])
         changed = plain.assign({f"catalogue_{name}": entry for name, entry in catalogue.items()})
