@@ -149,7 +149,7 @@ def _catalogue_word(catalogue: xr.Dataset, mine: np.ndarray) -> str:
 
 
 def _size_text(catalogue: xr.Dataset, ids: np.ndarray, identity: int, alike: list[int]) -> str:
-    """Return ', amplitude 0.0155 m', or where amplitudes agree, as those of places of rest do, ', x = 1 m'."""
+    """Return ', amplitude 0.0155 m', or ', x = 1 m' where amplitudes agree, as those of rests do."""
     for name, sign in (("amplitude", ""), ("x", "= ")):
         if name not in catalogue:
             continue
