@@ -58,7 +58,7 @@ contains
     character(len=:), allocatable :: text
     integer :: steps
     steps = size(list_of(law, 'force')) - 1
-    text = 'the last sample is the first once more'
+    text = 'the last sample repeats the first'
     if (value_of(law, 'periodic') > 0) then
       steps = steps + 1
       text = 'the first sample follows the last'

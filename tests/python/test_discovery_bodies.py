@@ -374,7 +374,7 @@ def test_a_speed_alone_tells_the_machine(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("library")
 @pytest.mark.parametrize(("case", "name", "why"), [
-    (TWO, "v.first", "found speeds and no place of a machine with impacts \\(contact.stop\\), allowed"),
+    (TWO, "v.first", "no position for a machine with impacts \\(contact.stop\\), allowed"),
     (None, "v", "found a speed and no x, allowed where the machine is written joint by joint"),
 ])  # fmt: skip
 def test_speeds_alone_are_refused_where_they_tell_too_little(case, name, why, tmp_path: Path) -> None:

@@ -232,7 +232,7 @@ def test_24_bits_and_samples_at_full_scale(tmp_path):
     table = read_table(path)
     assert np.allclose(table.columns["x"], numbers / 2**23)
     assert any(
-        f"{np.sum(np.abs(numbers) >= 2**23 - 1)} samples of x stand at full scale" in one
+        f"{np.sum(np.abs(numbers) >= 2**23 - 1)} samples of x are at full scale" in one
         for one in table.notes
     )
 
@@ -275,7 +275,7 @@ def test_a_structure_beside_other_variables_is_found(tmp_path):
 
 def test_what_is_not_read_is_answered_with_what_is(tmp_path):
     (tmp_path / "a.sac").write_bytes(bytes(400))
-    with pytest.raises(SeparatrixError, match=r"read are CSV.*'separatrix\[formats\]'; MDF with"):
+    with pytest.raises(SeparatrixError, match=r"supported are CSV.*'separatrix\[formats\]'; MDF with"):
         read_record(tmp_path / "a.sac")
 
 

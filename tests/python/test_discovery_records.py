@@ -283,7 +283,7 @@ def test_bytes_that_are_no_text_are_taken_in_comments_only(tmp_path):
     path.write_bytes(text.encode("latin-1"))
     assert np.array_equal(read_record(path).x, wanted.x)
     path.write_bytes(text.replace("t,x", "t,x,ü").encode("latin-1"))
-    with pytest.raises(SeparatrixError, match="record.csv:7: no text in UTF-8; read are CSV"):
+    with pytest.raises(SeparatrixError, match="record.csv:7: no text in UTF-8; supported are CSV"):
         read_record(path)
     path.write_bytes(text.encode("utf-16"))
     with pytest.raises(SeparatrixError, match="UTF-16"):

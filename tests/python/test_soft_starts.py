@@ -238,5 +238,5 @@ sample = 4
         captions.append(figure.separatrix_caption)
     assert marks[0] == pytest.approx(marks[1], abs=1e-12)
     assert marks[0][-1] > 0.00126 > marks[0][0]
-    assert "1 of 2 points outside of the map" in captions[0]
+    assert "1 of 2 points outside the map" in captions[0]
     assert "outside" not in captions[1]

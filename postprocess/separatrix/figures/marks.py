@@ -85,7 +85,7 @@ def draw(
         ax.set_ylim(limits[1])
     notes = list(lacking)
     if len(notes) > _MOST_NOTES:
-        notes = [*notes[:_MOST_NOTES], f"and so of {len(notes) - _MOST_NOTES} more"]
+        notes = [*notes[:_MOST_NOTES], f"and the same for {len(notes) - _MOST_NOTES} more"]
     return marked, notes
 
 
@@ -99,7 +99,7 @@ def _not_shown(whole: xr.Dataset, identity: int, x: np.ndarray, v: np.ndarray) -
         outside |= (values < axis.min()) | (values > axis.max())
     if not outside.any():
         return []
-    return [f"attractor {identity}: {outside.sum()} of {x.size} points outside of the map"]
+    return [f"attractor {identity}: {outside.sum()} of {x.size} points outside the map"]
 
 
 def on_legend(handle: Patch, marked: dict[int, dict]) -> Patch | Line2D:

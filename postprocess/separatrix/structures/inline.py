@@ -141,7 +141,7 @@ def _of_file(path: Path) -> tuple[dict, dict]:
                 content["damping"] = group["damping"][:]
             points = {point: row[:] for point, row in group.get("point", {}).items()}
     except DAMAGE as error:
-        raise SeparatrixError(f"{path}: found what is no structure file ({error})") from None
+        raise SeparatrixError(f"{path}: cannot be read as a structure file ({error})") from None
     return content, points
 
 

@@ -136,14 +136,14 @@ def common_times(path: Path, times: Mapping[str, np.ndarray]) -> np.ndarray:
         if other.size != t.size:
             raise SeparatrixError(
                 f"{path}: '{name}' is not sampled at the times of '{first}': {other.size} samples beside "
-                f"{t.size}; export both at one clock"
+                f"{t.size}; export both with one clock"
             )
         apart = np.abs(other - t)
         row = int(np.argmax(apart)) if t.size else 0
         if t.size and not apart[row] <= _APART * step:
             raise SeparatrixError(
                 f"{path}: '{name}' is not sampled at the times of '{first}': at {other[row]:.9g} s beside "
-                f"{t[row]:.9g} s, row {row + 1}; export both at one clock"
+                f"{t[row]:.9g} s, row {row + 1}; export both with one clock"
             )
     return t
 

@@ -78,5 +78,5 @@ def _kind(path: Path) -> str:
     if ending:
         return ending
     if not is_text(path):
-        raise SeparatrixError(f"{path}: a file of an unknown kind; read are {READ}")
+        raise SeparatrixError(f"{path}: a file of an unknown kind; supported are {READ}")
     return "CSV"

@@ -46,7 +46,7 @@ def read_mdf(path: Path, names: Mapping[str, str]) -> Found:
     t = common_times(path, times)
     bad = np.any(list(invalid.values()), axis=0)
     if bad.any():
-        found.notes.append(f"{np.sum(bad)} samples are invalid by the recorder: left out")
+        found.notes.append(f"{np.sum(bad)} samples are marked invalid by the recorder: left out")
     found.values = {name: np.asarray(values)[~bad] for name, values in found.values.items()}
     found.values["t"], found.units["t"] = t[~bad], "s"
     return found

@@ -103,7 +103,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     else:
         speed = next(name for name in ("v", *sensors) if name in columns and name[0] == "v")
         columns["x"] = cumulative_trapezoid(columns[speed], columns["t"], initial=0)
-        notes.append(f"no place: x is the integral of {speed} from 0 and is not compared")
+        notes.append(f"no position: x is the integral of {speed} from 0 and is not compared")
     t, x = columns["t"], columns["x"]
     if t.size < _FEWEST_SAMPLES:
         raise SeparatrixError(f"{path}: {t.size} samples, at least {_FEWEST_SAMPLES} are needed")

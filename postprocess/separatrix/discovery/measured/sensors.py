@@ -112,7 +112,7 @@ def _check_impacts(record: Record, structure: Structure) -> None:
     hard = [one.path for one in structure.joints if one.path.startswith("contact.") and one.law not in FORCES]
     if hard:
         raise SeparatrixError(
-            f"{record.file}: found speeds and no place of a machine with impacts "
+            f"{record.file}: found velocities but no position for a machine with impacts "
             f"({', '.join(hard)}), allowed with x or x.BODY"
         )
 

@@ -223,7 +223,7 @@ def _check_encoding(path: Path, number: int, text: str) -> None:
     try:
         text.encode()
     except UnicodeEncodeError:
-        raise SeparatrixError(f"{path}:{number}: no text in UTF-8; read are {READ}") from None
+        raise SeparatrixError(f"{path}:{number}: no text in UTF-8; supported are {READ}") from None
 
 
 def _check_place(path: Path, number: int, key: str, stands: dict[str, int], below: bool) -> None:

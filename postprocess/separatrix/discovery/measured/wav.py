@@ -52,5 +52,5 @@ def _shares(name: str, channel: np.ndarray, notes: list[str]) -> np.ndarray:
     least = 256 if channel.dtype == np.int32 and not np.any(channel & 0xFF) else 1
     clipped = int(np.sum((channel >= limits.max + 1 - least) | (channel == limits.min)))
     if clipped:
-        notes.append(f"{clipped} samples of {name} stand at full scale: clipped?")
+        notes.append(f"{clipped} samples of {name} are at full scale: clipped?")
     return (channel.astype(float) - middle) / (limits.max + 1 - middle)
