@@ -226,7 +226,7 @@ contains
     end do
     lines = lines//nl// &
       'Exit codes: 0 done, 64 usage, 65 bad case, 66 input missing, 70 internal, 73 cannot create, 74 I/O,'//nl// &
-      '75 stopped early and resumable, 76 file belongs to another case, 77 too many labels would change.'//nl
+      '75 stopped early and resumable, 76 file belongs to another case, 77 too many labels would change, 78 motion given up.'//nl
   end function help_text
 
 end module command_table
