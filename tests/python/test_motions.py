@@ -313,7 +313,7 @@ count = 8
 
 
 def test_a_double_well_has_two_attractors_at_rest(separatrix, tmp_path):
-    """By symmetry half of the starts come to each; a motion that has settled takes no more steps than another."""
+    """By symmetry half of the starts come to each; settled, a motion takes no more steps than before."""
     (tmp_path / "case.toml").write_text(DOUBLE_WELL)
     outcome = succeed(separatrix, "trajectory", "case.toml", folder=tmp_path)
     assert "at its equilibrium" in outcome.out
@@ -343,7 +343,11 @@ DAMPING
 @pytest.mark.parametrize("parts", [False, True])
 def test_an_overdamped_machine_has_a_closed_form(separatrix, tmp_path, parts, damping):
     """Steps that follow the fast exponent would take for ever; the slow one keeps its digits beside it."""
-    words = {"PART": "body", "SPRING": "restoring", "DAMPING": f'[friction]\nlaw = "viscous"\ndamping = {damping}'}
+    words = {
+        "PART": "body",
+        "SPRING": "restoring",
+        "DAMPING": f'[friction]\nlaw = "viscous"\ndamping = {damping}',
+    }
     if parts:
         words = {"PART": "body.a", "SPRING": "spring.s", "DAMPING": f'damping = {damping}\nbetween = ["a"]'}
     text = OVERDAMPED
@@ -356,6 +360,8 @@ def test_an_overdamped_machine_has_a_closed_form(separatrix, tmp_path, parts, da
         missing = file.attrs["energy_closing_error"]
     fast = damping / 2 + np.sqrt((damping / 2) ** 2 - 100)
     slow = 100 / fast
-    expected = ((3 + fast * 0.3) * np.exp(-slow * time) - (3 + slow * 0.3) * np.exp(-fast * time)) / (fast - slow)
+    expected = ((3 + fast * 0.3) * np.exp(-slow * time) - (3 + slow * 0.3) * np.exp(-fast * time)) / (
+        fast - slow
+    )
     np.testing.assert_allclose(x, expected, rtol=1e-10, atol=1e-14)
     assert abs(missing) < 1e-9
