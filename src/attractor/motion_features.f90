@@ -3,7 +3,7 @@
 
 !> What a motion looks like: its features over some drive periods, the events of its cycle.
 module motion_features
-  use attractors, only: features_t, regime_at_rest, regime_non_impact, regime_of, regime_stuck, wrap_range
+  use attractors, only: features_t, regime_at_rest, regime_of, regime_stuck, wrap_range
   use event_words, only: canonical_word
   use kinds, only: int64, wp
   use machine_facts, only: rides_along
@@ -26,12 +26,7 @@ contains
     features = regime_of(tally, periods)
     features%rotation = real(tally%turns, wp)/periods
     call wrap_range(features, moving%machine%turn)
-    if (.not. rides_along(moving)) then
-      ! In balance, though nothing holds it.
-      if (features%regime == regime_non_impact .and. .not. tally%x_max > tally%x_min) features%regime = regime_at_rest
-    else if (features%regime == regime_at_rest) then
-      features%regime = regime_stuck
-    end if
+    if (rides_along(moving) .and. features%regime == regime_at_rest) features%regime = regime_stuck
   end function features_over
 
   !> Event word of the cycle of `periods` drive periods that a state on the section has reached, wherever on it that is.

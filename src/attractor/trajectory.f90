@@ -4,7 +4,7 @@
 !> One trajectory from its start to its label: a pure function of the machine, the frozen catalogue and
 !> the start, so that a map does not depend on order, tile or rank.
 module trajectory
-  use attractors, only: attractor_t, features_t, find_box
+  use attractors, only: attractor_t, features_t, find_box, regime_at_rest, regime_non_impact
   use capture, only: captor_of, stays_in_family
   use kinds, only: int64, wp
   use motion, only: motion_t
@@ -13,6 +13,7 @@ module trajectory
   use strobe, only: advance_past_event, advance_strobe, advance_strobe_period, begin_tally, energy_now, record_end, &
     section_point, start_strobe, strobe_t
   use status, only: reason_settled, reason_time_over
+  use turn_section, only: is_undriven
   implicit none
   private
 
@@ -312,6 +313,7 @@ contains
       if (.not. ended) call open_window(moving, course)
     case (phase_window)
       outcome%window = features_over(moving, course%tally, span%window/moving%machine%period)
+      if (outcome%window%regime == regime_non_impact .and. in_balance(moving, course)) outcome%window%regime = regime_at_rest
       call note_state(course, outcome)
       course%phase = merge(phase_over, phase_extension, ended .or. course%captured > 0 .or. .not. can_be_captured)
       course%tally%wants_v_max = .false.
@@ -320,6 +322,13 @@ contains
     end select
     if (ended) course%phase = phase_over
   end subroutine end_phase
+
+  !> Whether the body has not moved, nor will it: nothing holds it, but no force is left.
+  pure logical function in_balance(moving, course)
+    type(motion_t), intent(in) :: moving
+    type(course_t), intent(in) :: course
+    in_balance = is_undriven(moving) .and. .not. abs(course%state%v) > 0 .and. .not. course%tally%x_max > course%tally%x_min
+  end function in_balance
 
   !> State and counts where the course is now.
   pure subroutine note_state(course, outcome)

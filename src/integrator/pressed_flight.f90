@@ -48,7 +48,8 @@ contains
         stiffer%friction%damping = machine%friction%damping + law%damping
         stiffer%natural_frequency = sqrt(stiffer%restoring%stiffness/machine%mass)
         call prepare_flow(stiffer, pressed%flow(side))
-        pressed%available = pressed%available .and. pressed%flow(side)%available
+        ! The copy that a record is made of is flown by steps.
+        pressed%available = pressed%available .and. pressed%flow(side)%available .and. .not. pressed%flow(side)%overdamped
       end do
     end associate
   end subroutine prepare_pressed

@@ -282,3 +282,86 @@ def test_the_figures_of_a_plane_say_where_its_motions_start(results):
     for kind in ("stack", "plane"):
         assert r"$\omega/\omega_0$" not in captions[kind]
     assert r"$\mu" not in captions["plane"]
+
+
+DOUBLE_WELL = """\
+[body.ball]
+mass = 1
+[spring.well]
+between = ["ball"]
+law = "polynomial"
+stiffness = -1
+cubic = 1
+damping = 0.5
+[start]
+x0 = 0.5
+[run]
+duration = 80
+[attractors]
+sample = 32
+[[axis]]
+name = "x0"
+from = -2
+to = 2
+count = 8
+[[axis]]
+name = "v0"
+from = -2
+to = 2
+count = 8
+"""
+
+
+def test_a_double_well_has_two_attractors_at_rest(separatrix, tmp_path):
+    """By symmetry half of the starts come to each; settled, a motion takes no more steps than before."""
+    (tmp_path / "case.toml").write_text(DOUBLE_WELL)
+    outcome = succeed(separatrix, "trajectory", "case.toml", folder=tmp_path)
+    assert "at its equilibrium" in outcome.out
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
+        assert file["x"][-1] == pytest.approx(1, abs=1e-8)
+        assert file.attrs["regime"] == "at_rest"
+    succeed(separatrix, "basin", "case.toml", folder=tmp_path)
+    with h5py.File(tmp_path / "case.basin.h5") as file:
+        labels, counts = np.unique(file["attractor"][()], return_counts=True)
+    assert labels.tolist() == [1, 2]
+    assert counts.tolist() == [32, 32]
+
+
+OVERDAMPED = """\
+start = { x0 = 0.3, v0 = 3 }
+run = { duration = 50 }
+[PART]
+mass = 1
+[SPRING]
+law = "linear"
+stiffness = 100
+DAMPING
+"""
+
+
+@pytest.mark.parametrize("damping", [1e3, 1e5, 1e7])
+@pytest.mark.parametrize("parts", [False, True])
+def test_an_overdamped_machine_has_a_closed_form(separatrix, tmp_path, parts, damping):
+    """Steps that follow the fast exponent would take for ever; the slow one keeps its digits beside it."""
+    words = {
+        "PART": "body",
+        "SPRING": "restoring",
+        "DAMPING": f'[friction]\nlaw = "viscous"\ndamping = {damping}',
+    }
+    if parts:
+        words = {"PART": "body.a", "SPRING": "spring.s", "DAMPING": f'damping = {damping}\nbetween = ["a"]'}
+    text = OVERDAMPED
+    for word, meaning in words.items():
+        text = text.replace(word, meaning)
+    write_case(tmp_path, text)
+    succeed(separatrix, "trajectory", "case.toml", folder=tmp_path)
+    with h5py.File(tmp_path / "case.trajectory.h5") as file:
+        time, x = file["time"][()], file["x"][()]
+        missing = file.attrs["energy_closing_error"]
+    fast = damping / 2 + np.sqrt((damping / 2) ** 2 - 100)
+    slow = 100 / fast
+    expected = ((3 + fast * 0.3) * np.exp(-slow * time) - (3 + slow * 0.3) * np.exp(-fast * time)) / (
+        fast - slow
+    )
+    np.testing.assert_allclose(x, expected, rtol=1e-10, atol=1e-14)
+    assert abs(missing) < 1e-9
