@@ -90,8 +90,8 @@ contains
     end do
   end function is_found
 
-  !> Where a motion is after many periods, and after how many it is back there (0: it is not, or it has come to a known orbit; -1: it
-  !> was given up or left its domain).
+  !> Where a motion is after many periods, and after how many it is back there (0: it is not, or it has come to a known orbit;
+  !> -1: it was given up or left its domain).
   subroutine settle(machines, start, longest, found, settled, periods)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: start(:)

@@ -171,7 +171,7 @@ upper = 0.1
 
 @pytest.mark.parametrize("name", ["pulls", "hunt_crossley"])
 def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeypatch) -> None:
-    """Starts of a map lie on both sides of the surface: same bits for lanes of any width, same ends without."""
+    """Starts of a map lie on both sides of the surface: same bits for any width of lanes."""
     axes = "".join(
         f'[[axis]]\nname = "{axis}"\nfrom = {-end}\nto = {end}\ncount = 4\n'
         for axis, end in (("x0", 0.02), ("v0", 0.2))
