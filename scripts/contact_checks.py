@@ -216,8 +216,8 @@ def hard(program: Program) -> list[Check]:
     lost = run.number("energy_lost_to_friction")
     ended("stuck exactly at the limit", run, "friction loss (J)", lost, 0, 1e-12)
     for case in ("pair_platform", "contact_hunt_crossley", "pair_backlash"):
-        told = program.refused("trajectory", case, "start.x0=1.5")
+        code = program.refused("trajectory", case, "start.x0=1.5")
         # a soft stop may be pressed from the start
         expected = 0 if case == "contact_hunt_crossley" else 65
-        rows.append(check(f"start inside the stop, {case}: exit code", told, expected, 0))
+        rows.append(check(f"start inside the stop, {case}: exit code", code, expected, 0))
     return rows

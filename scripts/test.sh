@@ -30,21 +30,28 @@ done
 
 # Single suites: those of Fortran by ctest, those of Python by pytest, which need program and library.
 run_suites() {
-  local name stem path suites=() files=()
+  local name stem path found suites=() files=()
   for name in "$@"; do
     stem=$(basename "$name")
     stem=${stem%.pf}
     stem=${stem%.py}
     stem=test_${stem#test_}
-    path=$(compgen -G "tests/*/$stem.pf" || compgen -G "tests/*/$stem.py" || true)
-    case "$path" in
-      *.pf) suites+=("$stem") ;;
-      *.py) files+=("$path") ;;
-      *)
-        echo "test: found '$name', allowed the name of a file tests/*/test_NAME.pf or tests/*/test_NAME.py" >&2
-        exit 64
-        ;;
-    esac
+    found=0
+    # without an ending it may be a suite of both
+    for path in $(compgen -G "tests/*/$stem.p[fy]" || true); do
+      case "$name" in
+        *.pf | *.py) [[ "${path##*.}" == "${name##*.}" ]] || continue ;;
+      esac
+      found=1
+      case "$path" in
+        *.pf) suites+=("$stem") ;;
+        *.py) files+=("$path") ;;
+      esac
+    done
+    if ((!found)); then
+      echo "test: found '$name', allowed the name of a file tests/*/test_NAME.pf or tests/*/test_NAME.py" >&2
+      exit 64
+    fi
   done
   scripts/bootstrap.sh
   # shellcheck source=scripts/environment.sh

@@ -26,6 +26,13 @@ def given_up_text(result: xr.Dataset) -> str:
     return f"given up after {time[-1] if time.size else 0.0:.6g} s: {reason_of(result).replace('_', ' ')}"
 
 
+def all_given_up(result: xr.Dataset) -> int:
+    """How many points a result has if the motions of all were given up; 0 if one was not."""
+    found = [result[name].values for name in ("reason", "branch_reason") if name in result]
+    lost = all(np.isin(values, _CODES).all() for values in found)
+    return sum(values.size for values in found) if lost else 0
+
+
 def refuse(path: Path, result: xr.Dataset) -> None:
     """Raise a SeparatrixError of code 78 where every motion of a result was given up."""
     reason = reason_of(result)
@@ -33,9 +40,8 @@ def refuse(path: Path, result: xr.Dataset) -> None:
         raise SeparatrixError(
             f"{path}: the motion was given up: {reason} (--partial: as far as it went)", GIVEN_UP
         )
-    found = [result[name].values for name in ("reason", "branch_reason") if name in result]
-    points = sum(values.size for values in found)
-    if points and all(np.isin(values, _CODES).all() for values in found):
+    points = all_given_up(result)
+    if points:
         raise SeparatrixError(
             f"{path}: the motions of all {points} points were given up (--partial: no error)", GIVEN_UP
         )

@@ -12,7 +12,8 @@ import xarray as xr
 
 import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix.cases import Case
-from separatrix.errors import BAD_DATA, CaseError, Interrupted
+from separatrix.errors import BAD_DATA, CaseError, GivenUpError, Interrupted
+from separatrix.given_up import all_given_up
 from separatrix.progress import Progress, Report
 from separatrix.simulate import LABEL_VARIABLES, Attractor, Catalogue, StopFlag, StoppedError, search_slices
 from separatrix.variables import CATALOGUE, CYCLES, FORMAT_VERSION, KINDS, MAP, STARTS, attributes
@@ -58,7 +59,7 @@ class Labelling:
         self.done = 0
 
     def __call__(self) -> xr.Dataset:
-        """Compute what is left; Interrupted can go on."""
+        """Compute what is left; Interrupted can go on. GivenUpError where every motion was given up."""
         stop = StopFlag()
         with Progress(self.asked) as told:
             try:
@@ -68,7 +69,12 @@ class Labelling:
                 stop.set()
                 done = self.done / max(1, self._total())
                 raise Interrupted(f"stopped at {100 * done:.0f} %; resume() goes on", done, self) from None
-        return self._dataset()
+        result = self._dataset()
+        if points := all_given_up(result):
+            raise GivenUpError(
+                f"the motions of all {points} points were given up: nothing is known of their ends", result
+            )
+        return result
 
     def _total(self) -> int:
         return len(self.starts) * math.prod(self.shape)

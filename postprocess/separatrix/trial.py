@@ -60,18 +60,18 @@ def read_apart(path: str | Path, kind: str, read: Callable[[], Result]) -> Resul
     os.close(sink)
     try:
         with os.fdopen(source, "rb") as answer:
-            told = answer.read()
+            content = answer.read()
     except BaseException:
         os.kill(child, signal.SIGKILL)
         raise
     finally:
         _, status = os.waitpid(child, 0)
-    if os.WIFSIGNALED(status) or not told:
+    if os.WIFSIGNALED(status) or not content:
         loops = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU
         why = "does not come to an end" if loops else "crashes"
         raise SeparatrixError(f"{path}: is damaged (the reader of {kind} files {why} in it)")
     try:
-        result = pickle.loads(told)
+        result = pickle.loads(content)
     except (EOFError, pickle.UnpicklingError):
         raise SeparatrixError(f"{path}: not enough memory for what its reader found") from None
     if isinstance(result, SeparatrixError):
@@ -90,16 +90,18 @@ def _answer(path: str | Path, kind: str, read: Callable[[], object], sink: int) 
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
     size = Path(path).stat().st_size
     longest = int(_LONGEST_WHOLE + _PER_BYTE * size)
-    resource.setrlimit(resource.RLIMIT_CPU, (longest, longest + 1))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _limit(resource.RLIMIT_CPU, longest, longest + 1)
+    _limit(resource.RLIMIT_CORE, 0, 0)
     used = _used_memory()
     if used:
         most = used + max(_MOST_MEMORY, _MEMORY_OVER_FILE * size)
-        resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+        _limit(resource.RLIMIT_AS, most, resource.RLIM_INFINITY)
     try:
         answer = read()
     except SeparatrixError as error:
         answer = error
+    except MemoryError:
+        answer = SeparatrixError(f"{path}: not enough memory to read it")
     except Exception as error:
         # what a library raises in a damaged file may be anything
         said = re.sub(r"[^ -~]+", " ", str(error))[:_LONGEST_REASON].strip()
@@ -107,6 +109,16 @@ def _answer(path: str | Path, kind: str, read: Callable[[], object], sink: int) 
         answer = SeparatrixError(f"{path}: not a {kind} file that can be read: {why}")
     with os.fdopen(sink, "wb") as file:
         pickle.dump(answer, file, protocol=pickle.HIGHEST_PROTOCOL)
+
+
+def _limit(what: int, soft: int, hard: int) -> None:
+    """Set a limit, within those that this process has: a hard one cannot be raised."""
+
+    def within(limit: int, given: int) -> int:
+        return given if limit == resource.RLIM_INFINITY or 0 <= given < limit else limit
+
+    given = resource.getrlimit(what)
+    resource.setrlimit(what, (within(soft, given[0]), within(hard, given[1])))
 
 
 def _used_memory() -> int:

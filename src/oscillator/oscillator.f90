@@ -207,7 +207,8 @@ contains
 
   !> Force [N] that friction or a barrier must hold to keep the body at rest at `x` [m] with the
   !> crank at `phi` [rad], its rate of change [N/s], and a bound on the magnitude of its second time
-  !> derivative [N/s^2] over all angles, where a play has sharp corners up to the next of them. Dahl's friction and a measured force are not in it.
+  !> derivative [N/s^2] over all angles, where a play has sharp corners up to the next of them. Dahl's friction and a
+  !> measured force are not in it.
   pure subroutine holding_force(machine, x, phi, force, rate, curvature_bound)
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, phi

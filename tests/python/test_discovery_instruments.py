@@ -135,6 +135,9 @@ def test_a_channel_of_time_stamps_is_read(tmp_path):
     assert np.allclose(record.t, T, atol=1e-9)
     np.savez(tmp_path / "a.npz", t=stamps, x=X)
     assert np.allclose(read_record(tmp_path / "a.npz").t, T)
+    # durations have their own beginning, from which a phase counts
+    np.savez(tmp_path / "b.npz", t=(1e6 * (3 + T)).astype("timedelta64[us]"), x=X)
+    assert np.allclose(read_record(tmp_path / "b.npz").t, 3 + T)
 
 
 # ---- MDF
@@ -176,27 +179,44 @@ def test_samples_that_the_recorder_calls_invalid_are_gaps(tmp_path):
 # ---- LabVIEW measurement files
 
 
-def lvm(path: Path, columns: str, decimal: str = ".") -> Path:
+def lvm(path: Path, columns: str, decimal: str = ".", empty: bool = False) -> Path:
+    """A file of two channels; without x values their column is `empty`, as LabVIEW leaves it, or left out."""
     numbers = [[f"{a:.6f}".replace(".", decimal) for a in row] for row in zip(T, X, 2 * X, strict=True)]
     rows = ["\t".join(row if columns == "One" else ["", *row[1:]]) for row in numbers]
-    if columns == "No":
+    if columns == "No" and not empty:
         rows = [row[1:] for row in rows]
     step = "5.0E-3".replace(".", decimal)
     head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", f"Decimal_Separator\t{decimal}"]
     head += [f"X_Columns\t{columns}", "Time_Pref\tRelative", "***End_of_Header***\t", "\t"]
     head += ["Channels\t2\t", "Samples\t300\t300\t", "Y_Unit_Label\tMillimeters\tN\t"]
     head += ["X_Dimension\tTime\tTime\t", "X0\t0\t0\t", f"Delta_X\t{step}\t{step}\t", "***End_of_Header***\t"]
-    title = ("X_Value\t" if columns == "One" else "") + "x\tforce\tComment"
+    title = ("X_Value\t" if columns == "One" or empty else "") + "x\tforce\tComment"
     path.write_text("\n".join([*head, title, *rows]) + "\n")
     return path
 
 
-@pytest.mark.parametrize(("columns", "decimal"), [("One", "."), ("No", ",")])
-def test_a_labview_measurement_is_read(tmp_path, columns, decimal):
-    record = read_record(lvm(tmp_path / "a.lvm", columns, decimal))
+@pytest.mark.parametrize(
+    ("columns", "decimal", "empty"), [("One", ".", False), ("No", ",", True), ("No", ".", False)]
+)
+def test_a_labview_measurement_is_read(tmp_path, columns, decimal, empty):
+    record = read_record(lvm(tmp_path / "a.lvm", columns, decimal, empty))
     assert np.allclose(record.t, T, atol=1e-6)
     assert np.allclose(record.x, 1e-3 * X, atol=1e-6)
     assert np.allclose(record.force, 2 * X, atol=1e-5)
+
+
+@pytest.mark.parametrize("word", ["1_000", "\u0661"])
+def test_a_word_that_is_no_number_to_the_eye_is_refused(tmp_path, word):
+    path = lvm(tmp_path / "a.lvm", "One")
+    lines = path.read_text().split("\n")
+    lines[-2] = f"1.495000\t{word}\t2"
+    path.write_text("\n".join(lines))
+    with pytest.raises(SeparatrixError, match=f"a.lvm:{len(lines) - 1}: '{word}' is no number"):
+        read_record(path)
+    path = tmp_path / "a.csv"
+    path.write_text("t,x\n" + "".join(f"{a},{b}\n" for a, b in zip(T, X, strict=True)) + f"1.5,{word}\n")
+    with pytest.raises(SeparatrixError, match=f"a.csv:302: '1.5,{word}' is not a row of numbers"):
+        read_record(path)
 
 
 # ---- WAV

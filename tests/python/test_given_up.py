@@ -139,6 +139,10 @@ def test_python_raises_with_what_there_is(library: Path, folder: Path) -> None:
     with pytest.raises(GivenUpError, match="all 6 points") as caught:
         sx.basin(case, progress=False)
     assert (caught.value.result["reason"] == 5).all()
+    # in this process, without a second look by the program
+    with pytest.raises(GivenUpError, match="all 6 points") as caught:
+        sx.basin(case.with_({"attractors.second_look": 0}), progress=False)
+    assert (caught.value.result["reason"] == 5).all()
 
 
 def test_the_table_of_exit_codes_is_that_of_the_code(source_dir: Path) -> None:

@@ -4,6 +4,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -251,6 +253,21 @@ def test_damaged_files_are_refused_with_their_name(tmp_path, capsys):
 
 def _raise(error):
     raise error
+
+
+def test_limits_of_the_session_are_no_damage(tmp_path):
+    """A hard limit of memory or time, as clusters set it, cannot be raised; files are read within it."""
+    code = (
+        "import resource; from separatrix.trial import read_apart\n"
+        "for what, most in ((resource.RLIMIT_AS, 8 << 30), (resource.RLIMIT_CPU, 15)):\n"
+        "    resource.setrlimit(what, (most, most))\n"
+        "assert read_apart(__import__('sys').argv[1], 'text', lambda: 3) == 3\n"
+    )
+    (tmp_path / "a.txt").write_text("3")
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "a.txt"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with pytest.raises(SeparatrixError, match=r"a.txt: not enough memory to read it"):
+        read_apart(tmp_path / "a.txt", "text", lambda: _raise(MemoryError()))
 
 
 def test_what_is_not_read_is_answered_with_what_is(tmp_path):

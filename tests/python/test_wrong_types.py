@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every key of the examples with a value of another type: refused by its name, or taken; never a crash."""
+"""Every key of the examples with a value of another type: refused with a message, or taken; never a crash."""
 
 import tomllib
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ def _keys(value: object, at: str = "", law: str = "") -> Iterator[tuple[str, str
 
 
 def _problems(text: str, name: str, keys: list[str]) -> list[str]:
-    """What is neither accepted nor a CaseError of code 65 or 66 that names the key."""
+    """What is neither accepted nor a CaseError of code 65 or 66 with a message."""
     problems = []
     for key in keys:
         for value in VALUES:

@@ -136,10 +136,9 @@ def machine_pieces(result: xr.Dataset) -> list[str]:
 
 
 def _has_weight(case: dict) -> bool:
-    """Whether gravity acts: on a pendulum, and by the weight that a friction coefficient multiplies."""
+    """Whether gravity acts: by the weight that a friction coefficient multiplies; a pendulum has a moment."""
     friction = case.get("friction", {})
-    rubs = isinstance(friction, dict) and any(key.endswith("_coefficient") for key in friction)
-    return rubs or case.get("restoring", {}).get("law") == "pendulum"
+    return isinstance(friction, dict) and any(key.endswith("_coefficient") for key in friction)
 
 
 def _law_pieces(case: dict, family: str, law: dict, axes: set[str], units: dict[str, str]) -> list[str]:

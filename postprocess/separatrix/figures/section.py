@@ -49,12 +49,15 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
             entry = {name: catalogue[name].values[row] for name in ("attractor", "period", "x", "v")}
             if 0 < entry["period"] <= _LONGEST:
                 point = float(entry["x"]), float(entry["v"])
-                yield (int(entry["attractor"]), *_flown(model, point, int(entry["period"]), angle, values))
+                yield (
+                    int(entry["attractor"]),
+                    *_points_of_cycle(model, point, int(entry["period"]), angle, values),
+                )
     except (CaseError, KeyError):
         return
 
 
-def _flown(
+def _points_of_cycle(
     model: Model, point: tuple[float, float], period: int, angle: float, values: Mapping[str, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities of a cycle; not numbers where it cannot be computed."""

@@ -12,7 +12,8 @@ import h5py
 import numpy as np
 from scipy import io, sparse
 
-from separatrix.errors import BAD_DATA, SeparatrixError
+from separatrix.errors import SeparatrixError
+from separatrix.extras import library
 from separatrix.trial import read_apart
 
 # Names of matrices, in the order in which they are looked for.
@@ -21,9 +22,6 @@ _USUAL = {
     "stiffness": ("stiffness", "K", "KAA", "KXX", "KGG", "Kr"),
     "damping": ("damping", "C", "D", "BAA", "BXX", "BGG", "Cr"),
 }
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-# Bytes that MATLAB puts before HDF5.
-_MATLAB_HEAD = 512
 
 # The name of a matrix that is alone in its file.
 ALONE = ""
@@ -62,9 +60,7 @@ def find_matrix(
 
 
 def _matlab(path: Path) -> dict[str, sparse.coo_array]:
-    with path.open("rb") as file:
-        begin = file.read(_MATLAB_HEAD + 8)
-    if _HDF5 in (begin[:8], begin[_MATLAB_HEAD:]):
+    if h5py.is_hdf5(path):
         with h5py.File(path) as file:
             return dict(_of_hdf5("", file))
     return dict(_of_arrays("", io.loadmat(path)))
@@ -125,10 +121,7 @@ def _checked(value: object) -> sparse.coo_array:
 
 def _op4(path: Path) -> dict[str, sparse.coo_array]:
     """Read a Nastran op4 file, binary or text."""
-    try:
-        from pyyeti.nastran import op4
-    except ImportError:
-        raise SeparatrixError(f"{path}: op4 files need pyyeti: pip install pyyeti", BAD_DATA) from None
+    op4 = library("pyyeti.nastran.op4", path, "formats")
     return dict(_of_arrays("", op4.read(str(path))))
 
 

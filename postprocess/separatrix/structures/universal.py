@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.errors import BAD_DATA, NO_INPUT, SeparatrixError
+from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.extras import library
 from separatrix.structures.content import Modes
 from separatrix.trial import read_apart
 
@@ -38,10 +39,7 @@ def read_modes(path: str | Path) -> Modes:
     path = Path(path)
     if not path.is_file():
         raise SeparatrixError(f"{path}: there is no such file", NO_INPUT)
-    try:
-        import pyuff
-    except ImportError:
-        raise SeparatrixError(f"{path}: universal files need pyuff: pip install pyuff", BAD_DATA) from None
+    pyuff = library("pyuff", path, "formats")
 
     def read() -> Modes:
         file = pyuff.UFF(str(path))
@@ -51,7 +49,7 @@ def read_modes(path: str | Path) -> Modes:
             _factors([file.read_sets(int(number)) for number in np.flatnonzero(kinds == _UNITS)]),
         )
 
-    return read_apart(path, "structure", read)
+    return read_apart(path, "universal", read)
 
 
 def _factors(sets: Sequence[Mapping]) -> tuple[float, float]:

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arrays of a file by their names as a table of columns, and the times that channels have in common."""
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
@@ -114,10 +112,11 @@ def _members(value: object) -> Mapping[str, object]:
 
 
 def _seconds(stamps: np.ndarray, notes: list[str]) -> np.ndarray:
-    """Time stamps as seconds since the first one."""
-    if stamps.dtype.kind == "M" and stamps.size:
-        notes.append(f"t counts from {np.ravel(stamps)[0]}")
-    late = np.atleast_1d(stamps - np.ravel(stamps)[:1])
+    """Time stamps as seconds since the first one, durations as they are."""
+    late = np.atleast_1d(stamps)
+    if stamps.dtype.kind == "M":
+        notes += [f"t counts from {first}" for first in late.ravel()[:1]]
+        late = late - late.ravel()[:1]
     seconds = late / np.timedelta64(1, "s")
     return np.where(np.isnat(late), np.nan, seconds)
 
@@ -146,13 +145,3 @@ def common_times(path: Path, times: Mapping[str, np.ndarray]) -> np.ndarray:
                 f"{t[row]:.9g} s, row {row + 1}; export both with one clock"
             )
     return t
-
-
-def library(name: str, path: Path, extra: str) -> ModuleType:
-    """A package that reads the files of others, from an extra of this one."""
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise SeparatrixError(
-            f"{path}: reading it needs the package {name}: pip install 'separatrix[{extra}]'"
-        ) from None

@@ -5,7 +5,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from separatrix.discovery.measured.arrays import Found, library, table_of
+from separatrix.discovery.measured.arrays import Found, table_of
 from separatrix.discovery.measured.hdf5 import read_hdf5
 from separatrix.discovery.measured.keys_file import read_keys
 from separatrix.discovery.measured.lvm import BEGIN, read_lvm
@@ -16,6 +16,7 @@ from separatrix.discovery.measured.tdms import read_tdms
 from separatrix.discovery.measured.uff import read_uff
 from separatrix.discovery.measured.wav import read_wav
 from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.extras import library
 from separatrix.trial import read_apart
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -179,8 +179,8 @@ def to_si(path: Path, table: Table, notes: list[str]) -> tuple[dict[str, np.ndar
 def _all_units(path: Path, table: Table, notes: list[str]) -> dict[str, str]:
     """Units of the columns by the header and by what the file states beside them, which must agree."""
     stated = {name: unit for name, unit in table.units.items() if name in table.columns and is_stated(unit)}
-    told = _units(path, table) if "units" in table.header else {}
-    by_header = {name: told.get(name, told.get(kind_of(name), "")) for name in table.columns}
+    said = _units(path, table) if "units" in table.header else {}
+    by_header = {name: said.get(name, said.get(kind_of(name), "")) for name in table.columns}
     by_header = {name: unit for name, unit in by_header.items() if unit}
     for name, unit in stated.items():
         own = by_header.get(name)

@@ -9,13 +9,14 @@ import numpy as np
 
 from separatrix.discovery.measured.arrays import Found, column_of, common_times
 from separatrix.discovery.measured.header import is_stated
-from separatrix.discovery.measured.tables import is_column
+from separatrix.discovery.measured.tables import is_column, real
 from separatrix.errors import SeparatrixError
 
 BEGIN = "LabVIEW Measurement"
 _END = "***End_of_Header***"
 _SPECIAL, _SPECIAL_END = "***Start_Special***", "***End_Special***"
 _SEPARATORS = {"Tab": "\t", "Comma": ","}
+_X_VALUES = "X_Value"
 
 
 def read_lvm(path: Path, names: Mapping[str, str]) -> Found:
@@ -87,13 +88,14 @@ def _channels(
     titles = [title.strip() for title in titles]
     each = {"No": 0, "One": 1, "Multi": 2}.get(_first(keys, "X_Columns", "One"))
     count = _first(own, "Channels", "0")
-    # how many columns lie before that of the first channel, and between channels
     if each is None or not count.isdecimal() or not int(count):
         raise SeparatrixError(f"{path}: found X_Columns {keys.get('X_Columns')} and {count} channels")
     decimal = _first(keys, "Decimal_Separator", ".")
+    # without x values LabVIEW leaves their column empty; other programs leave it out
+    first = int(titles[0] == _X_VALUES)
     for k in range(int(count)):
         # of x values: none, before the first channel, before each
-        over, at = [(None, k), (0, k + 1), (2 * k, 2 * k + 1)][each]
+        over, at = [(None, first + k), (0, k + 1), (2 * k, 2 * k + 1)][each]
         if at >= len(titles):
             raise SeparatrixError(f"{path}:{line}: {len(titles)} names of columns for {count} channels")
         name = column_of(titles[at], names)
@@ -127,7 +129,7 @@ def _of(own: dict[str, list[str]], key: str, k: int, absent: str) -> str:
 def _number(path: Path, own: dict[str, list[str]], key: str, k: int, decimal: str) -> float:
     text = _of(own, key, k, "")
     try:
-        return float(text.replace(decimal, "."))
+        return real(text.replace(decimal, "."))
     except ValueError:
         raise SeparatrixError(f"{path}: {key} is '{text}', expected a number") from None
 
@@ -138,7 +140,7 @@ def _numbers(path: Path, rows: list[tuple[int, list[str]]], at: int, decimal: st
     values = np.empty(len(kept))
     for place, (number, words) in enumerate(kept):
         try:
-            values[place] = float(words[at].strip().replace(decimal, "."))
+            values[place] = real(words[at].strip().replace(decimal, "."))
         except ValueError:
             raise SeparatrixError(f"{path}:{number}: '{words[at].strip()}' is no number") from None
     return values, kept

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.arrays import Found, column_of, common_times, library
+from separatrix.discovery.measured.arrays import Found, column_of, common_times
 from separatrix.discovery.measured.header import is_stated
 from separatrix.discovery.measured.tables import is_column
 from separatrix.errors import SeparatrixError
+from separatrix.extras import library
 
 # of a master channel: time
 _TIME = 1

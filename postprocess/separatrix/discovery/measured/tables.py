@@ -265,6 +265,13 @@ def _names(path: Path, number: int, text: str, separator: str) -> list[str]:
     return names
 
 
+def real(word: str) -> float:
+    """The number that a word is; `float` also takes 1_000 for one, and digits of other scripts."""
+    if "_" in word or not word.isascii():
+        raise ValueError(word)
+    return float(word)
+
+
 def _numbers(
     path: Path, number: int, text: str, separator: str, names: list[str], used: list[str]
 ) -> list[float]:
@@ -276,6 +283,6 @@ def _numbers(
         # a comma can only be that of decimals
         words = [word.replace(",", ".") for word in words]
     try:
-        return [float(word) for word in words]
+        return [real(word) for word in words]
     except ValueError:
         raise SeparatrixError(f"{path}:{number}: '{text}' is not a row of numbers") from None

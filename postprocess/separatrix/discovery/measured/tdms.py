@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.arrays import Found, column_of, common_times, library
+from separatrix.discovery.measured.arrays import Found, column_of, common_times
 from separatrix.discovery.measured.header import is_stated
 from separatrix.discovery.measured.tables import is_column
 from separatrix.discovery.measured.tdms_bursts import OFFSET, START, STEP, Burst, bursts_of
 from separatrix.errors import SeparatrixError
+from separatrix.extras import library
 
 # of a step, by which a burst may begin beside where the last one ended
 _BESIDE = 0.5
@@ -60,13 +61,13 @@ def _times(path: Path, name: str, size: int, bursts: list[Burst], found: Found) 
         bursts = [Burst(size, bursts[0].properties)] if bursts else []
     parts, begin, before, end = [], None, None, 0.0
     for burst in bursts:
-        told = burst.properties
-        step = float(told.get(STEP, 0.0))
+        properties = burst.properties
+        step = float(properties.get(STEP, 0.0))
         if not step > 0:
             raise SeparatrixError(f"{path}: {STEP} of '{name}' is {step:g} s, expected more than 0")
-        start = told.get(START)
+        start = properties.get(START)
         begin = start if begin is None else begin
-        first = float(told.get(OFFSET, 0.0))
+        first = float(properties.get(OFFSET, 0.0))
         if start is not None:
             seconds, fractions = (a - b for a, b in zip(start, begin, strict=True))
             first += seconds + fractions / 2.0**64

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.measured.arrays import Found, column_of, common_times, library
+from separatrix.discovery.measured.arrays import Found, column_of, common_times
 from separatrix.discovery.measured.header import is_stated, same_unit
 from separatrix.discovery.measured.tables import is_column, kind_of
 from separatrix.errors import SeparatrixError
+from separatrix.extras import library
 
 # specific data types of UFF 58 (displacement, velocity, force) and the columns that they are
 _OF_TYPE = {8: "x", 11: "v", 9: "force", 13: "force"}
