@@ -421,3 +421,9 @@ def test_columns_are_read_and_not_changed():
     columns = {"t": 1e3 * t, "x": 1e3 * np.cos(3 * t)}
     for _ in range(2):
         assert make_record("r", columns, {"units": "ms, mm"}).t == pytest.approx(t)
+
+
+@pytest.mark.parametrize("name", ["x", "v", "v.slide"])
+def test_a_record_without_samples_is_refused(name):
+    with pytest.raises(SeparatrixError, match="r: 0 samples, at least 60 are needed"):
+        make_record("r", {"t": np.zeros(0), name: np.zeros(0)})

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import separatrix as sx
+import xarray as xr
 from figure_probes import V0, X0, colour_at, legend_texts
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
@@ -23,6 +24,7 @@ from separatrix import cli, style
 from separatrix.classes import classes
 from separatrix.errors import SeparatrixError
 from separatrix.figures import basin, section, sweep
+from separatrix.figures import contact as contacts
 from separatrix.figures.animation import animate, ffmpeg
 from separatrix.figures.difference import differing
 from separatrix.figures.look import Look
@@ -473,3 +475,22 @@ def test_two_maps_are_compared_point_by_point(tmp_path: Path, capsys: pytest.Cap
     assert (tmp_path / "one_difference.png").is_file()
     assert cli.main([str(one), "--difference", "--formats", "png", "--dpi", "60"]) == 64
     assert "found 1 files, allowed 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("units", "force"), [(("m", "m/s"), "N"), (("rad", "rad/s"), "N m")])
+def test_contacts_of_an_angle_have_its_units(units: tuple[str, str], force: str) -> None:
+    """Penetration, speed and force as the file has them; those asked for take the place of their own kind."""
+    t = np.arange(400) / 100
+    values = {"x": (np.sin(9 * t), units[0]), "v": (9 * np.cos(9 * t), units[1])}
+    values["contact_force"] = (-np.maximum(np.sin(9 * t) - 0.5, 0), force)
+    motion = xr.Dataset(
+        {name: ("time", column, {"units": unit}) for name, (column, unit) in values.items()},
+        {"time": ("time", t, {"units": "s"})},
+        {"barrier_upper": 0.5, "kind": "trajectory"},
+    )
+    figure = contacts.loops(motion, "loops", Look(units=("deg", "mm")))
+    shown = {"m": "mm", "rad": "deg"}[units[0]]
+    assert figure.axes[0].get_xlabel() == f"penetration ({shown})"
+    assert figure.axes[0].get_ylabel() == f"force of the barrier ({force})"
+    deepest = max(np.max(line.get_xdata()) for line in figure.axes[0].lines if len(line.get_xdata()) > 2)
+    assert deepest == pytest.approx(0.5 * {"mm": 1e3, "deg": 180 / np.pi}[shown], rel=1e-2)

@@ -15,7 +15,7 @@ from separatrix import style
 from separatrix.figures import pair
 from separatrix.figures.caption import describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, Look
-from separatrix.labels import plain
+from separatrix.labels import plain, unit
 from separatrix.layout import compose
 
 MOST_LOOPS = 8
@@ -27,17 +27,18 @@ def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
 
     Of more contacts those with the most different speeds are shown.
     """
-    figure, axes = _panels(look)
+    figure, axes = _panels(result, look)
     found = contacts(result)
-    speed, speed_unit = look.factor("m/s"), look.unit("m/s")
+    speed_unit = unit(result["v"])
+    speed, shown = look.factor(speed_unit), look.unit(speed_unit)
     order = np.argsort([-one[1] for one in found])
     if len(found) > MOST_LOOPS:
         order = order[np.linspace(0, len(found) - 1, MOST_LOOPS).round().astype(int)]
     handles = []
     for place, index in enumerate(order):
         colour = style.OKABE_ITO[place]
-        _draw(axes, found[index], colour, look)
-        label = f"{found[index][1] * speed:.3g} {speed_unit}"
+        _draw(axes, found[index], colour, look.factor(unit(result["x"])), look.factor("s"))
+        label = f"{found[index][1] * speed:.3g} {shown}"
         handles.append(Line2D([], [], color=colour, label=label))
     caption = [f"{len(order)} of {len(found)} contacts, by impact speed", *describe_case(result)]
     compose(figure, title, [*caption, plain(version_text(result))], handles, columns=max(1, len(handles)))
@@ -46,7 +47,7 @@ def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
 
 def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
     """Return the fastest contact of each trajectory over penetration and time, one colour for each."""
-    figure, axes = _panels(DEFAULT)
+    figure, axes = _panels(results[0], DEFAULT)
     handles, captions = [], []
     for place, result in enumerate(results):
         found = contacts(pair.relative_to_stop(result))
@@ -54,36 +55,38 @@ def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
             continue
         colour = style.OKABE_ITO[place % len(style.OKABE_ITO)]
         fastest = max(found, key=lambda item: item[1])
-        _draw(axes, fastest, colour, DEFAULT)
+        _draw(axes, fastest, colour)
         law = resolved_case(result)["contact"]["law"].replace("_", " ")
-        handles.append(Line2D([], [], color=colour, label=f"{law}, {fastest[1]:.3g} m/s"))
+        handles.append(Line2D([], [], color=colour, label=f"{law}, {fastest[1]:.3g} {unit(result['v'])}"))
         captions += describe_case(result)
     compose(figure, title, [*captions, plain(version_text(results[0]))], handles, columns=2)
     return figure
 
 
-def _panels(look: Look) -> tuple[Figure, tuple[Axes, Axes]]:
+def _panels(result: xr.Dataset, look: Look) -> tuple[Figure, tuple[Axes, Axes]]:
     figure = style.new_figure(style.DOUBLE_COLUMN, 68.0)
     over_depth, over_time = figure.subplots(1, 2)
-    over_depth.set_xlabel(f"penetration ({look.unit('m')})")
+    over_depth.set_xlabel(f"penetration ({look.unit(unit(result['x']))})")
     over_time.set_xlabel(f"time since first touch ({look.unit('s')})")
     for letter, ax in zip("ab", (over_depth, over_time), strict=True):
-        ax.set_ylabel("force of the barrier (N)")
+        ax.set_ylabel(f"force of the barrier ({unit(result['contact_force'])})")
         ax.axhline(0, color="#BBBBBB", linewidth=0.5, zorder=0)
         ax.set_title(f"{letter})", loc="left")
     return figure, (over_depth, over_time)
 
 
-def _draw(axes: tuple[Axes, Axes], contact: tuple, colour: str, look: Look) -> None:
-    """Draw a contact from no force to no force: what lies between that and its ends is a jump."""
+def _draw(
+    axes: tuple[Axes, Axes], contact: tuple, colour: str, of_depth: float = 1.0, of_time: float = 1.0
+) -> None:
+    """Draw a contact from no force to no force, times these factors: jumps lie between that and its ends."""
     start, _, time, depth, force = contact
     over_depth, over_time = axes
     # the force at first touch follows from the first two samples
     early = time[:2] - start
     touch = force[0] - early[0] * (force[1] - force[0]) / (early[1] - early[0])
     force = np.concatenate([[0.0, touch], force, [0.0]])
-    depths = look.factor("m") * np.concatenate([[0.0, 0.0], depth, depth[-1:]])
-    times = look.factor("s") * np.concatenate([[0.0, 0.0], time - start, time[-1:] - start])
+    depths = of_depth * np.concatenate([[0.0, 0.0], depth, depth[-1:]])
+    times = of_time * np.concatenate([[0.0, 0.0], time - start, time[-1:] - start])
     over_depth.plot(depths, force, color=colour)
     over_time.plot(times, force, color=colour)
 

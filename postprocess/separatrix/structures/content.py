@@ -34,7 +34,7 @@ class Matrices:
 
     def __post_init__(self) -> None:
         """Sparse, square, of one size, symmetric."""
-        size = self.mass.shape[0]
+        size = np.shape(self.mass)[0]
         for name in ("mass", "stiffness", "damping"):
             if getattr(self, name) is None:
                 continue

@@ -15,7 +15,7 @@ import numpy as np
 
 from separatrix.errors import SeparatrixError
 from separatrix.simulate import LABEL_VARIABLES, StopFlag
-from separatrix.variables import CATALOGUE, FORMAT_VERSION
+from separatrix.variables import CATALOGUE, FORMAT_VERSION, MAP, attributes, position_is_angle
 from separatrix.version import __version__
 from separatrix.view import live
 from separatrix.view.machine import Machine
@@ -106,17 +106,18 @@ def _write(
         format="separatrix", kind="basin", date_created=now,
     )  # fmt: skip
     file.attrs.update(format_version=np.int32(FORMAT_VERSION), complete=np.int32(1))
+    angle = position_is_angle(source.case)
     for axis, points in axes:
         _put(file, axis["key"], points, axis["unit"], axis["label"]).make_scale(axis["key"])
     for name, array in values.items():
         like = source.file.get(name)
-        unit = str(like.attrs.get("units", "1")) if like is not None else _UNITS.get(name, "1")
-        item = _put(file, name, array, unit, name if like is None else str(like.attrs.get("long_name", name)))
+        about = attributes(MAP[name][1:], angle) if like is None else like.attrs
+        item = _put(file, name, array, str(about.get("units", "1")), str(about.get("long_name", name)))
         for i, (axis, _) in enumerate(axes):
             item.dims[i].attach_scale(file[axis["key"]])
         for key in ("flag_values", "flag_meanings"):
-            if like is not None and key in like.attrs:
-                item.attrs[key] = like.attrs[key]
+            if key in about:
+                item.attrs[key] = about[key]
     parameters = source.parameters_at(at) | dict(changed)
     for axis, _ in axes:
         parameters.pop(axis["path"], None)
@@ -126,13 +127,6 @@ def _write(
     text = _case_of_view(machine, axes, parameters, source, at)
     provenance.attrs.update(case_text=text, resolved_case=text)
     provenance.attrs.update(version=__version__, computed_by="separatrix-view", started=now, finished=now)
-
-
-_UNITS = {
-    "mean_impact_speed": "m/s", "amplitude": "m", "x_max": "m", "x_min": "m", "v_max": "m/s",
-    "settle_time": "s",
-    "grazing_margin": "m",
-}  # fmt: skip
 
 
 def _write_catalogue(
@@ -152,9 +146,13 @@ def _write_catalogue(
     group = file.create_group("catalogue")
     group["entry"] = np.arange(len(rows), dtype=np.int32)
     group["entry"].make_scale("entry")
+    angle = position_is_angle(machine.source.case)
     for name, (kind, *described) in CATALOGUE.items():
-        item = _put(group, name, np.array([row[name] for row in rows], kind), *described[:2])
-        item.attrs.update(described[2])
+        about = attributes(described, angle)
+        item = _put(
+            group, name, np.array([row[name] for row in rows], kind), about["units"], about["long_name"]
+        )
+        item.attrs.update(about)
         item.dims[0].attach_scale(group["entry"])
 
 

@@ -93,6 +93,8 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         bad = np.flatnonzero(~(np.abs(column) < _LARGEST))
         if bad.size:
             raise SeparatrixError(f"{where(bad[0])}: '{name}' is {column[bad[0]]}; {bad.size} such values")
+    if kept.size < _FEWEST_SAMPLES:
+        raise SeparatrixError(f"{path}: {kept.size} samples, at least {_FEWEST_SAMPLES} are needed")
     sensors = [name for name in columns if is_sensor(name)]
     places = [name for name in sensors if name[0] == "x"]
     own_x = "x" in columns
@@ -105,8 +107,6 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         columns["x"] = cumulative_trapezoid(columns[speed], columns["t"], initial=0)
         notes.append(f"no position: x is the integral of {speed} from 0 and is not compared")
     t, x = columns["t"], columns["x"]
-    if t.size < _FEWEST_SAMPLES:
-        raise SeparatrixError(f"{path}: {t.size} samples, at least {_FEWEST_SAMPLES} are needed")
     steps = np.diff(t)
     back = np.flatnonzero(steps <= 0)
     if back.size:
@@ -135,8 +135,8 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
         notes.append(f"columns that are not used: {', '.join(table.unused)}")
     channels = {name: columns[name] for name in CHANNELS if name in columns}
     of_bodies = {name: columns[name] for name in sensors}
-    told = {"header": numbers, "pieces": pieces, "notes": notes, "file": str(path)}
-    return Record(path.stem, t, sensors=of_bodies, own_x=own_x, **told, **channels)
+    described = {"header": numbers, "pieces": pieces, "notes": notes, "file": str(path)}
+    return Record(path.stem, t, sensors=of_bodies, own_x=own_x, **described, **channels)
 
 
 def unique_names(records: Iterable[Record]) -> None:
