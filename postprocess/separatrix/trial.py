@@ -18,6 +18,8 @@ from separatrix.errors import SeparatrixError
 _LONGEST = 2
 # the same of a whole file: at least, and per byte
 _LONGEST_WHOLE, _PER_BYTE = 20, 1e-5
+# time by the clock, in processor times
+_WAITING = 20
 # memory of a reader beside what it has at its beginning [bytes]: at least, and over the size of the file
 _MOST_MEMORY, _MEMORY_OVER_FILE = 4 << 30, 40
 # characters of what a library says
@@ -67,7 +69,7 @@ def read_apart(path: str | Path, kind: str, read: Callable[[], Result]) -> Resul
     finally:
         _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status) or not content:
-        loops = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU
+        loops = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM)
         why = "does not come to an end" if loops else "crashes"
         raise SeparatrixError(f"{path}: is damaged (the reader of {kind} files {why} in it)")
     try:
@@ -84,13 +86,15 @@ def read_apart(path: str | Path, kind: str, read: Callable[[], Result]) -> Resul
 def _answer(path: str | Path, kind: str, read: Callable[[], object], sink: int) -> None:
     """Send what `read` returns, or why it fails, within limits of time and memory."""
     # an interrupt ends it at once; libraries print what they find
-    for one in (signal.SIGTERM, signal.SIGINT):
+    for one in (signal.SIGTERM, signal.SIGINT, signal.SIGALRM):
         signal.signal(one, signal.SIG_DFL)
     for stream in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
     size = Path(path).stat().st_size
     longest = int(_LONGEST_WHOLE + _PER_BYTE * size)
     _limit(resource.RLIMIT_CPU, longest, longest + 1)
+    # who waits for a lock that another thread of the parent held takes no processor time
+    signal.alarm(_WAITING * longest)
     _limit(resource.RLIMIT_CORE, 0, 0)
     used = _used_memory()
     if used:

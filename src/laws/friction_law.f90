@@ -6,6 +6,7 @@
 !> or, where it fades, -s (K + (F - K)/(1 + |v|/v_f)) - b v with the break-away force F, or, in a fluid, -s (K + d v^2) - b v; at
 !> rest it is whatever holds the body, up to the break-away force. Nothing is smoothed.
 module friction_law
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
@@ -65,7 +66,7 @@ contains
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
       if (law%excess > 0) law%layer_speed = edge_of_layer(law%stribeck_velocity, law%stribeck_exponent)
     case default
-      error stop 'friction_of: a law of the table has no force'
+      law%kinetic = no_force()
     end select
   end function friction_of
 
@@ -90,9 +91,14 @@ contains
     case ('friction:coulomb_quadratic')
       law%drag = value_of(choice, 'drag')
     case default
-      error stop 'friction_of_part: a law of the table has no force'
+      law%kinetic = no_force()
     end select
   end function friction_of_part
+
+  !> The force of a law of the table that has none here: not a number, so that a motion with it is given up.
+  pure real(wp) function no_force()
+    no_force = ieee_value(1.0_wp, ieee_quiet_nan)
+  end function no_force
 
   !> Whether sliding friction depends on the speed other than linearly.
   pure elemental logical function falls(law)
