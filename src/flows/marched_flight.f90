@@ -69,8 +69,9 @@ contains
     do g = 1, flight%count_guards
       associate (guard => flight%guards(g), row => flight%system%guard(:n, g))
         ! One that is left without a speed.
-        if (guard%is_left .and. abs(sum(row*state%v(:n))) <= rounding*sum(abs(row*state%v(:n)))) &
+        if (guard%is_left .and. abs(sum(row*state%v(:n))) <= rounding*sum(abs(row*state%v(:n)))) then
           guard%blur = tolerance*sum(abs(row)*scale(:n))
+        end if
       end associate
     end do
     duration = machine%period

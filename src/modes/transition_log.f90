@@ -71,7 +71,7 @@ contains
           kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
           rest = rest_of_chatter(moving, before, turning, j, after%phase(j))
           ! In a row the impacts of others can take the rebound away.
-          if (.not. rest > 0) cycle
+          if (.not. rest > 0 .and. count(machine%joints%kind == joint_contact) > 1) cycle
           ! Told of the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled first
           ! comes first.
           call log_event(machine, kind, j, struck, struck, log, at=min(before%time + rest, next_action(machine, before)))
