@@ -65,7 +65,8 @@ module session
 
 contains
 
-  !> Starts the log and reads the case, which is warned of if that is all; under mpirun also starts the team. Ends the program if the case is bad.
+  !> Starts the log and reads the case; under mpirun also starts the team. A check alone warns of the case here. Ends the program if
+  !> the case is bad.
   subroutine open_session(command, session)
     type(command_t), intent(in) :: command
     type(session_t), intent(out) :: session

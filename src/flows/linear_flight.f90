@@ -197,8 +197,8 @@ contains
     end do
   end function value
 
-  !> Drops the leading terms of a series, where it `starts`, that are no more than the rounding of what they are sums of: `sizes` times
-  !> those of the unknowns. One that is nothing else is raised by its rounding, `lift`: it falls when it is below that.
+  !> Drops the leading terms of a series, where it `starts`, that are no more than the rounding of what they are sums of: `sizes`
+  !> times those of the unknowns. One that is nothing else is raised by its rounding, `lift`: it falls when it is below that.
   pure subroutine drop_rounding(sizes, matrix, unknowns, length, starts, p, lift)
     real(wp), intent(in) :: sizes(:), matrix(:, :), unknowns(:), length
     logical, intent(in) :: starts

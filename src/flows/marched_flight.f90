@@ -69,7 +69,12 @@ contains
     y(n + 1:) = state%v(:n)
     call set_sizes(machine, flight%system, state, y, scale, flight%depth, contact_time)
     do g = 1, flight%count_guards
-      if (flight%guards(g)%is_left) flight%guards(g)%blur = tolerance*sum(abs(flight%system%guard(:n, g))*scale(:n))
+      associate (guard => flight%guards(g), row => flight%system%guard(:n, g))
+        ! One that is left without a speed.
+        if (guard%is_left .and. abs(sum(row*state%v(:n))) <= rounding*sum(abs(row*state%v(:n)))) then
+          guard%blur = tolerance*sum(abs(row)*scale(:n))
+        end if
+      end associate
     end do
     duration = machine%period
     ! Held bodies move as they are told: only the force of the contact knows how fast that is.

@@ -85,7 +85,7 @@ contains
       ok = .true.
       if (any(hit /= 0)) then
         call judge_burst(machine, hit, turning, state, plastic)
-        call add_tied(machine, state, turning, touching)
+        call add_tied(machine, state, turning, hit, touching)
         if (plastic) call add_near(machine, state, turning, touching)
         call strike(machine, state, turning, touching, plastic, speed, lost, ok)
         do j = 1, size(machine%joints)

@@ -270,11 +270,13 @@ contains
     end do
   end subroutine classify
 
-  !> Moves the state onto what the phases hold: no sliding speed, gap and its rate zero; least in the metric of the masses.
-  pure subroutine project(machine, state, turning)
+  !> Moves the state onto what the phases hold: no sliding speed, gap and its rate zero; least in the metric of the masses. With
+  !> `speeds` false only the gaps.
+  pure subroutine project(machine, state, turning, speeds)
     type(jointed_t), intent(in) :: machine
     type(jointed_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
+    logical, intent(in), optional :: speeds
     type(question_t) :: question
     real(wp), dimension(most_joints) :: miss, gap, r, y
     real(wp) :: s, u
@@ -295,6 +297,7 @@ contains
     end do
     associate (n => question%count)
       side = 0
+      if (present(speeds)) miss = merge(miss, 0.0_wp, speeds)
       call solve(question, miss, 0.0_wp, side, r, y, ok)
       do i = 1, n
         state%v(:machine%n) = state%v(:machine%n) + r(i)*matmul(machine%mobility, machine%joints(question%joint(i))%row)

@@ -143,8 +143,8 @@ contains
     end associate
   end function energy_of_swing
 
-  !> Largest force, or a rate of it (derivative number `order` - 2), of a spring [N/m] under a body with a mobility [1/kg] that has an
-  !> energy [J]: what places on their way through zero are the rounding of.
+  !> Largest force, or a rate of it (derivative number `order` - 2), of a spring [N/m] under a body with a mobility [1/kg] that has
+  !> an energy [J]: what places on their way through zero are the rounding of.
   pure real(wp) function swing_of_force(energy, stiffness, mobility, order) result(force)
     real(wp), intent(in) :: energy, stiffness, mobility
     integer, intent(in) :: order

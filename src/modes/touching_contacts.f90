@@ -12,25 +12,46 @@ module touching_contacts
 
   public :: add_tied, add_near, close_gaps
 
+  !> Impacts farther apart than this share of a period are not at once.
+  real(wp), parameter :: longest_tie = 1e-11_wp
+
 contains
 
-  !> Contacts that close, or have opened, within the rounding of places and of the clock take part in an impact: they touch.
-  pure subroutine add_tied(machine, state, turning, touching)
+  !> Contacts that close, or have opened, within the rounding of places and of the clock take part in an impact: they touch. The
+  !> rounding of places on their way through zero is that of their swing, and a slow impact, of those that are `hit`, has no sharper
+  !> time.
+  pure subroutine add_tied(machine, state, turning, hit, touching)
     type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(jointed_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
+    integer, intent(in) :: hit(:)
     integer, intent(inout) :: touching(:)
-    real(wp) :: s, u, reach
-    integer :: j
+    real(wp) :: s, u, swing, reach, span
+    integer :: j, phase(most_joints)
+    logical :: alone
+    alone = .true.
+    swing = 16*epsilon(s)*swing_of(machine, state)
+    span = 8*spacing(state%time)
+    do j = 1, size(machine%joints)
+      if (hit(j) == 0) cycle
+      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
+      span = max(span, min(longest_tie*machine%period, swing*sum(abs(machine%joints(j)%row))/max(abs(u), tiny(u))))
+    end do
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
         if (joint%kind /= joint_contact .or. touching(j) /= 0) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        reach = 16*epsilon(s)*(sum(abs(joint%row*state%q(:machine%n))) + abs(joint%offset%mean)) + abs(u)*8*spacing(state%time)
+        reach = swing*sum(abs(joint%row)) + 16*epsilon(s)*abs(joint%offset%mean) + abs(u)*span
         if (s >= joint%upper - reach) touching(j) = 1
         if (s <= joint%lower + reach) touching(j) = -1
+        if (touching(j) /= 0) alone = .false.
       end associate
     end do
+    if (alone) return
+    phase = state%phase
+    where (touching /= 0) state%phase = touching
+    call project(machine, state, turning, speeds=.false.)
+    state%phase = phase
   end subroutine add_tied
 
   !> Contacts that are all but closed take part in the end of a chatter of several.
@@ -63,7 +84,7 @@ contains
     logical :: blurred(most_joints)
     integer :: j
     blurred = .false.
-    swing = maxval(abs(state%q(:machine%n))) + maxval(abs(state%v(:machine%n)))*machine%period
+    swing = swing_of(machine, state)
     do j = 1, size(machine%joints)
       if (slow(j) == 0) cycle
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
@@ -77,5 +98,12 @@ contains
     call project(machine, state, turning)
     where (blurred) state%phase = 0
   end subroutine close_gaps
+
+  !> How far places go [m].
+  pure real(wp) function swing_of(machine, state) result(swing)
+    type(jointed_t), intent(in) :: machine
+    type(jointed_state_t), intent(in) :: state
+    swing = maxval(abs(state%q(:machine%n))) + maxval(abs(state%v(:machine%n)))*machine%period
+  end function swing_of
 
 end module touching_contacts

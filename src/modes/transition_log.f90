@@ -32,6 +32,7 @@ contains
     type(jointed_state_t) :: struck
     complex(wp) :: turning(moving%harmonics)
     logical, dimension(size(moving%machine%joints)) :: told, stood, stands
+    real(wp) :: rest
     integer :: g, j, kind
     associate (machine => moving%machine)
       struck = after
@@ -68,11 +69,12 @@ contains
         if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0 .and. &
             machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
           kind = merge(event_chatter_upper, event_chatter_lower, after%phase(j) > 0)
+          rest = rest_of_chatter(moving, before, turning, j, after%phase(j))
+          ! In a row the impacts of others can take the rebound away.
+          if (.not. rest > 0 .and. count(machine%joints%kind == joint_contact) > 1) cycle
           ! Told of the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled first
           ! comes first.
-          call log_event(machine, kind, j, struck, struck, log, &
-                         at=min(before%time + rest_of_chatter(moving, before, turning, j, after%phase(j)), &
-                                next_action(machine, before)))
+          call log_event(machine, kind, j, struck, struck, log, at=min(before%time + rest, next_action(machine, before)))
         end if
       end do
       ! What an impact or a cascade does to other joints.

@@ -389,3 +389,68 @@ count = 3
         rf"^  1 to {found[1]}: .*, amplitude 0.07\d+ to 0.07\d+ m, .*come together by 0.99", out, re.M
     )
     assert "an attractor that was not found" not in out
+
+
+def cradle(masses, restitution, in_sequence, start):
+    """A row of balls of equal period that touch at rest: x0 of each."""
+    text = f"[body]\nin_sequence = {in_sequence}\n"
+    for i, mass in enumerate(masses):
+        text += f"[body.b{i}]\nmass = {mass}\n" + (f"x0 = {start[i]}\n" if i else "")
+        text += f'[spring.b{i}]\nbetween = ["b{i}"]\nstiffness = {9.81 * mass!r}\n'
+        if i:
+            text += f'[contact.c{i}]\nbetween = ["b{i - 1}", "b{i}"]\nlaw = "newton"\n'
+            text += f"restitution = {restitution}\nlower = 0\n"
+    return text + f"[start]\nx0 = {start[0]}\n[run]\nduration = 2.9\n"
+
+
+def pairwise(v, masses, restitution):
+    """Velocities after impacts of pairs, the fastest first."""
+    v = np.array(v, float)
+    while (speed := v[:-1] - v[1:]).max() > 1e-9:
+        i = int(speed.argmax())
+        impulse = (1 + restitution) * speed[i] / (1 / masses[i] + 1 / masses[i + 1])
+        v[i] -= impulse / masses[i]
+        v[i + 1] += impulse / masses[i + 1]
+    return v
+
+
+@pytest.mark.parametrize(
+    ("masses", "restitution", "start"),
+    [
+        ([1] * 5, 1.0, [-0.1, 0, 0, 0, 0]),
+        ([1] * 8, 1.0, [-0.1, -0.1, -0.1, 0, 0, 0, 0, 0]),
+        ([1] * 4, 0.9, [0, 0, 0, 0.2]),
+        ([1, 2, 0.7, 1.3], 0.9, [-0.1, 0, 0, 0.05]),
+        ([1] * 4, 0.9, [-0.3, -0.3, -0.3, 0]),
+    ],
+)
+def test_newtons_cradle(separatrix, tmp_path, masses, restitution, start):
+    """All come back at once, every half period after the first quarter; impacts of pairs in between."""
+    (tmp_path / "case.toml").write_text(cradle(masses, restitution, 1, start))
+    said = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
+    assert "note:" not in said
+    rate = np.sqrt(9.81)
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert file.attrs["reason"] == "time_over"
+        assert abs(file.attrs["energy_closing_error"]) < 1e-12
+        time = file["time"][:]
+        found = np.array([file[f"b{i}_v"][:] for i in range(len(masses))])
+        assert file["event_time"][0] == pytest.approx(np.pi / 2 / rate, abs=1e-9)
+    v = -np.array(start) * rate
+    for turn in range(3):
+        v = pairwise(v, masses, restitution)
+        at = np.searchsorted(time, (0.5 + turn) * np.pi / rate) + 5
+        if at >= len(time):
+            break
+        assert found[:, at] / np.cos(rate * time[at] - (0.5 + turn) * np.pi) == pytest.approx(v, abs=1e-8)
+        v = -v
+    assert turn == 2
+
+
+def test_a_row_of_bodies_that_touch_is_noted(separatrix, tmp_path):
+    """Where impacts of contacts that touch come at once, by a run and by its check; not of two balls."""
+    for balls, in_sequence, noted in ((4, 0, True), (4, 1, False), (2, 0, False)):
+        (tmp_path / "case.toml").write_text(cradle([1] * balls, 0.5, in_sequence, [-0.1] + [0] * (balls - 1)))
+        for words in (["--validate"], ["--force"]):
+            said = succeed(separatrix, "trajectory", "case.toml", *words, folder=tmp_path).out
+            assert ("note: bodies touch in a row (contact.c2, contact.c3)" in said) == noted
