@@ -10,7 +10,7 @@ import xarray as xr
 from separatrix.errors import GIVEN_UP, SeparatrixError
 from separatrix.variables import REASONS
 
-GIVEN_UP_REASONS = ("not_finite", "event_budget", "step_failed", "step_budget")
+GIVEN_UP_REASONS = ("not_finite", "event_budget", "step_failed", "step_budget", "mode_cycle")
 _CODES = [REASONS.index(name) for name in GIVEN_UP_REASONS]
 
 

@@ -51,7 +51,8 @@ contains
   !> Whether a motion that ended for this reason was given up. One that left its domain was not: that it leaves is known.
   pure elemental logical function is_given_up(code)
     integer, intent(in) :: code
-    is_given_up = any(code == [reason_not_finite, reason_event_budget, reason_step_failed, reason_step_budget])
+    is_given_up = any(code == [reason_not_finite, reason_event_budget, reason_step_failed, reason_step_budget, &
+                               reason_mode_cycle])
   end function is_given_up
 
 end module status

@@ -252,8 +252,7 @@ def test_24_bits_and_samples_at_full_scale(tmp_path):
     table = read_table(path)
     assert np.allclose(table.columns["x"], numbers / 2**23)
     assert any(
-        f"{np.sum(np.abs(numbers) >= 2**23 - 1)} samples of x are at full scale" in one
-        for one in table.notes
+        f"{np.sum(np.abs(numbers) >= 2**23 - 1)} samples of x are at full scale" in one for one in table.notes
     )
 
 

@@ -12,7 +12,9 @@ import separatrix as sx
 from program import run, succeed
 from separatrix import cli
 from separatrix.errors import GivenUpError
+from separatrix.given_up import GIVEN_UP_REASONS
 from separatrix.measuring import cli as measures
+from separatrix.variables import REASONS
 
 CASE = """\
 [body]
@@ -157,3 +159,8 @@ def test_the_table_of_exit_codes_is_that_of_the_code(source_dir: Path) -> None:
         if isinstance(line, ast.Assign) and isinstance(line.value, ast.Constant):
             names.add(line.value.value)
     assert listed == sorted(names)
+
+
+def test_a_reason_is_an_answer_or_was_given_up() -> None:
+    """A new reason has to be one of them in Python, too."""
+    assert set(REASONS) - set(GIVEN_UP_REASONS) == {"not_run", "settled", "time_over", "left_domain"}
