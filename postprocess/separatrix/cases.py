@@ -6,6 +6,7 @@ import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Self
 
@@ -194,6 +195,8 @@ class Case:
 
 def load(path: str | Path) -> Case:
     """Read a case file. CaseError names file, line, key, what was found and what is allowed."""
+    if not isinstance(path, str | PathLike):
+        raise CaseError(f"load: found {path!r}, allowed the name of a file", USAGE)
     path = Path(path).expanduser()
     try:
         text = path.read_text()
@@ -232,6 +235,8 @@ def toml(value: object) -> str:
         return str(int(value))
     if isinstance(value, float | np.floating):
         return repr(float(value))
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return toml(value.item())
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):

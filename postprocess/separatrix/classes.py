@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names and colours of the classes of a coded field: regimes, attractors, periods, event words."""
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,9 +12,12 @@ import xarray as xr
 from separatrix import style
 from separatrix.labels import flag_text, unit
 from separatrix.open import decode_word, flag_names, table
+from separatrix.variables import attributes, position_is_angle
 
 CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
 _MOST = len(style.TOL_MUTED)
+# of the largest value, below which another is 0 to rounding
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -126,7 +130,7 @@ def _attractor_text(result: xr.Dataset, identity: int) -> str:
         if mine.strip(".") and mine not in words.values():
             apart = f", {mine}"
         else:
-            apart = _size_text(catalogue, ids, identity, alike)
+            apart = _size_text(result, catalogue, ids, identity, alike)
     return f"attractor {identity}: {texts[identity]}{apart}"
 
 
@@ -148,15 +152,34 @@ def _catalogue_word(catalogue: xr.Dataset, mine: np.ndarray) -> str:
     return decode_word(int(words[0])) if len(words) == 1 else ""
 
 
-def _size_text(catalogue: xr.Dataset, ids: np.ndarray, identity: int, alike: list[int]) -> str:
+def _size_text(
+    result: xr.Dataset, catalogue: xr.Dataset, ids: np.ndarray, identity: int, alike: list[int]
+) -> str:
     """Return ', amplitude 0.0155 m', or ', x = 1 m' where amplitudes agree, as those of rests do."""
     for name, sign in (("amplitude", ""), ("x", "= ")):
         if name not in catalogue:
             continue
-        texts = {one: _range_text(catalogue[name], ids == one) for one in (identity, *alike)}
+        values = catalogue[name].copy(data=_rounded(catalogue[name].values))
+        values.attrs["units"] = _unit_of_motion(result, unit(values))
+        texts = {one: _range_text(values, ids == one) for one in (identity, *alike)}
         if texts[identity] not in [texts[one] for one in alike]:
             return f", {name} {sign}{texts[identity]}"
     return ""
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Values with 0 for what is nothing beside the largest."""
+    size = np.abs(values)
+    return np.where(size < _NOTHING * np.max(size, initial=0.0), 0.0, values)
+
+
+def _unit_of_motion(result: xr.Dataset, si: str) -> str:
+    """Return the unit of a position, which may be an angle."""
+    try:
+        case = tomllib.loads(result.attrs.get("resolved_case", ""))
+    except tomllib.TOMLDecodeError:
+        return si
+    return str(attributes((si, "", {}), position_is_angle(case))["units"])
 
 
 def _range_text(values: xr.DataArray, mine: np.ndarray) -> str:

@@ -4,6 +4,7 @@
 
 import re
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,15 @@ import numpy as np
 import xarray as xr
 
 from separatrix.cases import Case, as_case, linspace, quantity
-from separatrix.errors import GIVEN_UP, USAGE, CaseError, GivenUpError, Interrupted, SeparatrixError
+from separatrix.errors import (
+    GIVEN_UP,
+    USAGE,
+    CaseError,
+    GivenUpError,
+    Interrupted,
+    SeparatrixError,
+    SeparatrixWarning,
+)
 from separatrix.labelling import Labelling, SecondLookError, axis_values, can_label
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
@@ -36,6 +45,9 @@ _FEW_POINTS = 50_000
 # What is computed without a file of its own is kept in memory.
 _MOST_IN_MEMORY = 50_000_000
 _STARTS = ("x0", "v0", "crank_angle")
+# columns of a table of starts, and other names of the ratio
+_COLUMNS = ("x0", "v0", "ratio")
+_RATIO = {"drive.ratio": "ratio", "drive_ratio": "ratio", "drive__ratio": "ratio"}
 
 
 @dataclass
@@ -389,15 +401,16 @@ def _workers(workers: int | None, ranks: int | None, number: int, name: str = "w
 def _starts(case: Case, starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarray]:
     """Return the columns of a table of starts, equally long."""
     if starts is None:
-        given = dict(columns)
+        given = {_RATIO.get(name, name): values for name, values in columns.items()}
     elif hasattr(starts, "keys"):
         # a table may have further columns, a mapping is written for this
         further = hasattr(starts, "to_dict")
-        given = {
-            str(key): starts[key]
-            for key in starts.keys()  # noqa: SIM118
-            if not further or str(key) in ("x0", "v0", "ratio")
-        }
+        named = [(_RATIO.get(str(key), str(key)), key) for key in starts.keys()]  # noqa: SIM118
+        if [name for name, _ in named].count("ratio") > 1:
+            raise SeparatrixError("starts: found two columns of the drive ratio, allowed one", USAGE)
+        given = {name: starts[key] for name, key in named if not further or name in _COLUMNS}
+        if further:
+            _warn_of_unused(case, starts, [str(key) for name, key in named if name not in _COLUMNS])
     else:
         array = np.asarray(starts)
         if array.dtype.kind not in "iuf":
@@ -405,17 +418,34 @@ def _starts(case: Case, starts: object, columns: Mapping[str, object]) -> dict[s
         if array.ndim != 2 or array.shape[1] not in (2, 3):
             raise SeparatrixError(f"starts: found shape {array.shape}, allowed (n, 2) or (n, 3)", USAGE)
         given = dict(zip(("x0", "v0", "ratio"), array.T, strict=False))
-    unknown = set(given) - {"x0", "v0", "ratio"}
+    unknown = set(given) - set(_COLUMNS)
     if unknown or not {"x0", "v0"} <= set(given):
         raise SeparatrixError(
             f"starts: found the columns {', '.join(given) or 'none'}, allowed x0, v0 and optionally ratio",
             USAGE,
         )
     columns = {name: np.atleast_1d(_column(case, name, value)) for name, value in given.items()}
-    arrays = np.broadcast_arrays(*columns.values())
+    try:
+        arrays = np.broadcast_arrays(*columns.values())
+    except ValueError:
+        sizes = ", ".join(f"{name} {column.size}" for name, column in columns.items())
+        raise SeparatrixError(f"starts: found {sizes} values, allowed equally many", USAGE) from None
     if arrays[0].ndim != 1:
         raise SeparatrixError(f"starts: found columns of shape {arrays[0].shape}, allowed lists", USAGE)
     return dict(zip(given, arrays, strict=True))
+
+
+def _warn_of_unused(case: Case, starts: object, names: list[str]) -> None:
+    """Warn of columns that are not used: all of a table, of a Dataset those that are a parameter."""
+    if isinstance(starts, xr.Dataset):
+        parameters = {path.replace(".", "_") for path in case.parameters}
+        names = [name for name in names if name.replace(".", "_") in parameters]
+    if names:
+        warnings.warn(
+            f"starts: the columns {', '.join(names)} are not used; used are x0, v0 and ratio",
+            SeparatrixWarning,
+            stacklevel=4,
+        )
 
 
 def _column(case: Case, name: str, values: object) -> np.ndarray:

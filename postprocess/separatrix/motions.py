@@ -65,7 +65,7 @@ def trajectory(
         duration = case.with_({"run.window": duration}).in_si("run.duration", duration)
     if duration is not None and not 0 < number("duration", duration) < np.inf:
         raise SeparatrixError(f"duration: found {duration}, allowed more than 0", USAGE)
-    if samples is not None and samples < 2:
+    if samples is not None and not number("samples", samples) >= 2:
         raise SeparatrixError(f"samples: found {samples}, allowed 2 or more", USAGE)
     start = case.start(x0=x0, v0=v0, crank_angle=crank_angle)
     given_up = None

@@ -116,3 +116,24 @@ def test_a_missing_package_is_named(tmp_path, monkeypatch):
         SeparatrixError, match=r"needs the package pyuff: pip install 'separatrix\[formats\]'"
     ):
         read_record(tmp_path / "a.uff")
+
+
+def test_columns_of_hdf5_are_those_of_other_files(tmp_path):
+    """F is the force, complex numbers are none, and times count from a date in any unit."""
+    path = tmp_path / "a.h5"
+
+    def written(**columns) -> Path:
+        with h5py.File(path, "w") as file:
+            for name, column in columns.items():
+                file[name] = column
+            file["t"].attrs["units"] = "nanoseconds since 2024-01-01 00:00:00"
+        return path
+
+    nanoseconds = (1e9 * T).astype("i8")
+    record = read_record(written(t=nanoseconds, x=X, F=2 * X))
+    assert np.allclose(record.t, T, atol=1e-9)
+    assert np.allclose(record.force, 2 * X)
+    with pytest.raises(SeparatrixError, match="a.h5: 'F' and 'force' are the same column"):
+        read_record(written(t=nanoseconds, x=X, F=X, force=X))
+    with pytest.raises(SeparatrixError, match="a.h5: 'x' is no list of numbers .*complex"):
+        read_record(written(t=nanoseconds, x=X + 1j))

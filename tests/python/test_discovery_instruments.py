@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files as instruments write them: units, clocks, bursts and channels that are no column."""
 
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -317,6 +318,46 @@ def test_files_that_are_cut_off_are_told(tmp_path):
     keys(tmp_path / "cut.wav", "units: t s, x 2.5 mm")
     with pytest.raises(SeparatrixError, match=r"cut\.wav: .*(cut|damaged|WAV)"):
         read_record(tmp_path / "cut.wav")
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+def test_a_function_has_as_many_values_as_its_header_states(tmp_path, binary):
+    whole = uff(tmp_path / "a.uff", function(ord_data_type=4)).read_bytes()
+    if binary:
+        lines = whole.splitlines(keepends=True)[:13]
+        lines[1] = b"    58b     1     2          11%12d     0     0           0           0\n" % (8 * X.size)
+        whole = b"".join([*lines, X.tobytes(), b"    -1\n"])
+        (tmp_path / "a.uff").write_bytes(whole)
+    assert read_record(tmp_path / "a.uff").t.size == X.size
+    middle = len(whole) // 2
+    begin = middle if binary else whole.index(b"\n", middle) + 1
+    end = begin + 80 if binary else whole.index(b"\n", begin) + 1
+    (tmp_path / "lost.uff").write_bytes(whole[:begin] + whole[end:])
+    with pytest.raises(SeparatrixError, match=rf"lost.uff: 'x' has \d+ values, expected {X.size} as its"):
+        read_record(tmp_path / "lost.uff")
+
+
+def test_a_data_set_without_an_end_is_refused(tmp_path):
+    whole = uff(tmp_path / "a.uff", function(), function(3 + T, ordinate_spec_data_type=13)).read_bytes()
+    mark = next(re.finditer(rb" {4}-1[^\n]*\n(?= {4}-1)", whole))
+    (tmp_path / "odd.uff").write_bytes(whole[: mark.start()] + whole[mark.end() :])
+    with pytest.raises(SeparatrixError, match="odd.uff: found 3 lines '-1', allowed an even number"):
+        read_record(tmp_path / "odd.uff")
+    two = whole[mark.end() :].split(b"\n", 1)[1]
+    (tmp_path / "two.uff").write_bytes(whole[: mark.end()] + two.removesuffix(b"\n") + b"\n    -1\n")
+    with pytest.raises(SeparatrixError, match="two.uff:.*found lines between two data sets"):
+        read_record(tmp_path / "two.uff")
+
+
+def test_a_measurement_shorter_than_its_header_states_is_refused(tmp_path):
+    path = lvm(tmp_path / "a.lvm", "One")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines, "1.500000\t1\t2\n"]))
+    # with one header for several writings there are more
+    assert read_record(path).t.size == 301
+    path.write_text("".join(lines[:-100]))
+    with pytest.raises(SeparatrixError, match="a.lvm: 'x' has 200 samples, expected 300 as the header"):
+        read_record(path)
 
 
 def test_damaged_files_of_any_kind_are_refused_or_read(tmp_path):

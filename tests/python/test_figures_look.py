@@ -251,6 +251,11 @@ def test_attractors_of_one_class_are_told_apart(library: Path) -> None:
         changed = plain.assign({f"catalogue_{name}": entry for name, entry in catalogue.items()})
         texts = [entry.text for entry in classes(changed, "attractor", dict.fromkeys((1, 2, 3), 1))]
         assert texts == [f"attractor {number}: {text}" for number, text in enumerate(expected, 1)]
+    # of an angle, and what is 0 to rounding
+    changed["catalogue_x"] = ("entry", np.array([-1e-16, 3.0, 1.0]), {"units": "m"})
+    changed.attrs["resolved_case"] = '[restoring]\nlaw = "pendulum"\n'
+    texts = [entry.text for entry in classes(changed, "attractor", dict.fromkeys((1, 2, 3), 1))]
+    assert [text.partition(", x ")[2] for text in texts] == ["= 0 rad", "= 3 rad", ""]
 
 
 def longest(ax: Axes) -> Line2D:

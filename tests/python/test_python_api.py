@@ -104,6 +104,39 @@ def test_points_are_those_of_the_program(results: dict[str, Path], case: sx.Case
             sx.points(case, wrong)
 
 
+def test_columns_of_a_table_of_starts_count_or_are_named(case: sx.Case) -> None:
+    class Table(dict):
+        """What a DataFrame is to `points`."""
+
+        to_dict = dict.copy
+
+    starts = {"x0": [0.1, 0.2], "v0": [0.0, 1.0]}
+    for name in ("drive.ratio", "drive_ratio", "ratio"):
+        assert sx.points(case, Table(starts | {name: [0.5, 0.55]}))["ratio"].values.tolist() == [0.5, 0.55]
+    with pytest.raises(sx.SeparatrixError, match="found two columns of the drive ratio"):
+        sx.points(case, Table(starts | {"ratio": [1, 1], "drive.ratio": [1, 1]}))
+    with pytest.warns(sx.SeparatrixWarning, match="the columns crank_angle, note are not used"):
+        sx.points(case, Table(starts | {"crank_angle": [0.0, 1.0], "note": ["a", "b"]}))
+
+
+def test_wrong_arguments_are_refused_in_one_line(case: sx.Case, results: dict[str, Path]) -> None:
+    wrong = (
+        (lambda: sx.load(None), "load: found None"),
+        (
+            lambda: sx.points(case, x0=[1.0, 2.0], v0=[1.0, 2.0, 3.0]),
+            "found x0 2, v0 3 values, allowed equally",
+        ),
+        (lambda: sx.trajectory(case, samples="x"), "samples: found 'x', allowed a number"),
+        (lambda: sx.open_result(results["points"]).separatrix.plot(units=None), "units: found None"),
+    )
+    for call, said in wrong:
+        with pytest.raises(sx.SeparatrixError, match=said) as caught:
+            call()
+        assert "\n" not in str(caught.value)
+    assert case.with_({"drive.ratio": np.array(1.3)}).resolved["drive"]["ratio"] == 1.3
+    assert sx.open_result(results["points"]).separatrix.plot(units="mm").separatrix_caption
+
+
 @pytest.mark.parametrize(
     "name",
     ["trajectory_coulomb_1.05", "pair_backlash", "contact_hunt_crossley", "pair_platform", "whole periods"],

@@ -130,6 +130,47 @@ def test_harwell_boeing_of_solvers(tmp_path):
         _refused(read_harwell_boeing, path, said)
     path.write_text("\n".join(lines[:-1]))
     _refused(read_harwell_boeing, path, "found the end of the file")
+    path.write_text("\n".join(lines)[:-1] + "\n")
+    _refused(read_harwell_boeing, path, "characters of the line, allowed")
+    # SciPy writes narrower columns
+    io.hb_write(tmp_path / "k.hb", sparse.csc_matrix(STIFFNESS))
+    text = (tmp_path / "k.hb").read_text().rstrip("\n")
+    for end, cut in (("\n", 1), ("", 3)):
+        path.write_text(text[:-cut] + end)
+        _refused(read_harwell_boeing, path, "cut off")
+
+
+def test_a_last_number_that_is_cut_off_is_refused(tmp_path):
+    """Where the last line has no end and all numbers before have one length."""
+    path = tmp_path / "k.mtx"
+    rows = [f"{node},1, {node},1, {value:.15e}" for node, value in ((1, 2.0), (2, -3.0), (3, 2.0), (4, 5.0))]
+    path.write_text("\n".join(rows))
+    assert read_matrices({"mass": path, "stiffness": path}).mass.diagonal().tolist() == [2, -3, 2, 5]
+    for cut in (1, 4, 10):
+        path.write_text("\n".join(rows)[:-cut])
+        with pytest.raises(SeparatrixError, match=r"k.mtx:4: found '4,1, 4,1, .*"):
+            read_matrices({"mass": path, "stiffness": path})
+    path.write_text("1,1, 1,1, 1000.0\n2,1, 2,1, 20.0\n3,1, 3,1, 5.0")
+    assert read_matrices({"mass": path, "stiffness": path}).size == 3
+
+
+def test_coordinates_without_mass_are_named(tmp_path, capsys):
+    for name, nodes in (("m", (1, 2)), ("k", (1, 2, 3))):
+        (tmp_path / f"{name}.mtx").write_text("".join(f"{node},1, {node},1, 2.0\n" for node in nodes))
+    words = ["--mass", f"{tmp_path}/m.mtx", "--stiffness", f"{tmp_path}/k.mtx", "--point", "tip=1:1"]
+    assert main([*words, "-o", str(tmp_path / "o.h5")]) == 0
+    assert "note: 1 of 3 coordinates without mass: 3:1" in capsys.readouterr().out
+
+
+def test_modes_without_an_end_are_refused(tmp_path):
+    whole = _modes(tmp_path / "a.unv", (1, 1.0, 1.0)).read_bytes()
+    first = whole.index(b"    -1", 1)
+    for cut, said in (
+        (whole[: len(whole) - 30], "has no end"),
+        (whole[:first] + whole[whole.index(b"    -1", first + 1) :], "allowed an even number"),
+    ):
+        (tmp_path / "cut.unv").write_bytes(cut)
+        _refused(read_modes, tmp_path / "cut.unv", said)
 
 
 def _mat73(path, content):

@@ -138,7 +138,9 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     ax.set_ylabel(name)
     counts = []
     if "branch" in result:
-        counts.append(f"{int(result['branch'].max())} branches from {int(result.attrs['seeds'])} seeds")
+        number, seeds = int(result["branch"].max()), int(result.attrs["seeds"])
+        several = "branch" if number == 1 else "branches", "seed" if seeds == 1 else "seeds"
+        counts.append(f"{number} {several[0]} from {seeds} {several[1]}")
     if "equilibrium_branch" in result:
         counts.append(f"{int(result['equilibrium_branch'].max())} of equilibria")
     if not counts:

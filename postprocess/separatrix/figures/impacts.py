@@ -49,7 +49,7 @@ def section(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure | No
             handles.append(Line2D([], [], linestyle="", marker="o", ms=3, color=colour, label=label))
     ax.set(xlim=(0, 360), xticks=range(0, 361, 60), xlabel="phase of the drive (deg)")
     ax.set_ylabel(f"speed of impact ({unit(result['v'])})")
-    ax.set_ylim(bottom=0)
+    ax.set_ylim(0, 1.05 * speed[settled].max() or 1.0)
     pieces = caption_pieces(result, look, describe_case(result))
     pieces += [f"{count_text(int(settled.sum()))} impacts in the second half of the run"]
     compose(figure, title, shown([*pieces, plain(version_text(result))], look), handles)

@@ -33,7 +33,7 @@ class Look:
     #: which axis is horizontal and which vertical
     axes: tuple[str, str] | None = None
     #: units in the place of the SI units, each for all that has its SI unit
-    units: Sequence[str] = ()
+    units: str | Sequence[str] = ()
     #: the settling time as lightness under the colours of a map
     shade: bool = False
     #: the points of the attractors on the section, in a map over x0 and v0
@@ -50,6 +50,11 @@ class Look:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn."""
+        if isinstance(self.units, str):
+            object.__setattr__(self, "units", [self.units])
+        for name in ("units", "colours"):
+            if not isinstance(getattr(self, name), Sequence):
+                raise SeparatrixError(f"{name}: found {getattr(self, name)!r}, allowed a list", USAGE)
         for unit in self.units:
             if unit not in UNITS:
                 raise SeparatrixError(f"units: found '{unit}', allowed {', '.join(UNITS)}", USAGE)

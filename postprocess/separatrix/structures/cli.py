@@ -29,6 +29,8 @@ from separatrix.version import __version__
 
 # Most coordinates of a machine.
 _MOST = 16
+# labels in a message
+_MOST_NAMES = 6
 _UNIVERSAL = (".uff", ".unv", ".u55")
 
 
@@ -137,6 +139,11 @@ def _report(full: Matrices | Modes, reduced: Matrices | Modes, options: argparse
         "frequencies [Hz]: " + ", ".join(f"{value:.6g}" for value in frequency),
     ]
     if isinstance(full, Matrices):
+        without = np.flatnonzero(abs(full.mass).sum(axis=1) == 0)
+        if without.size:
+            names = ", ".join(full.labels[place] for place in without[:_MOST_NAMES])
+            more = ", ..." if without.size > _MOST_NAMES else ""
+            lines.append(f"note: {without.size} of {full.size} coordinates without mass: {names}{more}")
         for check in checks(full, reduced):
             if np.isnan(check.full):
                 continue

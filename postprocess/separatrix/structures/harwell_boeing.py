@@ -116,7 +116,29 @@ def _take(
                 f"allowed {here} numbers in the format {form.text}"
             )
         values += found
+    if not form.whole:
+        _check_last(
+            path, [line.decode(errors="replace") for line in lines[at : at + needed]], at + needed, form
+        )
     return np.array(values), at + needed
+
+
+def _check_last(path: Path, lines: list[str], number: int, form: _Format) -> None:
+    """Refuse a last field that is shorter than all others: its number is cut off."""
+    ends = [
+        (place, field.end()) for line in lines for place, field in enumerate(re.finditer(r"\S+", line), 1)
+    ]
+    *others, (place, end) = ends
+    widths = {end / place for place, end in others} or {end}
+    if len(lines) > 1 and all(len(line) == form.count * form.width for line in lines[:-1]):
+        # there may be no blanks between the columns
+        widths, end = {form.width}, len(lines[-1])
+        place = -(-end // form.width)
+    if len(widths) == 1 and end < place * min(widths):
+        raise SeparatrixError(
+            f"{path}:{number}: found the last number in {end} characters of the line, allowed "
+            f"{place * min(widths):g} as of the others: cut off"
+        )
 
 
 def _number(field: str, form: _Format) -> float | None:

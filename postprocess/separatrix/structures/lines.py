@@ -21,6 +21,8 @@ HOW = "finite, with a decimal point: 2.75, 2.5e3, 2.5D+03"
 _EXPONENT = bytes.maketrans(b"dD", b"ee")
 # Most coordinates that a file may claim; a matrix of so many fills no memory by its zeros.
 _MOST = 10_000_000
+# lines at the end of a file that are looked at, and how many numbers of one length make a fixed format
+_LAST_LINES, _LAST_BYTES, _ALIKE = 4, 10_000, 3
 _MARK = b"\xef\xbb\xbf"
 
 
@@ -29,7 +31,26 @@ def text_of(path: Path) -> bytes:
     text = path.read_bytes().removeprefix(_MARK)
     if b"\0" in text:
         raise SeparatrixError(f"{path}: found a binary file, allowed a text")
-    return text if text.endswith(b"\n") else text + b"\n"
+    if text.endswith(b"\n"):
+        return text
+    _check_last(path, text)
+    return text + b"\n"
+
+
+def _check_last(path: Path, text: bytes) -> None:
+    """Refuse a last line without an end whose number is shorter than those before, all of one length."""
+    lines = text[-_LAST_BYTES:].split(b"\n")[-_LAST_LINES:]
+    words = [re.split(rb"[\s,]+", line.strip())[-1].lstrip(b"+-") for line in lines]
+    *others, last = words
+    others = others[-_ALIKE:]
+    fixed = len(others) == _ALIKE and len({len(word) for word in others}) == 1
+    fixed = fixed and all(re.fullmatch(rb"\d*\.\d*[eEdD][+-]?\d+", word) for word in others)
+    if fixed and last and len(last) < len(others[0]):
+        place = text.count(b"\n") + 1
+        raise SeparatrixError(
+            f"{path}:{place}: found {shown(lines[-1])} without an end of the line, its last "
+            "number shorter than those before: cut off? Where it is whole, end the line"
+        )
 
 
 def number(text: str) -> float | None:

@@ -11,6 +11,7 @@ from separatrix.errors import NO_INPUT, SeparatrixError
 from separatrix.extras import library
 from separatrix.structures.content import Modes
 from separatrix.trial import read_apart
+from separatrix.universal_files import check_whole
 
 _MODES, _UNITS = 55, 164
 # Numbers of units of length and force in one metre and one newton, by the units codes of data set 164.
@@ -42,6 +43,7 @@ def read_modes(path: str | Path) -> Modes:
     pyuff = library("pyuff", path, "formats")
 
     def read() -> Modes:
+        check_whole(path)
         file = pyuff.UFF(str(path))
         kinds = np.asarray(file.get_set_types())
         return _modes(

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.discovery.measured.tables import Table, check_length, has_motion, is_column
+from separatrix.discovery.measured.tables import SAME, Table, check_length, has_motion, is_column
 from separatrix.errors import SeparatrixError
 
 _UNIT = ("units", "unit")
@@ -21,10 +21,16 @@ def read_hdf5(path: Path) -> Table:
         header = {key: _text(value) for key, value in file.attrs.items()}
         if isinstance(file.get("t"), h5py.Dataset):
             check_length(path, file["t"].size)
-        used = [name for name in file if is_column(name) and isinstance(file[name], h5py.Dataset)]
-        columns = {name: _values(file[name]) for name in used}
-        units = {name: unit for name in used if (unit := _unit(path, name, file[name]))}
-        unused = sorted(set(file) - columns.keys())
+        used = [name for name in file if is_column(SAME.get(name, name))]
+        used = [name for name in used if isinstance(file[name], h5py.Dataset)]
+        for name in used:
+            if SAME.get(name, name) != name and SAME[name] in used:
+                raise SeparatrixError(
+                    f"{path}: '{name}' and '{SAME[name]}' are the same column, expected one"
+                )
+        columns = {SAME.get(name, name): _values(path, name, file[name]) for name in used}
+        units = {SAME.get(name, name): unit for name in used if (unit := _unit(path, name, file[name]))}
+        unused = sorted(set(file) - set(used))
     missing = [] if "t" in columns else ["t"]
     missing += [] if has_motion(columns) else ["x"]
     if missing:
@@ -41,9 +47,11 @@ def _unit(path: Path, name: str, dataset: h5py.Dataset) -> str:
     return stated[0] if stated else ""
 
 
-def _values(dataset: h5py.Dataset) -> np.ndarray:
+def _values(path: Path, name: str, dataset: h5py.Dataset) -> np.ndarray:
     """Numbers of a dataset, unpacked; those that are missing are no numbers."""
     raw = np.asarray(dataset[()])
+    if raw.dtype.kind not in "fiu":
+        raise SeparatrixError(f"{path}: '{name}' is no list of numbers (it has the type {raw.dtype})")
     values = raw.astype(float)
     for key in _FILL:
         if key in dataset.attrs:

@@ -22,7 +22,7 @@ from separatrix.discovery.measured.tables import (
 from separatrix.errors import SeparatrixError
 
 _TURN = 2 * np.pi
-_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048}
 _ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180, "turn": _TURN}
 _FORCE = {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": 9.80665, "lbf": 4.4482216152605, "N m": 1.0}
@@ -59,6 +59,10 @@ _SAME |= {
     "newton": "N",
     "newtons": "N",
     "kilonewtons": "kN",
+    "milliseconds": "ms",
+    "microseconds": "us",
+    "nanoseconds": "ns",
+    "minutes": "min",
     "micrometres": "um",
     "micrometers": "um",
     "radian": "rad",
@@ -68,7 +72,9 @@ _SAME |= {
 _UNSTATED = ("", "none", "n/a", "na", "-", "unknown", "not applicable")
 _EXAMPLES = {"units": "units: s, mm", "phase": "phase: 0.35, or phase: 20 deg at t = 0 s"}
 _AT = re.compile(r"\s*(?:at|@)\s*t\s*=\s*(.*)")
-_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\w*)\s*(.*)", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)\b)\s*(.*)", re.IGNORECASE
+)
 # longest symbol of a unit; longer ones are words
 _SYMBOL = 3
 # characters of a unit in a message

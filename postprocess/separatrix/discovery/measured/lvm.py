@@ -108,6 +108,12 @@ def _channels(
         if dimension != "Time":
             raise SeparatrixError(f"{path}: '{name}' is recorded over '{dimension}', expected over Time")
         values, kept = _numbers(path, rows, at, decimal)
+        stated = _of(own, "Samples", k, "")
+        # with one header for several writings, it states those of the first one
+        if stated.isdecimal() and values.size < int(stated):
+            raise SeparatrixError(
+                f"{path}: '{name}' has {values.size} samples, expected {stated} as the header states: cut off"
+            )
         found.values[name] = values
         unit = _of(own, "Y_Unit_Label", k, "")
         found.units |= {name: unit} if is_stated(unit) else {}

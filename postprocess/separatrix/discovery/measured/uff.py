@@ -12,14 +12,13 @@ from separatrix.discovery.measured.header import is_stated, same_unit
 from separatrix.discovery.measured.tables import is_column, kind_of
 from separatrix.errors import SeparatrixError
 from separatrix.extras import library
+from separatrix.universal_files import check_whole
 
 # specific data types of UFF 58 (displacement, velocity, force) and the columns that they are
 _OF_TYPE = {8: "x", 11: "v", 9: "force", 13: "force"}
 # types of function and abscissa of a time record: time response over time or what is not said; what is not
 # said over time
 _OVER_TIME = {(1, 17), (1, 0), (0, 17)}
-# of a data set
-_END = b"-1"
 _ROTATIONS = (4, 5, 6)
 # digits of the times of an uneven function in text; of a step, what one more digit would show
 _DIGITS, _COARSE = 6, 0.1
@@ -27,10 +26,7 @@ _DIGITS, _COARSE = 6, 0.1
 
 def read_uff(path: Path, names: Mapping[str, str]) -> Found:
     """Functions over time; displacement is x, velocity v, force force, or as `id1` says."""
-    # behind binary data there is no new line
-    if not path.read_bytes().rstrip().endswith(_END):
-        # pyuff leaves out what has no end
-        raise SeparatrixError(f"{path}: is cut off: its last data set has no end")
+    check_whole(path)
     sets = library("pyuff", path, "formats").UFF(str(path)).read_sets()
     sets = [sets] if isinstance(sets, dict) else sets
     found, times, others = Found(), {}, 0
@@ -52,7 +48,7 @@ def read_uff(path: Path, names: Mapping[str, str]) -> Found:
             continue
         if name in found.values:
             raise SeparatrixError(f"{path}: two functions are '{name}': say which in their first line (id1)")
-        found.values[name] = np.asarray(one["data"])
+        found.values[name] = _values(path, name, one)
         times[name] = np.asarray(one["x"], float)
         unit = _unit(name, one, factors)
         found.units |= {name: unit} if unit else {}
@@ -68,6 +64,17 @@ def read_uff(path: Path, names: Mapping[str, str]) -> Found:
             # by the standard, but it is not stated
             found.units.setdefault("t", "s")
     return found
+
+
+def _values(path: Path, name: str, one: dict) -> np.ndarray:
+    """The values of a function, as many as its header states."""
+    values, stated = np.asarray(one["data"]), int(one["num_pts"])
+    if values.size != stated:
+        raise SeparatrixError(
+            f"{path}: '{name}' has {values.size} values, expected {stated} as its header states: damaged or "
+            "cut off"
+        )
+    return values
 
 
 def _factors(path: Path, sets: list[dict]) -> tuple[float, float] | None:
