@@ -438,7 +438,7 @@ def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
 
 
 def test_a_sweep_without_a_contact_speaks_of_no_impacts_only(separatrix, tmp_path):
-    """Without impacts is not `non_impact`: on a belt the motion also sticks, as the regimes in the file say."""
+    """Without impacts is not `non_impact`: on a belt the body also sticks, as the regimes say."""
     case = """
         body.m = {mass = 2}
         spring.k = {between = ["m"], stiffness = 50, damping = 0.2}
