@@ -27,7 +27,7 @@ module sweep_chain
   !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
   !> not a number there.
   integer, parameter :: hold_numbers = 11, hold_codes = 4
-  integer, parameter, public :: hold_reason = 2
+  integer, parameter, public :: hold_reason = 2, hold_impacts = 5
   !> Numbers kept of each limit.
   integer, parameter :: limit_numbers = 7
 

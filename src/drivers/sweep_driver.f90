@@ -290,13 +290,14 @@ contains
     end associate
   end subroutine note_branch_point
 
-  !> Ranges of the parameter where starts lead to motions with impacts, without, and both.
+  !> Ranges of the parameter where starts lead to motions with impacts, without, and both. The file has the regimes.
   subroutine report_multiple(session, work)
     type(session_t), intent(inout) :: session
     type(branch_work_t), intent(in) :: work
     integer :: i, first
     integer :: kind(size(work%free) + 1)
-    character(len=*), parameter :: names(3) = [character(len=19) :: 'non-impact', 'impact', 'multiple solutions']
+    character(len=*), parameter :: names(3) = [character(len=24) :: 'without impacts', 'with impacts', &
+      'with and without impacts']
     kind = 0
     do i = 1, size(work%free)
       if (work%free(i) > 0) kind(i) = 1

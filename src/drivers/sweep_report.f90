@@ -16,7 +16,7 @@ module sweep_report
   use restoring_law, only: position_is_angle
   use session, only: session_t
   use status, only: reason_names, reason_time_over
-  use sweep_chain, only: chains_t, hold_reason, limit_t
+  use sweep_chain, only: chains_t, hold_impacts, hold_reason, limit_t
   use sweep_limits, only: limit_beyond_range, limit_bracketed, limit_outcomes
   use text, only: interval_text, join, replace_all, to_text
   implicit none
@@ -201,6 +201,8 @@ contains
       call session%journal%line('limit', '  no limit seen between the values that were not given up')
     else if (is_pair(session%the_case%laws)) then
       call session%journal%line('limit', '  one regime throughout')
+    else if (.not. any(chains%holds(hold_impacts, :, :) > 0)) then
+      call session%journal%line('limit', '  no impacts throughout')
     else
       call session%journal%line('limit', '  impacts neither start nor stop')
     end if

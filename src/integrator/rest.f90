@@ -22,7 +22,10 @@ module rest
   !> Relative change of the acceleration over what is left of a chatter sequence at which it is
   !> completed analytically.
   real(wp), parameter :: chatter_uniformity = 1e-6_wp
-  !> The same where a bounce no longer rises above the rounding of the position, so that it cannot be flown.
+  !> Longest rest of a chatter sequence that is completed, in periods: as for structures, and under a force that no spring
+  !> makes. Such a force is as uniform over a bounce of any height.
+  real(wp), parameter :: longest_rest = 1e-2_wp, longest_rest_under_load = 1e-6_wp
+  !> The uniformity where a bounce no longer rises above the rounding of the position, so that it cannot be flown.
   real(wp), parameter :: unflown_uniformity = 0.5_wp
   !> A bounce that takes less than this share of a period ends a chatter sequence whose restitution still changes.
   real(wp), parameter :: briefest_bounce = 1e-12_wp
@@ -172,8 +175,8 @@ contains
   end function holding_step
 
   !> Time [s] until impacts on the barrier in `direction` +1 (upper) or -1 have died out, the body having
-  !> just left it at `speed` [m/s]; -1 if they do not, or if the acceleration is not yet uniform over
-  !> what is left. One bounce with constant friction: out at a_out = (R + F)/m, back at a_in = (R - F)/m,
+  !> just left it at `speed` [m/s]; -1 if they do not, or if what is left is not yet brief, with a uniform
+  !> acceleration. One bounce with constant friction: out at a_out = (R + F)/m, back at a_in = (R - F)/m,
   !> the speed shrinks by k sqrt(a_in/a_out), so the times form a geometric series.
   pure real(wp) function chatter_time(machine, state, direction, speed) result(left)
     type(oscillator_t), intent(in) :: machine
@@ -206,11 +209,21 @@ contains
                 + machine%restoring%stiffness*speed**2/(2*out))/machine%mass &
                + layer_change(law, speed)/machine%mass
       if (effects%nonlinear) change = change + effect_change(machine, state, speed, speed**2/(2*out))/machine%mass
-      if (change > merge(unflown_uniformity, chatter_uniformity, speed**2/(2*out) < position_rounding(machine, state%x))*back) then
+      if (speed**2/(2*out) < position_rounding(machine, state%x)) then
+        if (change > unflown_uniformity*back) left = -1
+      else if (change > chatter_uniformity*back .or. left > longest_completion(machine)) then
         left = -1
       end if
     end associate
   end function chatter_time
+
+  !> Longest rest of a chatter sequence [s] that is completed.
+  pure real(wp) function longest_completion(machine) result(longest)
+    type(oscillator_t), intent(in) :: machine
+    logical :: loaded
+    loaded = abs(machine%effects%offset) > 0 .or. .not. machine%natural_frequency > 0
+    longest = merge(longest_rest_under_load, longest_rest, loaded)*machine%period
+  end function longest_completion
 
   !> What rounding does to a position [m] that is the sum of an equilibrium and a response.
   pure real(wp) function position_rounding(machine, x) result(rounding)

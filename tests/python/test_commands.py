@@ -437,6 +437,25 @@ def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
     assert sum(map(int, re.findall(r"ended as \w+: (\d+) points", plain))) == 42
 
 
+def test_a_sweep_without_a_contact_speaks_of_no_impacts_only(separatrix, tmp_path):
+    """Without impacts is not `non_impact`: on a belt the body also sticks, as the regimes say."""
+    case = """
+        body.m = {mass = 2}
+        spring.k = {between = ["m"], stiffness = 50, damping = 0.2}
+        friction.b = {between = ["m"], force = 3, static_force = 5, velocity = 0.3}
+        run.duration = 10
+        attractors.sample = 4
+        sweep = {parameter = "friction.b.velocity", from = 0.1, to = 0.3, count = 2, starts = [2, 2]}
+        axis = [{name = "x0", from = -0.3, to = 0.3, count = 2}, {name = "v0", from = -1, to = 1, count = 2}]
+    """
+    (tmp_path / "belt.toml").write_text(case)
+    said = succeed(separatrix, "sweep", "belt.toml", "-o", "belt.h5", folder=tmp_path).out
+    assert "no impacts throughout" in said
+    assert "many starts: without impacts from 0.100000 to 0.300000" in said
+    assert "neither start nor stop" not in said
+    assert "non-impact" not in said
+
+
 def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
     """The numbers of all attractors are exchanged in one piece, which counts to 2**31 - 1."""
     write_case(tmp_path)
