@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.errors import GIVEN_UP, SeparatrixError
+from separatrix.labels import unit
 from separatrix.variables import REASONS
 
 GIVEN_UP_REASONS = ("not_finite", "event_budget", "step_failed", "step_budget", "mode_cycle")
@@ -23,7 +24,18 @@ def reason_of(result: xr.Dataset) -> str:
 def given_up_text(result: xr.Dataset) -> str:
     """What a caption says of a motion that was given up."""
     time = result["time"].values
-    return f"given up after {time[-1] if time.size else 0.0:.6g} s: {reason_of(result).replace('_', ' ')}"
+    after = f"{time[-1] if time.size else 0.0:.6g} {unit(result['time'])}"
+    return f"given up after {after}: {reason_of(result).replace('_', ' ')}"
+
+
+def left_text(result: xr.Dataset, domain: float) -> str:
+    """What a caption says of a motion that left its domain, of so many units of the position; else ''."""
+    if result.attrs.get("kind") != "trajectory" or result.attrs.get("reason") != "left_domain":
+        return ""
+    time = result["time"].values
+    inside = np.flatnonzero(np.abs(result["x"].values) <= domain)
+    first = min(inside[-1] + 1 if inside.size else 0, time.size - 1)
+    return f"left the domain after {time[first]:.6g} {unit(result['time'])}"
 
 
 def all_given_up(result: xr.Dataset) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
-from separatrix.trial import try_first
+from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION
 from separatrix.version import __version__
 from separatrix.words import decode_word
@@ -133,7 +133,7 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
     except OSError as error:
         reason = _first_line(error)
         if path.suffix == ".toml" and not h5py.is_hdf5(path):
-            reason = "found a case, allowed is a result; `separatrix basin` makes one of a case"
+            reason = CASE_GIVEN
         raise SeparatrixError(f"{path}: cannot be read as HDF5 ({reason})", BAD_DATA) from error
 
 

@@ -3,7 +3,7 @@
 
 !> `separatrix trajectory`: one motion, its time history and every event.
 module trajectory_driver
-  use attractors, only: attractor_t, regime_names
+  use attractors, only: attractor_t, features_t, regime_at_rest, regime_names, regime_non_impact
   use case_check, only: require_start
   use case_setup, only: grid_of, output_path, span_of
   use case_type, only: case_t
@@ -17,7 +17,7 @@ module trajectory_driver
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
-  use machine_facts, only: has_drive_period, stops_of
+  use machine_facts, only: has_drive_period, has_driver, stops_of
   use motion, only: motion_t
   use motion_columns, only: event_columns, motion_column_t, sample_columns
   use motion_history, only: contact_forces, kinetic_energies
@@ -32,7 +32,7 @@ module trajectory_driver
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
-  use trajectory_report, only: counted_over, explained, report
+  use trajectory_report, only: counted_over, ended_after, explained, report
   use trajectory, only: begin_course, begin_record, conclude, course_t, end_record, fit_window, go_on, is_recorded, &
     outcome_t, span_t
   implicit none
@@ -106,8 +106,9 @@ contains
     call check_written(session, path)
     call report(session, moving, span, outcome, cycle, log)
     call report_files(session, command, path)
-    call judge_motion(outcome%reason, explained(outcome%reason)//' after '//to_text(recorded_until(log), 6)//' s of '// &
-                      to_text(span%duration, 6)//' s; '//path//' has what comes before', command%partial, error)
+    call judge_motion(outcome%reason, explained(outcome%reason)//' after '// &
+                      to_text(ended_after(moving, outcome%reason, log), 6)//' s of '//to_text(span%duration, 6)//' s; '// &
+                      path//' has what comes before', command%partial, error)
     call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
@@ -133,6 +134,7 @@ contains
     end do
     call end_record(moving, span, course, log)
     call conclude(moving, no_catalogue, course, outcome)
+    call note_rest(moving, span, log, outcome%window)
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
     ! Newton's method at each period, four steps in the mean, with differences along every coordinate.
     periods = span%duration/moving%machine%period
@@ -141,6 +143,27 @@ contains
     if ((monotonic_seconds() - began)/periods*searched < worth_a_word) return
     call session%journal%line('search', 'looking for the cycle that it came to; run.average = "window" leaves that out')
   end subroutine fly
+
+  !> A structure without a drive is at rest where all its velocities in the window are rounding.
+  pure subroutine note_rest(moving, span, log, features)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    type(log_t), intent(in) :: log
+    type(features_t), intent(inout) :: features
+    integer :: i
+    if (.not. allocated(moving%jointed) .or. features%regime /= regime_non_impact) return
+    if (has_drive_period(moving) .or. has_driver(moving)) return
+    associate (machine => moving%jointed%machine)
+      if (features%amplitude > machine%negligible_speed*machine%period) return
+      do i = log%samples, 1, -1
+        if (log%sample_data(1, i) < span%duration - span%window) exit
+        if (any(abs(log%sample_coordinates(machine%n + 1:, i)) > machine%negligible_speed)) return
+      end do
+    end associate
+    features%regime = regime_at_rest
+    features%amplitude = 0
+    features%v_max = 0
+  end subroutine note_rest
 
   !> Code 65 if the samples of so many periods are more than fit into memory.
   subroutine check_samples(the_case, periods, error)
@@ -333,13 +356,5 @@ contains
     if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     if (len(command%record) > 0) call session%journal%line('written', 'wrote '//command%record)
   end subroutine report_files
-
-  !> Time of the last sample or event [s].
-  pure real(wp) function recorded_until(log) result(time)
-    type(log_t), intent(in) :: log
-    time = 0
-    if (log%samples > 0) time = log%sample_data(1, log%samples)
-    if (log%events > 0) time = max(time, log%event_data(1, log%events))
-  end function recorded_until
 
 end module trajectory_driver

@@ -7,18 +7,18 @@ module trajectory_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, features_t, kind_rest, regime_names
   use kinds, only: wp
-  use machine_facts, only: has_drive_period, has_stops
+  use machine_facts, only: has_drive_period, has_mode, has_stops
   use motion, only: motion_t
   use motion_state, only: log_t
   use restoring_law, only: position_is_angle
   use session, only: session_t
-  use status, only: is_given_up, reason_event_budget, reason_name, reason_time_over
+  use status, only: is_given_up, reason_event_budget, reason_left_domain, reason_name, reason_time_over
   use text, only: to_text
   use trajectory, only: outcome_t, span_t
   implicit none
   private
 
-  public :: report, counted_over, explained
+  public :: report, counted_over, explained, ended_after
 
 contains
 
@@ -33,31 +33,59 @@ contains
     associate (f => outcome%window, journal => session%journal, is_angle => position_is_angle(session%the_case%laws))
       if (outcome%reason /= reason_time_over) then
         call journal%line('end', trim(merge('given up', 'ended   ', is_given_up(outcome%reason)))//' before the end: '// &
-          explained(outcome%reason)//'; '//to_text(log%events)//' events recorded until then')
+          explained(outcome%reason)//' after '//to_text(ended_after(moving, outcome%reason, log), 6)//' s; '// &
+          to_text(log%events)//' events recorded until then')
         return
       end if
       call journal%line('steady', trim(regime_names(f%regime))//': amplitude '//to_text(f%amplitude, 6)// &
         ' '//unit_of('m', is_angle)//', v_max '//to_text(f%v_max, 6)//' '//unit_of('m/s', is_angle)// &
-        impacts_text(moving, f, cycle, is_angle)//' ('//taken_over(moving, span, cycle)//')', &
+        impacts_text(moving, span, f, cycle, is_angle)//' ('//taken_over(moving, span, cycle)//')', &
         '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
         to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
       call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, '// &
-        trim(merge('drive period              ', 'period of the slowest mode', has_drive_period(moving)))//' '// &
+        name_of_period(moving)//' '// &
         to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
     end associate
   end subroutine report
 
-  !> ', 1.0 impacts per period at 0.2 m/s', of a machine that has something to hit; without a drive per second.
-  pure function impacts_text(moving, features, cycle, is_angle) result(text)
+  !> What the time between two sections is.
+  pure function name_of_period(moving) result(name)
     type(motion_t), intent(in) :: moving
+    character(len=:), allocatable :: name
+    name = 'unit of time'
+    if (has_mode(moving)) name = 'period of the slowest mode'
+    if (has_drive_period(moving)) name = 'drive period'
+  end function name_of_period
+
+  !> When a motion ended [s], to the distance of two samples: as far as it is recorded, or where it left the domain.
+  pure real(wp) function ended_after(moving, reason, log) result(time)
+    type(motion_t), intent(in) :: moving
+    integer, intent(in) :: reason
+    type(log_t), intent(in) :: log
+    integer :: i
+    time = 0
+    if (log%samples > 0) time = log%sample_data(1, log%samples)
+    if (log%events > 0) time = max(time, log%event_data(1, log%events))
+    if (reason /= reason_left_domain) return
+    do i = log%samples, 1, -1
+      if (abs(log%sample_data(2, i)) <= moving%options%domain) exit
+      time = log%sample_data(1, i)
+    end do
+  end function ended_after
+
+  !> ', 1.0 impacts per period at 0.2 m/s', of a machine that has something to hit; without a drive, or in less than a period of
+  !> it, per second.
+  pure function impacts_text(moving, span, features, cycle, is_angle) result(text)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
     type(features_t), intent(in) :: features
     type(attractor_t), intent(in) :: cycle
     logical, intent(in) :: is_angle
     character(len=:), allocatable :: text
     text = ''
     if (.not. has_stops(moving)) return
-    if (has_drive_period(moving)) then
+    if (has_drive_period(moving) .and. .not. is_short(moving, span)) then
       text = ', '//to_text(features%impacts_per_period, 5)//' impacts per period'
     else
       text = ', '//to_text(features%impacts_per_period/counted_over(moving, cycle), 5)//' impacts per second'
@@ -73,6 +101,13 @@ contains
     if (cycle%by_event .and. cycle%period > 0 .and. cycle%duration > 0) time = cycle%duration/cycle%period
   end function counted_over
 
+  !> Whether a run holds no period of the drive.
+  pure logical function is_short(moving, span)
+    type(motion_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
+    is_short = span%duration < moving%machine%period
+  end function is_short
+
   !> What steady values are taken over.
   pure function taken_over(moving, span, cycle) result(text)
     type(motion_t), intent(in) :: moving
@@ -85,7 +120,7 @@ contains
       if (cycle%by_event) text = 'over its limit cycle of '//to_text(cycle%duration, 10)//' s'
       if (cycle%kind == kind_rest .and. .not. has_drive_period(moving)) text = 'at rest'
       if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
-    else if (span%whole_periods .and. has_drive_period(moving)) then
+    else if (span%whole_periods .and. has_drive_period(moving) .and. .not. is_short(moving, span)) then
       text = 'last '//to_text(nint(span%window/moving%machine%period))//' drive periods'
     else
       text = 'last '//to_text(span%window, 6)//' s'
@@ -97,7 +132,7 @@ contains
     integer, intent(in) :: reason
     character(len=:), allocatable :: text
     text = reason_name(reason)
-    if (reason == reason_event_budget) text = text//' (flights count, those between samples of a controller, too)'
+    if (reason == reason_event_budget) text = text//' (flights count, not only impacts; raise integrator.event_budget)'
   end function explained
 
 end module trajectory_report

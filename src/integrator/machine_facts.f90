@@ -5,6 +5,7 @@
 module machine_facts
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
+  use eigen, only: undamped_modes
   use jointed, only: is_stop, jointed_t
   use jointed_state, only: acts_as_spring
   use kinds, only: wp
@@ -13,7 +14,7 @@ module machine_facts
   implicit none
   private
 
-  public :: is_one_body, structure_in, has_drive_period, has_driver, has_stops, rides_along, rest_lasts, &
+  public :: is_one_body, structure_in, has_drive_period, has_mode, has_driver, has_stops, rides_along, rest_lasts, &
     smallest_motion, stops_of, contact_sizes
 
 contains
@@ -40,6 +41,22 @@ contains
       has_drive_period = moving%machine%drive%ratio > 0 .or. moving%machine%drive%interval > 0
     end if
   end function has_drive_period
+
+  !> Whether the section of a machine without a drive is a period of its slowest mode; else it is only a unit of time. Springs
+  !> that are not in the stiffness matrix may make modes that nobody has computed.
+  pure logical function has_mode(moving)
+    type(motion_t), intent(in) :: moving
+    real(wp), allocatable :: squares(:), shapes(:, :)
+    if (.not. allocated(moving%jointed)) then
+      has_mode = moving%machine%natural_frequency > 0
+      return
+    end if
+    associate (machine => moving%jointed%machine)
+      allocate (squares(machine%n), shapes(machine%n, machine%n))
+      call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
+      has_mode = squares(machine%n) > 0 .and. all(.not. (abs(machine%joints%moment) > 0 .or. abs(machine%joints%attraction) > 0))
+    end associate
+  end function has_mode
 
   !> Whether there is anything to hit.
   pure logical function has_stops(moving)

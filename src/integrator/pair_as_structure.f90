@@ -77,7 +77,6 @@ contains
         return
       end if
       machine%start(:, driver%at) = [pair%driver_x0, pair%driver_v0]
-      driver%rest_energy = 0.5_wp*pair%stiffness*pair%free_length**2
       if (pair%drive == driven_by_force) driver%push(driver%at) = pair%mean
       if (pair%drive /= driven_by_controller) return
       driver%running(driver%at) = pair%velocity

@@ -106,6 +106,7 @@ contains
       machine%damping(:, k) = machine%damping(:, k) + damping*row*row(k)
     end do
     machine%load = machine%load + stiffness*length*row
+    machine%rest_energy = machine%rest_energy + 0.5_wp*stiffness*length**2
   end subroutine add_link
 
   pure subroutine add_joint(machine, joint)
@@ -251,6 +252,7 @@ contains
       return
     end if
     call widen_force(machine, harmonics)
+    machine%rest_energy = machine%rest_energy + (0.5_wp*machine%stiffness(at, at)*wave%mean - machine%load(at))*wave%mean
     machine%load(rest) = machine%load(rest) - machine%stiffness(rest, at)*wave%mean - machine%damping(rest, at)*wave%rate
     do m = 1, harmonics
       w = m*machine%frequency

@@ -86,15 +86,16 @@ module jointed
     real(wp) :: stops_run = 0
     !> Velocities at which coordinates run on after the reference of a controller [m/s].
     real(wp), allocatable :: running(:)
-    !> Constant force of the drive [N], and the energy of the spring where all coordinates are zero [J].
+    !> Constant force of the drive [N].
     real(wp), allocatable :: push(:)
-    real(wp) :: rest_energy = 0
   end type driver_t
 
   type, public :: jointed_t
     !> Number of coordinates.
     integer :: n = 0
     real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :), load(:)
+    !> Energy of the springs where all coordinates are zero [J].
+    real(wp) :: rest_energy = 0
     !> Amplitudes of the forces [N], one column per harmonic.
     complex(wp), allocatable :: force(:, :)
     type(joint_t), allocatable :: joints(:)

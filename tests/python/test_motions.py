@@ -3,6 +3,7 @@
 """Motions, sweeps and labels of real runs: what the case asks for is what the files hold."""
 
 import os
+import re
 import tomllib
 from pathlib import Path
 
@@ -10,6 +11,9 @@ import h5py
 import numpy as np
 import pytest
 from program import meanings, run, succeed, write_case
+from separatrix import cli
+from separatrix.given_up import left_text
+from separatrix.open import open_result
 
 NO_STARTS = ["sweep", "case.toml", "--set", "sweep.starts=[0, 0]"]
 FLOATS = ("x_max", "x_min", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period")
@@ -365,3 +369,80 @@ def test_an_overdamped_machine_has_a_closed_form(separatrix, tmp_path, parts, da
     )
     np.testing.assert_allclose(x, expected, rtol=1e-10, atol=1e-14)
     assert abs(missing) < 1e-9
+
+
+AT_FREE_LENGTH = """\
+[body.b]
+mass = 1
+[spring.b]
+between = ["b"]
+stiffness = 10
+free_length = 0.1
+[start]
+x0 = 0.1
+[run]
+duration = 1
+"""
+
+
+def test_a_spring_at_its_free_length_holds_no_energy(separatrix, tmp_path):
+    """Nor does it move what it holds, but for rounding; stretched, it holds k (x - l)^2/2.
+
+    So it does where its foot is given.
+    """
+    write_case(tmp_path, AT_FREE_LENGTH)
+    said = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
+    assert said.startswith("at_rest: amplitude 0.0 m, v_max 0.0 m/s")
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert np.abs(file["potential_energy"][()]).max() < 1e-16
+    moving = ["trajectory", "case.toml", *options("start.x0=0.2"), "-o", "out.h5", "--force"]
+    assert succeed(separatrix, *moving, folder=tmp_path).out.startswith("non_impact")
+    with h5py.File(tmp_path / "out.h5") as file:
+        stretch = file["x"][()] - 0.1
+        np.testing.assert_allclose(file["potential_energy"], 5 * stretch**2, rtol=0, atol=1e-15)
+    foot = '[body.foot]\nmass = 1\n[drive.foot]\nbody = "foot"\nlaw = "motion"\nmean = 0.3\nfrequency = 6\n'
+    write_case(tmp_path, AT_FREE_LENGTH.replace('["b"]', '["foot", "b"]') + foot + '[watch]\nbody = "b"\n')
+    succeed(separatrix, "trajectory", "case.toml", "-o", "foot.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "foot.h5") as file:
+        stretch = file["x"][()] - 0.4
+        np.testing.assert_allclose(file["potential_energy"], 5 * stretch**2, rtol=0, atol=1e-15)
+
+
+def test_a_period_without_a_mode_is_a_unit_of_time(separatrix, tmp_path):
+    for spring, words in (("", "unit of time 1.0"), (AT_FREE_LENGTH, "period of the slowest mode 1.98692 s")):
+        body = '[body.b]\nmass = 1\nload = "-9.81 N"\n[run]\nduration = 1\n[start]\nx0 = 1\n'
+        write_case(tmp_path, spring or body)
+        said = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", folder=tmp_path).out
+        assert words in said
+
+
+def test_a_run_shorter_than_a_drive_period_is_of_seconds(separatrix, tmp_path):
+    write_case(tmp_path)
+    command = ["trajectory", "case.toml", *options("run.duration=1e-3"), "-o", "out.h5"]
+    said = succeed(separatrix, *command, folder=tmp_path).out
+    assert "(last 0.000250000 s)" in said
+    assert "per period" not in said
+    assert "drive periods" not in said
+
+
+def test_a_motion_that_leaves_says_when(separatrix, tmp_path):
+    """x = x0 cosh(10 t) is at 1e6 m at t = ln(2e8)/10; captions have no steady motion, no drive."""
+    write_case(
+        tmp_path,
+        AT_FREE_LENGTH.replace("10\n", "-100\n").replace("0.1", "0.01").replace("free_length = 0.01\n", ""),
+    )
+    longer = options("run.duration=10")
+    command = ["trajectory", "case.toml", *longer, "-o", "out.h5"]
+    said = succeed(separatrix, *command, folder=tmp_path).out
+    found = re.search(r"ended before the end: left_domain after (\d\.\d+) s; 0 events", said)
+    assert found is not None, said
+    assert float(found[1]) == pytest.approx(np.log(2e8) / 10, abs=0.011)
+    exponents = succeed(separatrix, "stability", "case.toml", "--periods", "64", *longer, folder=tmp_path).out
+    assert "not known: the motion leaves the domain (run.domain)" in exponents
+    assert cli.main([str(tmp_path / "out.h5"), "--formats", "svg"]) == 0
+    with open_result(tmp_path / "out.h5") as result:
+        assert left_text(result, 1e6) == f"left the domain after {float(found[1]):.6g} s"
+    text = (tmp_path / "out_history.svg").read_text()
+    assert "; left the" in text
+    assert "steady motion" not in text
+    assert "drive period" not in text

@@ -318,6 +318,10 @@ def test_says_what_the_library_refuses(desk: Desk) -> None:
 
 def test_damaged_files_are_a_message(results: dict[str, Path], tmp_path: Path) -> None:
     """Foreign, cut, and flipped bytes: refused at the start or at the request, in one line."""
+    case = tmp_path / "case.toml"
+    case.write_text("[body]\nmass = 1\n")
+    with pytest.raises(SeparatrixError, match="found a case"):
+        ResultFile(case)
     path = tmp_path / "damaged.h5"
     whole = results["map"].read_bytes()
     cases = [b"", b"text", whole[:1000], whole[: len(whole) // 2]]

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from separatrix import style
 from separatrix.figures.caption import describe_case, resolved_case, version_text
-from separatrix.given_up import given_up_text, reason_of
+from separatrix.given_up import given_up_text, left_text, reason_of
 from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -120,6 +120,13 @@ def caption(result: xr.Dataset) -> list[str]:
     """Return the bodies, their regime, and the version of the program."""
     return [
         *describe_case(result),
-        given_up_text(result) if reason_of(result) else f"regime: {flag_text(str(result.attrs['regime']))}",
+        _ending(result),
         plain(version_text(result)),
     ]
+
+
+def _ending(result: xr.Dataset) -> str:
+    """Return the regime, or why there is none."""
+    if reason_of(result):
+        return given_up_text(result)
+    return left_text(result, np.inf) or f"regime: {flag_text(str(result.attrs['regime']))}"

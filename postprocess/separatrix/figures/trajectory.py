@@ -16,7 +16,7 @@ from separatrix.errors import SeparatrixError
 from separatrix.figures import contact, energy, impacts, pair
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
-from separatrix.given_up import given_up_text, reason_of
+from separatrix.given_up import given_up_text, left_text, reason_of
 from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.layout import compose
 from separatrix.open import flag_names
@@ -112,9 +112,17 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
         handles.append(
             Line2D([], [], linestyle="", marker="v", markersize=2.5, color=style.IMPACT, label="impact")
         )
-    caption = [f"b) the last {ZOOM_PERIODS} drive periods", *_caption(result, look)]
+    caption = [f"b) the last {_zoom_text(result, end - start)}", *_caption(result, look)]
     compose(figure, title, shown(caption, look), handles, columns=4)
     return figure
+
+
+def _zoom_text(result: xr.Dataset, length: float) -> str:
+    """Return how long the enlarged part is: in drive periods where it holds as many as it should."""
+    whole = length >= (1 - 1e-9) * ZOOM_PERIODS * float(result.attrs["drive_period"])
+    if result.attrs.get("driven", 1) and whole:
+        return f"{ZOOM_PERIODS} drive periods"
+    return f"{length:.4g} {unit(result['time'])}"
 
 
 def other_bodies(result: xr.Dataset) -> list[str]:
@@ -257,8 +265,10 @@ def _barrier_handle(result: xr.Dataset) -> list[Line2D]:
 def _caption(result: xr.Dataset, look: Look) -> list[str]:
     attributes = result.attrs
     pieces = caption_pieces(result, look, describe_case(result))
-    if reason_of(result):
-        return [*pieces, _start_text(result, look), given_up_text(result), plain(version_text(result))]
+    domain = resolved_case(result).get("run", {}).get("domain", np.inf) * _factor(result["x"], look)
+    ending = given_up_text(result) if reason_of(result) else left_text(result, domain)
+    if ending:
+        return [*pieces, _start_text(result, look), ending, plain(version_text(result))]
     pieces += [_start_text(result, look), f"steady motion: {_regime_text(attributes['regime'])}"]
     pieces.append(f"amplitude {attributes['amplitude']:.4g} {unit(result['x'])}")
     pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} {unit(result['v'])}")
@@ -274,13 +284,21 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
     return [*pieces, plain(version_text(result))]
 
 
+def _factor(variable: xr.DataArray, look: Look) -> float:
+    """By what SI values are multiplied to be in the unit of a variable that is in the units asked for."""
+    return look.factor(next((UNITS[one][0] for one in look.units if one == unit(variable)), unit(variable)))
+
+
 def _start_text(result: xr.Dataset, look: Look) -> str:
     # the first sample is the start but for rounding
     start = resolved_case(result).get("start", {})
     texts = []
     for name in ("x", "v"):
-        si = next((UNITS[one][0] for one in look.units if one == unit(result[name])), unit(result[name]))
-        value = start[f"{name}0"] * look.factor(si) if f"{name}0" in start else float(result[name].values[0])
+        value = (
+            start[f"{name}0"] * _factor(result[name], look)
+            if f"{name}0" in start
+            else float(result[name].values[0])
+        )
         texts.append(f"${name}_0$ = {value:g} {unit(result[name])}")
     return ", ".join(texts)
 

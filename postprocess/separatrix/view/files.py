@@ -8,8 +8,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.errors import DAMAGE, NO_INPUT, SeparatrixError
-from separatrix.trial import try_first
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION
 from separatrix.view.packing import clean
 from separatrix.words import decode_word
@@ -38,6 +38,8 @@ class ResultFile:
         except SeparatrixError:
             raise
         except DAMAGE as error:
+            if self.path.suffix == ".toml" and not h5py.is_hdf5(self.path):
+                raise SeparatrixError(f"{path}: cannot be read as HDF5 ({CASE_GIVEN})", BAD_DATA) from error
             raise SeparatrixError(f"{path}: is damaged ({str(error).splitlines()[0]})") from error
 
     def _try(self, file: h5py.File) -> None:
