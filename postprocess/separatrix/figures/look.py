@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How a figure is to look: what of the result it shows, in which units, colours and size."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -52,9 +52,11 @@ class Look:
         """Refuse what cannot be drawn."""
         if isinstance(self.units, str):
             object.__setattr__(self, "units", [self.units])
-        for name in ("units", "colours"):
-            if not isinstance(getattr(self, name), Sequence):
-                raise SeparatrixError(f"{name}: found {getattr(self, name)!r}, allowed a list", USAGE)
+        kinds = dict.fromkeys(("units", "colours"), (Iterable, "a list"))
+        kinds |= dict.fromkeys(("region", "slice", "inset"), (Mapping, "a mapping of names"))
+        for name, (kind, allowed) in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                raise SeparatrixError(f"{name}: found {getattr(self, name)!r}, allowed {allowed}", USAGE)
         for unit in self.units:
             if unit not in UNITS:
                 raise SeparatrixError(f"units: found '{unit}', allowed {', '.join(UNITS)}", USAGE)
