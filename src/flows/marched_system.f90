@@ -185,7 +185,7 @@ contains
     end do
   end function marched_slope
 
-  !> Accelerations with the size of each term in its place, those of a force that is not linear and what its slopes make of the sizes
+  !> Accelerations with the size of each term in its place, those of a nonlinear force and what its slopes make of the sizes
   !> of its coordinate and speed: near an equilibrium the terms cancel, and their rounding is left. `origin` are the coordinates at
   !> the start [m].
   pure function sizes_of_terms(self, origin, time, y) result(sizes)
