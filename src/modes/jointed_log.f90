@@ -220,7 +220,7 @@ contains
     end do
   end subroutine book_flight
 
-  !> An interval from `first` [s after the start of the path] to `last` at most, `until` the fastest part has decayed, and its panels.
+  !> An interval from `first` [s after the start of the path] to `last` at most, `until` the fastest part has decayed; its panels.
   pure subroutine next_stretch(machine, flow, path, first, last, until, panels)
     type(jointed_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow

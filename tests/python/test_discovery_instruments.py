@@ -174,7 +174,7 @@ def test_samples_that_the_recorder_calls_invalid_are_gaps(tmp_path):
     record = read_record(path)
     assert record.t.size == 280
     assert record.pieces == [(0, 120), (120, 280)]
-    assert said(record, "20 samples are invalid")
+    assert said(record, "20 samples are marked invalid")
 
 
 # ---- LabVIEW measurement files
