@@ -191,7 +191,9 @@ def _exit_codes(program: Path, source: Path) -> str:
     if not set(codes) <= set(advice):
         raise SystemExit(f"docs: --help has the exit codes {codes}, docs/user-guide.md has {list(advice)}")
     rows = [[code, codes.get(code, ""), *text.rsplit(" | ", 1)] for code, text in advice.items()]
-    rows = [[part.replace("](#", "](../user-guide.md#") for part in row] for row in rows]
+    # the page is a folder deeper than the guide
+    rows = [[part.replace("](#", "](user-guide.md#") for part in row] for row in rows]
+    rows = [[re.sub(r"\]\((?!https?:)", "](../", part) for part in row] for row in rows]
     return (
         "# Exit codes\n\nOf all commands; the Python package has them as `error.code` of its exceptions.\n\n"
         + table(["code", "in short", "meaning", "what to do"], rows)

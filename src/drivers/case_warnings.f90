@@ -13,15 +13,14 @@ module case_warnings
   use errors, only: error_t
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
-  use jointed, only: joint_contact, jointed_t, together_newton
-  use jointed_section, only: start_of_jointed
-  use jointed_state, only: jointed_state_t
+  use jointed, only: joint_contact, jointed_t
   use journal, only: journal_t
   use kinds, only: int64, wp
   use machine_facts, only: contact_sizes, stops_of
   use motion, only: motion_t
   use strobe, only: section_obstacle
   use text, only: to_text
+  use touching_row, only: contacts_in_row
   implicit none
   private
 
@@ -94,40 +93,12 @@ contains
     type(grid_t), intent(in) :: grid
     type(motion_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
-    type(jointed_state_t) :: state
     character(len=:), allocatable :: names
-    integer :: i, j
-    associate (machine => moving%jointed%machine)
-      if (machine%together /= together_newton) return
-      state = start_of_jointed(moving%jointed, grid%start(1), grid%start(2), grid%start(3))
-      names = ''
-      do j = 1, size(machine%joints)
-        if (.not. rebounds(machine, j) .or. (state%phase(j) == 0 .and. state%left(j) == 0)) cycle
-        if (.not. any([(rebounds(machine, i) .and. i /= j .and. yields_with(machine, j, i), i=1, size(machine%joints))])) cycle
-        names = names//', '//trim(machine%joints(j)%name)
-      end do
-    end associate
+    names = contacts_in_row(moving, grid%start)
     if (len(names) == 0) return
-    call journal%line('note', 'note: bodies touch in a row ('//names(3:)//'): impacts of contacts that touch come all at once. '// &
+    call journal%line('note', 'note: bodies touch in a row ('//names//'): impacts of contacts that touch come all at once. '// &
       "If they are to come one after the other, as in Newton's cradle, set in_sequence = 1 in [body]")
   end subroutine note_row
-
-  !> Whether joint `j` is a rigid contact with a rebound.
-  pure logical function rebounds(machine, j)
-    type(jointed_t), intent(in) :: machine
-    integer, intent(in) :: j
-    rebounds = .false.
-    if (machine%joints(j)%kind == joint_contact) rebounds = machine%joints(j)%contact%restitution > 0
-  end function rebounds
-
-  !> Whether an impulse of joint `i` changes the speed of joint `j`.
-  pure logical function yields_with(machine, j, i)
-    type(jointed_t), intent(in) :: machine
-    integer, intent(in) :: j, i
-    real(wp) :: kick(machine%n)
-    kick = matmul(machine%mobility, machine%joints(j)%row)
-    yields_with = abs(sum(machine%joints(i)%row*kick)) > 1e-12_wp*sum(machine%joints(j)%row*kick)
-  end function yields_with
 
   !> Says where a restitution is one of a flexible structure: it then depends on the number of modes.
   subroutine warn_about_modes(the_case, journal)

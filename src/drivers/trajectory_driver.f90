@@ -17,7 +17,7 @@ module trajectory_driver
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
-  use machine_facts, only: has_drive_period, has_driver, stops_of
+  use machine_facts, only: has_drive_period, has_driver, is_one_body, stops_of, structure_in
   use motion, only: motion_t
   use motion_columns, only: event_columns, motion_column_t, sample_columns
   use motion_history, only: contact_forces, kinetic_energies
@@ -151,9 +151,9 @@ contains
     type(log_t), intent(in) :: log
     type(features_t), intent(inout) :: features
     integer :: i
-    if (.not. allocated(moving%jointed) .or. features%regime /= regime_non_impact) return
+    if (is_one_body(moving) .or. features%regime /= regime_non_impact) return
     if (has_drive_period(moving) .or. has_driver(moving)) return
-    associate (machine => moving%jointed%machine)
+    associate (machine => structure_in(moving))
       if (features%amplitude > machine%negligible_speed*machine%period) return
       do i = log%samples, 1, -1
         if (log%sample_data(1, i) < span%duration - span%window) exit

