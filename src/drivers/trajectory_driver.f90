@@ -14,6 +14,7 @@ module trajectory_driver
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
+  use jointed, only: jointed_t
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
@@ -150,16 +151,16 @@ contains
     type(span_t), intent(in) :: span
     type(log_t), intent(in) :: log
     type(features_t), intent(inout) :: features
+    type(jointed_t) :: machine
     integer :: i
     if (is_one_body(moving) .or. features%regime /= regime_non_impact) return
     if (has_drive_period(moving) .or. has_driver(moving)) return
-    associate (machine => structure_in(moving))
-      if (features%amplitude > machine%negligible_speed*machine%period) return
-      do i = log%samples, 1, -1
-        if (log%sample_data(1, i) < span%duration - span%window) exit
-        if (any(abs(log%sample_coordinates(machine%n + 1:, i)) > machine%negligible_speed)) return
-      end do
-    end associate
+    machine = structure_in(moving)
+    if (features%amplitude > machine%negligible_speed*machine%period) return
+    do i = log%samples, 1, -1
+      if (log%sample_data(1, i) < span%duration - span%window) exit
+      if (any(abs(log%sample_coordinates(machine%n + 1:, i)) > machine%negligible_speed)) return
+    end do
     features%regime = regime_at_rest
     features%amplitude = 0
     features%v_max = 0
