@@ -4,29 +4,25 @@
 !> `separatrix stability`: Lyapunov exponents of the motion from [start], or of the entries of a map without a period, and what
 !> kind of motion it is.
 module stability_driver
-  use attractors, only: attractor_t
   use body_family, only: family_t
   use case_check, only: require_start
-  use case_setup, only: grid_of, options_of, span_of
+  use case_setup, only: options_of
   use case_type, only: case_t
   use command_line, only: command_t
   use endings, only: judge_motion
   use errors, only: error_t
   use exponents, only: most_points, motion_names, spectrum_t, type_of_motion, zero_one_test
   use files, only: file_exists, is_special, is_text
-  use grid, only: grid_t, slice_motion
   use journal, only: json_number, json_text
-  use kinds, only: int64, wp
+  use kinds, only: wp
   use launcher, only: launched_rank
   use machine_family, only: machine_neighbourhood
   use more_periods, only: periods_needed
-  use motion, only: motion_t
   use session, only: open_session, session_t
   use stability_of_map, only: needed_text, run_stability_of_map, why_not_known
-  use status, only: exit_done, reason_left_domain, reason_name, reason_not_finite
+  use status, only: exit_done, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
-  use trajectory, only: outcome_t, run_trajectory, span_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -83,7 +79,6 @@ contains
         k = zero_one_test(section)
         call report(session, spectrum, machines%centre%has_clock, k)
       else
-        if (spectrum%reason == reason_not_finite) call ask_for_domain(session%the_case, spectrum%reason)
         call session%journal%line('not_known', 'not known: '//why_not_known(spectrum))
       end if
       call judge_motion(spectrum%reason, reason_name(spectrum%reason), command%partial, error)
@@ -91,26 +86,6 @@ contains
     call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine run_stability_of_case
-
-  !> A motion whose numbers end between two sections may have left its domain on the way: that of the run says so.
-  subroutine ask_for_domain(the_case, reason)
-    type(case_t), intent(in) :: the_case
-    integer, intent(inout) :: reason
-    type(grid_t) :: grid
-    type(motion_t) :: moving
-    type(outcome_t) :: outcome
-    type(error_t), allocatable :: error
-    type(attractor_t) :: no_catalogue(0)
-    type(span_t) :: span
-    grid = grid_of(the_case, the_case%axes(:0))
-    span = span_of(the_case)
-    span%extension = 1
-    span%stop_when_captured = .false.
-    call slice_motion(grid, 0_int64, moving, error)
-    if (allocated(error)) return
-    call run_trajectory(moving, no_catalogue, span, grid%start(1), grid%start(2), grid%start(3), outcome)
-    if (outcome%reason == reason_left_domain) reason = outcome%reason
-  end subroutine ask_for_domain
 
   !> What was found, with errors and the check.
   subroutine report(session, spectrum, has_clock, k)

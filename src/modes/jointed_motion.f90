@@ -149,7 +149,7 @@ contains
         if (moving%section > 0) call follow_section(moving, turned, state)
         if (state%at_section .and. present(transitions)) call note_transition(transitions, transition_t(start, state, &
                                                                        moving%section, turns_round, .not. any(fallen)))
-        call check_limits(moving, state, tally, reason)
+        call check_limits(moving, state, watch, tally, reason)
         if (.not. present(one_event) .or. reason /= 0) cycle
         if (one_event .and. state%time - before > shortest_pause*burst_gap*machine%period) exit
       end do
@@ -218,15 +218,18 @@ contains
     if (present(transitions)) call keep(start, state, list, fallen, held, transitions)
   end subroutine change_mode
 
-  !> Budgets and the domain.
-  pure subroutine check_limits(moving, state, tally, reason)
+  !> Budgets and the domain. Numbers that end in a flight on which what is watched was outside ended there.
+  pure subroutine check_limits(moving, state, watch, tally, reason)
     type(jointed_motion_t), intent(in) :: moving
     type(jointed_state_t), intent(in) :: state
+    type(watch_t), intent(in) :: watch
     type(tally_t), intent(in) :: tally
     integer, intent(inout) :: reason
     if (tally%steps > moving%options%step_budget) reason = reason_step_budget
     if (.not. all(abs(state%q(:moving%machine%n)) <= moving%options%domain)) reason = reason_left_domain
-    if (any(state%q /= state%q) .or. any(state%v /= state%v)) reason = reason_not_finite
+    if (any(state%q /= state%q) .or. any(state%v /= state%v)) then
+      if (.not. max(-watch%extremes(1), watch%extremes(2)) > moving%options%domain) reason = reason_not_finite
+    end if
   end subroutine check_limits
 
   !> Notes a transition; what was `held` for an instant, or several at once, is not certain.
