@@ -29,6 +29,9 @@ module exponents
   !> Periods in which a direction turns to where it grows most.
   integer, parameter, public :: aligning = 100
 
+  !> Values of the 0-1 test from and to which it decides.
+  real(wp), parameter, public :: chaotic_from = 0.8_wp, regular_to = 0.2_wp
+
   !> What a motion may be.
   integer, parameter, public :: motion_not_known = 0, motion_contracting = 1, motion_neutral = 2, motion_chaotic = 3, &
     motion_transient = 4
@@ -317,14 +320,14 @@ contains
     if (.not. spectrum%known .or. spectrum%at_rest) return
     associate (largest => spectrum%exponents(1), error => spectrum%errors(1), room => 3*spectrum%errors(1) + spectrum%memory)
       if (spectrum%cycle > 0 .and. spectrum%multiplier < 1 - neutral) then
-        if (k < 0.2_wp) motion = motion_contracting
+        if (k < regular_to) motion = motion_contracting
       else if (abs(spectrum%halves(1) - spectrum%halves(2)) > 2*sqrt(2.0_wp)*room + 1e-9_wp*abs(largest) .and. error > 0) then
         motion = motion_transient
-      else if (largest > room .and. k > 0.8_wp) then
+      else if (largest > room .and. k > chaotic_from) then
         motion = motion_chaotic
-      else if (largest < -room .and. largest < 0 .and. k < 0.2_wp) then
+      else if (largest < -room .and. largest < 0 .and. k < regular_to) then
         motion = motion_contracting
-      else if (abs(largest)*spectrum%mean_period <= 3*error*spectrum%mean_period + rounding .and. k < 0.2_wp) then
+      else if (abs(largest)*spectrum%mean_period <= 3*error*spectrum%mean_period + rounding .and. k < regular_to) then
         ! One of a family of cycles is a cycle.
         motion = merge(motion_contracting, motion_neutral, spectrum%returns)
         if (.not. spectrum%returns .and. all_alike(spectrum) .and. spectrum%sum_exact < 0) motion = motion_not_known

@@ -4,15 +4,13 @@
 !> How many periods would decide what a motion is, where the errors of its exponents are what leaves it open: from how fast these
 !> fall.
 module more_periods
-  use exponents, only: motion_not_known, spectrum_t, type_of_motion
+  use exponents, only: chaotic_from, motion_not_known, regular_to, spectrum_t, type_of_motion
   use kinds, only: wp
   implicit none
   private
 
   public :: periods_needed, test_is_open
 
-  !> Values of the 0-1 test from and to which it decides, as in `type_of_motion`.
-  real(wp), parameter :: chaotic_from = 0.8_wp, regular_to = 0.2_wp
   !> Room for what an estimate from one run may be off.
   real(wp), parameter :: margin = 1.5_wp
   !> More periods than that are no advice.

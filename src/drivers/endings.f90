@@ -4,7 +4,6 @@
 !> How trajectories ended, as every command that runs many says it, and whether that is an error.
 module endings
   use errors, only: error_t, fail
-  use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64
   use map_reader, only: reader_t
@@ -67,7 +66,7 @@ contains
     reasons = 0
     do i = 1, size(names)
       if (.not. reader%has(trim(names(i)))) cycle
-      call count_codes(reader, trim(names(i)), counts, error)
+      call reader%count_codes(trim(names(i)), counts, error)
       if (allocated(error)) return
       reasons = reasons + counts
     end do

@@ -10,14 +10,13 @@ module info_driver
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
   use map_verify, only: probe_file
-  use slabs, only: slab, slab_count
   use status, only: exit_io, reason_names
   use text, only: interval_text, join, to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
 
-  public :: run_info, count_codes
+  public :: run_info
 
   character(len=*), parameter :: root_texts(6) = [character(len=14) :: 'kind', 'title', 'source', 'date_created', &
     'format_version', 'complete']
@@ -161,7 +160,7 @@ contains
     path = '/'//variable
     if (reader%has('/branch_'//variable)) path = '/branch_'//variable
     if (.not. reader%has(path)) return
-    call count_codes(reader, path, counts, error)
+    call reader%count_codes(path, counts, error)
     if (allocated(error)) return
     if (json) body = body//', "'//path(2:)//'": {'
     if (.not. json) body = body//new_line('a')//'  '//path(2:)//':'
@@ -180,30 +179,6 @@ contains
     end do
     if (json) body = body//'}'
   end subroutine add_codes
-
-  !> How often each code from 0 occurs in a variable; codes outside the table are not counted.
-  subroutine count_codes(reader, path, counts, error)
-    type(reader_t), intent(in) :: reader
-    character(len=*), intent(in) :: path
-    integer(int64), intent(out) :: counts(0:)
-    type(error_t), allocatable, intent(out) :: error
-    integer(int64), allocatable :: lengths(:), lower(:), extent(:)
-    real(wp), allocatable :: values(:)
-    integer(int64) :: k
-    integer :: i
-    counts = 0
-    call reader%lengths(path, lengths, error)
-    if (allocated(error)) return
-    allocate (lower(size(lengths)), extent(size(lengths)))
-    do k = 1, slab_count(lengths)
-      call slab(lengths, k, lower, extent)
-      call reader%read_block(path, lower, extent, values, error)
-      if (allocated(error)) return
-      do i = 0, ubound(counts, 1)
-        counts(i) = counts(i) + count(abs(values - i) < 0.5_wp)
-      end do
-    end do
-  end subroutine count_codes
 
   !> How much of a refined map was computed, and how much of it can be wrong.
   subroutine add_refinement(reader, json, body, error)

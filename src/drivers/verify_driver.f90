@@ -17,7 +17,6 @@ module verify_driver
   use endings, only: judge_file, judge_motion
   use errors, only: error_t, fail
   use grid, only: grid_t, point_laws, point_slice, point_start
-  use info_driver, only: count_codes
   use journal, only: journal_t, json_text
   use kinds, only: int64, real32, wp
   use list_audit, only: audit_points

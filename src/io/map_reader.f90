@@ -14,6 +14,7 @@ module map_reader
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
   use map_schema, only: format_version, oldest_version
+  use slabs, only: slab, slab_count
   use status, only: exit_bad_case, exit_io, exit_no_input
   use files, only: file_exists, is_text
   use output_check, only: is_folder
@@ -42,6 +43,7 @@ module map_reader
     procedure :: read_values
     procedure :: read_columns
     procedure :: read_block
+    procedure :: count_codes
     procedure :: read_strings
     procedure :: read_text
     procedure :: has_attribute
@@ -264,6 +266,30 @@ contains
     call from_bytes(dataset%type, bytes, values)
     call h5_close_dataset(dataset, error)
   end subroutine read_block
+
+  !> How often each code from 0 occurs in a variable; codes outside the table are not counted.
+  subroutine count_codes(self, path, counts, error)
+    class(reader_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(int64), intent(out) :: counts(0:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64), allocatable :: lengths(:), lower(:), extent(:)
+    real(real64), allocatable :: values(:)
+    integer(int64) :: k
+    integer :: i
+    counts = 0
+    call self%lengths(path, lengths, error)
+    if (allocated(error)) return
+    allocate (lower(size(lengths)), extent(size(lengths)))
+    do k = 1, slab_count(lengths)
+      call slab(lengths, k, lower, extent)
+      call self%read_block(path, lower, extent, values, error)
+      if (allocated(error)) return
+      do i = 0, ubound(counts, 1)
+        counts(i) = counts(i) + count(abs(values - i) < 0.5_real64)
+      end do
+    end do
+  end subroutine count_codes
 
   !> The texts of a variable: the meanings of its codes, or what it has in a file of version 1, strings.
   subroutine read_strings(self, path, strings, error)

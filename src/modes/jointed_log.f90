@@ -47,11 +47,11 @@ contains
         end associate
       end if
     end associate
+    energy = energy + machine%rest_energy
     if (allocated(machine%driver)) then
-      energy = energy + machine%rest_energy + sum(machine%driver%push*state%q(:machine%n))
+      energy = energy + sum(machine%driver%push*state%q(:machine%n))
       return
     end if
-    energy = energy + machine%rest_energy
     do j = 1, size(machine%joints)
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       energy = energy + joint_energy(machine%joints(j), state%phase(j), state%slider(j), s)
