@@ -39,10 +39,10 @@ def function(data=X, t=T, **more):
     return pyuff.prepare_58(**chosen | more)
 
 
-def units(length, force):
+def units(length, force, code=9):
     pyuff = pytest.importorskip("pyuff")
     more = {"units_description": "x", "temp_mode": 1, "temp": 1.0, "temp_offset": 273.15}
-    return pyuff.prepare_164(units_code=9, length=length, force=force, **more)
+    return pyuff.prepare_164(units_code=code, length=length, force=force, **more)
 
 
 def uff(path: Path, *sets) -> Path:
@@ -64,6 +64,11 @@ def test_units_of_a_universal_file_count(tmp_path):
         read_record(uff(tmp_path / "d.uff", units(1.0, 1.0), function(ordinate_axis_units_lab="mm")))
     keys(tmp_path / "d.uff", "units: t s, x mm")
     assert np.allclose(read_record(tmp_path / "d.uff").x, 1e-3 * X, atol=1e-6)
+    # the code of metres with the factors of millimetres
+    with pytest.raises(SeparatrixError, match="code and factors of data set 164 disagree.*e.uff.keys"):
+        read_record(uff(tmp_path / "e.uff", units(1000.0, 1.0, code=1), function()))
+    keys(tmp_path / "e.uff", "units: t s, x mm")
+    assert np.allclose(read_record(tmp_path / "e.uff").x, 1e-3 * X, atol=1e-6)
 
 
 def test_functions_that_are_no_column_over_time_are_left_out(tmp_path):

@@ -11,22 +11,9 @@ from separatrix.errors import NO_INPUT, SeparatrixError
 from separatrix.extras import library
 from separatrix.structures.content import Modes
 from separatrix.trial import read_apart
-from separatrix.universal_files import check_whole
+from separatrix.universal_files import check_whole, units_of
 
 _MODES, _UNITS = 55, 164
-# Numbers of units of length and force in one metre and one newton, by the units codes of data set 164.
-_POUND_FORCE, _KILOGRAM_FORCE = 1 / 4.4482216152605, 1 / 9.80665
-_OF_CODE = {
-    1: (1.0, 1.0),
-    2: (1 / 0.3048, _POUND_FORCE),
-    3: (1.0, _KILOGRAM_FORCE),
-    4: (1 / 0.3048, 1 / 0.138254954376),
-    5: (1000.0, 1000.0),
-    6: (100.0, 100.0),
-    7: (1 / 0.0254, _POUND_FORCE),
-    8: (1000.0, _KILOGRAM_FORCE),
-    10: (1000.0, 1.0),
-}
 _NORMAL_MODE = 2
 # Specific data types of shapes that are displacements: not stated, general, displacement.
 _DISPLACEMENT = (0, 1, 8)
@@ -56,20 +43,12 @@ def read_modes(path: str | Path) -> Modes:
 
 def _factors(sets: Sequence[Mapping]) -> tuple[float, float]:
     """Return the divisors that lead from the units of the file to m and N."""
-    found = {(int(one["units_code"]), float(one["length"]), float(one["force"])) for one in sets}
-    if len(found) > 1:
-        raise SeparatrixError(f"found {len(found)} data sets 164 with units that differ, allowed one")
-    code, length, force = found.pop() if found else (1, 1.0, 1.0)
-    stated = f"data set 164: found the factors {length:g} of length and {force:g} of force"
-    if not (0 < length < np.inf and 0 < force < np.inf):
-        raise SeparatrixError(f"{stated}, allowed ones above 0")
-    of_code = _OF_CODE.get(code, (length, force))
-    if not np.allclose((length, force), of_code, rtol=1e-3, atol=0):
-        raise SeparatrixError(
-            f"{stated} with the units code {code}, allowed {of_code[0]:g} and {of_code[1]:g}, "
-            "or the code 9 of other units"
-        )
-    return length, force
+    units = units_of(sets)
+    if units is None:
+        return 1.0, 1.0
+    if units.fault:
+        raise SeparatrixError(units.fault)
+    return units.length, units.force
 
 
 def _modes(sets: Sequence[Mapping], factors: tuple[float, float]) -> Modes:

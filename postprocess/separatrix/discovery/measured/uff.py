@@ -12,7 +12,7 @@ from separatrix.discovery.measured.header import is_stated, same_unit
 from separatrix.discovery.measured.tables import is_column, kind_of
 from separatrix.errors import SeparatrixError
 from separatrix.extras import library
-from separatrix.universal_files import check_whole
+from separatrix.universal_files import FileUnits, check_whole, units_of
 
 # specific data types of UFF 58 (displacement, velocity, force) and the columns that they are
 _OF_TYPE = {8: "x", 11: "v", 9: "force", 13: "force"}
@@ -30,7 +30,7 @@ def read_uff(path: Path, names: Mapping[str, str]) -> Found:
     sets = library("pyuff", path, "formats").UFF(str(path)).read_sets()
     sets = [sets] if isinstance(sets, dict) else sets
     found, times, others = Found(), {}, 0
-    factors = _factors(path, sets)
+    units = _units(path, sets)
     for one in (one for one in sets if one.get("type") == 58):
         if (one.get("func_type"), one.get("abscissa_spec_data_type")) not in _OVER_TIME:
             others += 1
@@ -50,7 +50,7 @@ def read_uff(path: Path, names: Mapping[str, str]) -> Found:
             raise SeparatrixError(f"{path}: two functions are '{name}': say which in their first line (id1)")
         found.values[name] = _values(path, name, one)
         times[name] = np.asarray(one["x"], float)
-        unit = _unit(name, one, factors)
+        unit = _unit(name, one, units)
         found.units |= {name: unit} if unit else {}
         unit = str(one.get("abscissa_axis_units_lab", ""))
         found.units |= {"t": unit} if is_stated(unit) else {}
@@ -77,27 +77,25 @@ def _values(path: Path, name: str, one: dict) -> np.ndarray:
     return values
 
 
-def _factors(path: Path, sets: list[dict]) -> tuple[float, float] | None:
-    """Length and force of the file over m and N, None where it has no data set 164."""
-    stated = {(one["length"], one["force"]) for one in sets if one.get("type") == 164}
-    if len(stated) > 1:
-        raise SeparatrixError(f"{path}: found data sets 164 of several units, expected one")
-    if not stated:
-        return None
-    factors = stated.pop()
-    if not all(np.isfinite(one) and one > 0 for one in factors):
-        raise SeparatrixError(f"{path}: data set 164: factors {factors}, expected more than 0")
-    return factors
+def _units(path: Path, sets: list[dict]) -> FileUnits | None:
+    """The units that the file states."""
+    try:
+        return units_of([one for one in sets if one.get("type") == 164])
+    except SeparatrixError as error:
+        raise SeparatrixError(f"{path}: {error}") from None
 
 
-def _unit(name: str, one: dict, factors: tuple[float, float] | None) -> str:
+def _unit(name: str, one: dict, units: FileUnits | None) -> str:
     """The unit of a function, by its label and by data set 164; '' where the file says nothing."""
     label = str(one.get("ordinate_axis_units_lab", "")).strip()
     label = label if is_stated(label) else ""
     kind = kind_of(name)
-    if factors is None or kind == "phi":
+    if units is None or kind == "phi":
         return label
-    length, force = factors
+    if units.fault:
+        # no unit: refused, or the user says which
+        return "unknown: code and factors of data set 164 disagree"
+    length, force = units.length, units.force
     turns = abs(one.get("rsp_dir") or 0) in _ROTATIONS
     if kind == "force":
         unit = f"{1 / (force * length)!r} N m" if turns else f"{1 / force!r} N"
