@@ -145,7 +145,7 @@ int separatrix_coordinate_segments(const separatrix_model *model, int chosen_cou
 enum {
   separatrix_sample_numbers = 13,
   separatrix_event_numbers = 7,
-  separatrix_summary_numbers = 26,
+  separatrix_summary_numbers = 28,
   separatrix_attractor_numbers = 55,
   separatrix_label_numbers = 13,
   separatrix_section_coordinates = 16
@@ -173,7 +173,7 @@ enum {
  *     velocity [m/s] of the driving one; force of soft barriers on the body [N]; energy and kinetic energy
  * [J]; lost since the start to friction, to damping and to contacts, put in by the drive [J] event
  * [event_capacity][7] kind (docs/file-format.md), time [s], x [m], v before and after [m/s]; of two bodies
- * position and velocity of the driving one, otherwise not numbers summary [26] As `points`: x [m], v [m/s],
+ * position and velocity of the driving one, otherwise not numbers summary [28] As `points`: x [m], v [m/s],
  * number of impacts, speed before the last [m/s], regime, reason (codes of docs/file-format.md). As
  * `trajectory`, over the cycle that the motion comes to, or the window at the end: amplitude [m], largest and
  * smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s]. The machine: drive
@@ -181,8 +181,9 @@ enum {
  * Reason of the `trajectory`; its energy [J] at the start, lost to friction, damping and contacts, put in; if
  * it came to its end, energy at the end and what is missing in this book, otherwise not numbers. Period of
  * the cycle in drive periods, 0: none; not a number, and the values are over the window, with a duration
- * other than that of the case. All of it is written also where the motion was given up, as far as it went:
- * the answer is then 78 */
+ * other than that of the case. 1 if a drive gives the drive period, which else is a unit of time; 1 if the
+ * position is an angle, in rad for m. All of it is written also where the motion was given up, as far as it
+ * went: the answer is then 78 */
 int separatrix_trajectory(const separatrix_model *model, int chosen_count, const int *chosen,
                           const double *values, const double *start, double duration, int samples_per_period,
                           int sample_capacity, int *sample_count, double *sample, int event_capacity,

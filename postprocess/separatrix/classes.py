@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names and colours of the classes of a coded field: regimes, attractors, periods, event words."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,9 +9,8 @@ import numpy as np
 import xarray as xr
 
 from separatrix import style
-from separatrix.labels import flag_text, unit
+from separatrix.labels import flag_text, is_angle, unit
 from separatrix.open import decode_word, flag_names, table
-from separatrix.variables import attributes, position_is_angle
 
 CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
 _MOST = len(style.TOL_MUTED)
@@ -113,7 +111,7 @@ def _word_text(word: str) -> str:
 def _attractor_text(result: xr.Dataset, identity: int) -> str:
     """Return 'attractor 1: non-impact, period 1' from the catalogue, over all of its slices.
 
-    Attractors of one class are told apart by their event words, or else by their amplitudes.
+    Attractors of one class are distinguished by their event words, or else by their amplitudes.
     """
     catalogue = table(result, "catalogue")
     if "attractor" not in catalogue:
@@ -160,7 +158,8 @@ def _size_text(
         if name not in catalogue:
             continue
         values = catalogue[name].copy(data=_rounded(catalogue[name].values))
-        values.attrs["units"] = _unit_of_motion(result, unit(values))
+        # Files of version 1 have lengths there, of angles too.
+        values.attrs["units"] = "rad" if is_angle(result["amplitude"]) else unit(values)
         texts = {one: _range_text(values, ids == one) for one in (identity, *alike)}
         if texts[identity] not in [texts[one] for one in alike]:
             return f", {name} {sign}{texts[identity]}"
@@ -171,15 +170,6 @@ def _rounded(values: np.ndarray) -> np.ndarray:
     """Values with 0 for what is nothing beside the largest."""
     size = np.abs(values)
     return np.where(size < _NOTHING * np.max(size, initial=0.0), 0.0, values)
-
-
-def _unit_of_motion(result: xr.Dataset, si: str) -> str:
-    """Return the unit of a position, which may be an angle."""
-    try:
-        case = tomllib.loads(result.attrs.get("resolved_case", ""))
-    except tomllib.TOMLDecodeError:
-        return si
-    return str(attributes((si, "", {}), position_is_angle(case))["units"])
 
 
 def _range_text(values: xr.DataArray, mine: np.ndarray) -> str:

@@ -47,6 +47,11 @@ def unit(variable: xr.DataArray) -> str:
     return "" if text == "1" else text
 
 
+def is_angle(variable: xr.DataArray) -> bool:
+    """Whether a position, or a range of it, is an angle."""
+    return unit(variable) in ("rad", "deg")
+
+
 def axis_label(variable: xr.DataArray) -> str:
     """Return the label of an axis: what, symbol and unit."""
     name = str(variable.name)

@@ -19,7 +19,6 @@ from separatrix.variables import (
     REGIMES,
     SAMPLES,
     attributes,
-    position_is_angle,
 )
 from separatrix.version import __version__
 
@@ -121,7 +120,7 @@ def _dataset(case: Case, motion: simulate.Motion, cycle: dict[str, float] | None
     events["kind"] = events["kind"].astype(np.int8)
     if not two_bodies:
         del events["driver_x"], events["driver_v"]
-    angle = position_is_angle(case.resolved)
+    angle = bool(summary["position_is_angle"])
     data = {
         name: ("time", columns[name], attributes(row, angle))
         for name, row in SAMPLES.items()
@@ -144,14 +143,6 @@ def _window(run: dict, period: float) -> float:
     return min(max(1.0, np.floor(run["window"] / period + 0.5)), np.floor(run["duration"] / period)) * period
 
 
-def _driven(resolved: dict) -> int:
-    """Whether the drive period is that of a drive, and not of the slowest mode."""
-    drive = resolved.get("drive", {})
-    if "law" in drive:
-        return int(drive["law"] not in ("none", "velocity", "pid_velocity"))
-    return int(any(part.get("frequency", 0) > 0 for part in drive.values()))
-
-
 def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None) -> dict[str, object]:
     resolved = case.resolved
     steady = cycle or summary
@@ -160,7 +151,7 @@ def _about(case: Case, summary: dict[str, float], cycle: dict[str, float] | None
     about: dict[str, object] = {
         "format": "separatrix", "format_version": FORMAT_VERSION, "kind": "trajectory", "complete": 1,
         "title": case.title, "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
-        "drive_period": summary["drive_period"], "driven": _driven(resolved), "drive_ratio": ratio,
+        "drive_period": summary["drive_period"], "driven": int(summary["driven"]), "drive_ratio": ratio,
         "window": _window(resolved["run"], summary["drive_period"]),
         "period": int(cycle["period"]) if cycle else 0, "reason": REASONS[int(summary["trajectory_reason"])],
         "regime": REGIMES[int(steady["regime"])],

@@ -37,7 +37,8 @@ SUMMARY = (
     "impacts_per_period", "mean_impact_speed", "drive_period", "barrier_upper", "barrier_lower", "soft",
     "two_bodies",
     "trajectory_reason", "energy_start", "energy_lost_to_friction", "energy_lost_to_damping",
-    "energy_lost_to_contacts", "energy_put_in", "energy_end", "energy_closing_error", "period",
+    "energy_lost_to_contacts", "energy_put_in", "energy_end", "energy_closing_error", "period", "driven",
+    "position_is_angle",
 )  # fmt: skip
 ATTRACTOR = (
     "attractor", "regime", "period", "event_word", "x", "v", "driver_x", "driver_v", "multiplier",

@@ -6,7 +6,6 @@ A test compares them with the files of the program.
 """
 
 import re
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -142,16 +141,3 @@ def attributes(row: tuple[str, str, dict], angle: bool = False) -> dict[str, obj
     """Return the attributes of a variable of a motion along a line, or of an angle."""
     unit, meaning, more = row
     return {"units": _TURNED.get(unit, unit) if angle else unit, "long_name": meaning, **more}
-
-
-def position_is_angle(case: Mapping) -> bool:
-    """Whether the position that a resolved case looks at is an angle: of a pendulum, or tied to one."""
-    watched = case.get("watch", {}).get("body")
-    if watched is None:
-        return case.get("restoring", {}).get("law") == "pendulum"
-    joints = [joint for kind in ("spring", "friction", "contact") for joint in case.get(kind, {}).values()]
-    ends = [(set(joint["between"]) - {"ground"}, joint.get("law")) for joint in joints]
-    angles = {name for names, law in ends if law == "pendulum" for name in names}
-    for _ in joints:
-        angles |= {name for names, _ in ends if names & angles for name in names}
-    return watched in angles

@@ -12,11 +12,12 @@ module c_trajectory
   use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use machine_facts, only: has_driver, stops_of
+  use machine_facts, only: has_drive_period, has_driver, stops_of
   use model_type, only: model_t
   use motion, only: motion_t
   use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: closing_error, log_t, open_log
+  use restoring_law, only: position_is_angle
   use settled_cycle, only: describe_cycle
   use status, only: exit_given_up, exit_usage, is_given_up, reason_name, reason_time_over
   use text, only: to_text
@@ -30,7 +31,7 @@ module c_trajectory
   public :: separatrix_trajectory
 
   !> Numbers of a sample, of an event, and of the motion as a whole.
-  integer, parameter :: of_sample = 13, of_event = 7, of_summary = 26
+  integer, parameter :: of_sample = 13, of_event = 7, of_summary = 28
   !> Most samples of a trajectory: some hundred bytes each.
   real(wp), parameter :: most_samples = 2e7_wp
 
@@ -69,6 +70,7 @@ contains
       kept = min(event_count, event_capacity)
       if (kept > 0) call put_events(prepared%journey%moving, log, kept, event)
       call summarise(prepared%journey%moving, log, outcome, summary)
+      summary(28) = merge(1.0_wp, 0.0_wp, position_is_angle(self%the_case%laws))
       if (is_given_up(outcome%reason)) call fail(error, exit_given_up, 'the motion was given up: '//reason_name(outcome%reason))
     end if
     code = answer(error, message, message_size)
@@ -202,6 +204,7 @@ contains
       summary(13:18) = [moving%machine%period, barriers, merge(1.0_wp, 0.0_wp, stops%soft), &
                         merge(1.0_wp, 0.0_wp, has_driver(moving)), real(outcome%reason, wp)]
       summary(19:23) = [book%at_start, book%friction, book%damping, book%contact, book%work]
+      summary(27) = merge(1.0_wp, 0.0_wp, has_drive_period(moving))
       if (outcome%reason == reason_time_over) summary(24:25) = [book%at_end, closing_error(book)]
     end associate
   end subroutine summarise

@@ -157,6 +157,7 @@ contains
     type(schema_t) :: extra
     type(error_t), allocatable :: error
     call sum_counts(session, work)
+    extra%positions_are_angles = position_is_angle(session%the_case%laws)
     call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
     if (allocated(work%grid%drawn)) call add_sample_shares(extra, work%captured, points_of_slice(work%grid))
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)

@@ -72,15 +72,26 @@ def test_pendulums_in_parts_are_angles_and_have_no_drive(separatrix, tmp_path):
     assert "drive" not in printed
     # the mode of the coupling alone is none of the machine
     assert "unit of time" in printed
-    told = sx.trajectory(tmp_path / "case.toml", duration=1.0)
-    assert [told[name].attrs["units"] for name in ("x", "event_x", "v")] == ["rad", "rad", "rad/s"]
-    assert told.attrs["driven"] == 0
+    pendulum = sx.trajectory(tmp_path / "case.toml", duration=1.0)
+    assert [pendulum[name].attrs["units"] for name in ("x", "event_x", "v")] == ["rad", "rad", "rad/s"]
+    assert pendulum.attrs["driven"] == 0
     with open_result(tmp_path / "out.h5") as result:
         assert result.attrs["driven"] == 0
         assert {result[name].attrs["units"] for name in ("x", "first_x", "second_x")} == {"rad"}
         assert {result[name].attrs["units"] for name in ("v", "first_v", "second_v")} == {"rad/s"}
         figure = trajectory.phase_portrait(result, "pendulums")
         assert "rad" in figure.axes[0].get_xlabel()
+
+
+def test_the_catalogue_of_a_map_of_angles_is_in_rad(run):
+    """As the map itself is; multipliers and crank angles keep their units."""
+    out, _ = run("basin", *SMALL)
+    with h5py.File(out) as file:
+        units = {name: file[name].attrs["units"] for name in ("amplitude", "catalogue/x", "catalogue/v")}
+        units["catalogue/amplitude"] = file["catalogue/amplitude"].attrs["units"]
+    assert units == {
+        "amplitude": "rad", "catalogue/x": "rad", "catalogue/v": "rad/s", "catalogue/amplitude": "rad"
+    }  # fmt: skip
 
 
 def test_a_trajectory_goes_on_and_its_portrait_goes_round(run):

@@ -12,8 +12,8 @@ import xarray as xr
 from separatrix.errors import CaseError
 from separatrix.figures.look import Look
 from separatrix.figures.parts import numbers_of_parts, parts, several_bodies
+from separatrix.labels import is_angle
 from separatrix.library import Model
-from separatrix.variables import position_is_angle
 
 # Symbols are those of docs/start.md and docs/theory.md: m, c, k, e, omega.
 # symbol and unit of the parameters that matter for a caption, in this order; the library knows better units
@@ -216,7 +216,7 @@ def start_pieces(result: xr.Dataset) -> list[str]:
     if not isinstance(start, dict):
         return []
     symbols = _START
-    if position_is_angle(resolved_case(result)):
+    if is_angle(result["amplitude"]):
         symbols = {key: (symbol, unit.replace("m", "rad")) for key, (symbol, unit) in _START.items()}
     varying = {str(name) for name in result.dims} | set(str(result.attrs.get("axes", "")).split())
     pieces = _values(start, symbols, "", varying, {})

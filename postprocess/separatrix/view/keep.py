@@ -15,9 +15,10 @@ import numpy as np
 
 from separatrix.errors import SeparatrixError
 from separatrix.simulate import LABEL_VARIABLES, StopFlag
-from separatrix.variables import CATALOGUE, FORMAT_VERSION, MAP, attributes, position_is_angle
+from separatrix.variables import CATALOGUE, FORMAT_VERSION, MAP, attributes
 from separatrix.version import __version__
 from separatrix.view import live
+from separatrix.view.files import ResultFile
 from separatrix.view.machine import Machine
 
 __all__ = ["keep_file"]
@@ -106,7 +107,7 @@ def _write(
         format="separatrix", kind="basin", date_created=now,
     )  # fmt: skip
     file.attrs.update(format_version=np.int32(FORMAT_VERSION), complete=np.int32(1))
-    angle = position_is_angle(source.case)
+    angle = _is_angle(source)
     for axis, points in axes:
         _put(file, axis["key"], points, axis["unit"], axis["label"]).make_scale(axis["key"])
     for name, array in values.items():
@@ -129,6 +130,11 @@ def _write(
     provenance.attrs.update(version=__version__, computed_by="separatrix-view", started=now, finished=now)
 
 
+def _is_angle(source: ResultFile) -> bool:
+    """Whether the positions of the map beside which this one is kept are angles."""
+    return source.file["amplitude"].attrs["units"] in ("rad", b"rad")
+
+
 def _write_catalogue(
     file: h5py.File,
     machine: Machine,
@@ -146,7 +152,7 @@ def _write_catalogue(
     group = file.create_group("catalogue")
     group["entry"] = np.arange(len(rows), dtype=np.int32)
     group["entry"].make_scale("entry")
-    angle = position_is_angle(machine.source.case)
+    angle = _is_angle(machine.source)
     for name, (kind, *described) in CATALOGUE.items():
         about = attributes(described, angle)
         item = _put(
