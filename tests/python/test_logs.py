@@ -83,8 +83,8 @@ def test_progress_of_a_sweep_never_goes_back(separatrix, tmp_path):
     write_case(tmp_path)
     sweep = ("--set=sweep.starts=[0, 0]", "--progress", "1e-6", "--json")
     outcome = succeed(separatrix, "sweep", "case.toml", *sweep, "-o", "sweep.h5", folder=tmp_path)
-    told = [json.loads(line) for line in outcome.out.splitlines()]
-    done = [(line["done"], line["total"]) for line in told if line.get("of") == "values"]
+    events = [json.loads(line) for line in outcome.out.splitlines()]
+    done = [(line["done"], line["total"]) for line in events if line.get("of") == "values"]
     assert done == [(number, 14) for number in range(1, 15)]
 
 

@@ -197,8 +197,8 @@ def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeyp
     (tmp_path / "list.csv").write_text("x0,v0\n0.015,0.1\n")
     succeed(separatrix, "points", "case.toml", "--list", "list.csv", "-o", "points.h5", folder=tmp_path)
     rigid = ["--set", 'contact={law="newton", restitution=0.5, upper=0.01}']
-    told = run(separatrix, "points", "case.toml", "--list", "list.csv", *rigid, folder=tmp_path)
-    assert told.code == 65
+    refused = run(separatrix, "points", "case.toml", "--list", "list.csv", *rigid, folder=tmp_path)
+    assert refused.code == 65
 
 
 def test_all_points_of_a_motion_are_marked_in_its_map() -> None:
