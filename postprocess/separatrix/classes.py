@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix import style
-from separatrix.labels import flag_text, is_angle, unit
+from separatrix.labels import flag_text, positions_are_angles, unit
 from separatrix.open import decode_word, flag_names, table
 
 CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
@@ -159,7 +159,7 @@ def _size_text(
             continue
         values = catalogue[name].copy(data=_rounded(catalogue[name].values))
         # Files of version 1 have lengths there, of angles too.
-        values.attrs["units"] = "rad" if is_angle(result["amplitude"]) else unit(values)
+        values.attrs["units"] = "rad" if positions_are_angles(result) else unit(values)
         texts = {one: _range_text(values, ids == one) for one in (identity, *alike)}
         if texts[identity] not in [texts[one] for one in alike]:
             return f", {name} {sign}{texts[identity]}"

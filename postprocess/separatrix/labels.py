@@ -47,9 +47,12 @@ def unit(variable: xr.DataArray) -> str:
     return "" if text == "1" else text
 
 
-def is_angle(variable: xr.DataArray) -> bool:
-    """Whether a position, or a range of it, is an angle."""
-    return unit(variable) in ("rad", "deg")
+def positions_are_angles(result: xr.Dataset) -> bool:
+    """Whether the positions of a result are angles, by the units of the first of its positions."""
+    for name in ("amplitude", "x0", "catalogue_x", "saddles_x"):
+        if name in result:
+            return unit(result[name]) in ("rad", "deg")
+    return False
 
 
 def axis_label(variable: xr.DataArray) -> str:

@@ -12,7 +12,7 @@ import xarray as xr
 from separatrix.errors import CaseError
 from separatrix.figures.look import Look
 from separatrix.figures.parts import numbers_of_parts, parts, several_bodies
-from separatrix.labels import is_angle
+from separatrix.labels import positions_are_angles
 from separatrix.library import Model
 
 # Symbols are those of docs/start.md and docs/theory.md: m, c, k, e, omega.
@@ -216,7 +216,7 @@ def start_pieces(result: xr.Dataset) -> list[str]:
     if not isinstance(start, dict):
         return []
     symbols = _START
-    if is_angle(result["amplitude"]):
+    if positions_are_angles(result):
         symbols = {key: (symbol, unit.replace("m", "rad")) for key, (symbol, unit) in _START.items()}
     varying = {str(name) for name in result.dims} | set(str(result.attrs.get("axes", "")).split())
     pieces = _values(start, symbols, "", varying, {})

@@ -132,7 +132,8 @@ def _write(
 
 def _is_angle(source: ResultFile) -> bool:
     """Whether the positions of the map beside which this one is kept are angles."""
-    return source.file["amplitude"].attrs["units"] in ("rad", b"rad")
+    file = source.file
+    return file["amplitude" if "amplitude" in file else "catalogue/x"].attrs["units"] in ("rad", b"rad")
 
 
 def _write_catalogue(
