@@ -60,8 +60,8 @@ def trajectory(
     """
     case = as_case(case)
     if isinstance(duration, str):
-        # The window is at most as long.
-        duration = case.with_({"run.window": duration}).in_si("run.duration", duration)
+        # The window of the case may be longer.
+        duration = case.with_({"run": {}}).in_si("run.duration", duration)
     if duration is not None and not 0 < number("duration", duration) < np.inf:
         raise SeparatrixError(f"duration: found {duration}, allowed more than 0", USAGE)
     if samples is not None and not number("samples", samples) >= 2:

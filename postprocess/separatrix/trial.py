@@ -15,7 +15,7 @@ from typing import TypeVar
 from separatrix.errors import SeparatrixError
 
 # why what is tried is not read
-CASE_GIVEN = "found a case, allowed is a result; `separatrix basin` makes one of a case"
+CASE_GIVEN = "found a case, allowed a result; `separatrix basin` makes one of a case"
 # Processor time of a loop [s]; what is tried takes milliseconds.
 _LONGEST = 2
 # the same of a whole file: at least, and per byte

@@ -8,11 +8,12 @@ module capture
   use machine_facts, only: rest_lasts
   use motion, only: motion_t
   use motion_state, only: tally_t
+  use rest_sets, only: rest_set_of
   use strobe, only: advance_to_section, copy_of, section_point, speed_number, stays_clear, strobe_t, turn_point
   implicit none
   private
 
-  public :: captor_of, stays_in_family
+  public :: captor_of, captor_of_point, stays_in_family
 
 contains
 
@@ -28,12 +29,24 @@ contains
     integer :: reason
     found = 0
     if (size(catalogue) == 0) return
-    found = find_capture(catalogue, section_point(moving, strobe), slipped .or. .not. rest_lasts(moving))
+    found = captor_of_point(moving, catalogue, section_point(moving, strobe), slipped .or. .not. rest_lasts(moving))
     if (found > 0 .or. .not. any(catalogue%by_event)) return
     later = copy_of(strobe)
     call advance_to_section(moving, later, unused, reason)
     if (reason == 0) found = find_capture(catalogue, turn_point(moving, later), .true., by_event=.true.)
   end function captor_of
+
+  !> The same of a section point; of one at rest the positions of rest to which it belongs come first.
+  pure integer function captor_of_point(moving, catalogue, point, slipped) result(found)
+    type(motion_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    real(wp), intent(in) :: point(:)
+    logical, intent(in) :: slipped
+    found = find_capture(catalogue, point, slipped)
+    if (found == 0) return
+    if (catalogue(found)%rests) found = rest_set_of(moving, catalogue, point)
+    if (found == 0) found = find_capture(catalogue, point, .true.)
+  end function captor_of_point
 
   !> Whether a motion on the section, with what was counted since its window began, has settled at one of a family of cycles, each
   !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left

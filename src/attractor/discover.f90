@@ -7,7 +7,7 @@ module discover
   use aperiodic, only: add_aperiodic, meets_chaos, outlast, tell_family, watch_long
   use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_not_known, kind_rest, longest_period, &
     make_points, most_coordinates, regime_at_rest, regime_non_impact
-  use capture, only: captor_of
+  use capture, only: captor_of, captor_of_point
   use circle, only: point_near
   use contact_law, only: contact_t
   use cycle, only: map_point, refine_cycle
@@ -70,7 +70,7 @@ contains
         if (stretch%known .or. .not. stretch%ok) exit
         call identify(moving, strobe, stretch%returns, max_period, found, ok)
         if (ok) then
-          if (.not. holds(catalogue, found)) catalogue = [catalogue, found]
+          if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
         if (find_box(catalogue, section_point(moving, strobe), stretch%regime) > 0) exit
@@ -98,7 +98,7 @@ contains
     if (is_linear(moving) .and. stretch%regime == regime_non_impact) then
       call motion_without_impact(moving, found, ok)
       if (ok) then
-        if (.not. holds(catalogue, found)) catalogue = [catalogue, found]
+        if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
         return
       end if
     end if
@@ -110,7 +110,7 @@ contains
       if (known .or. .not. ok) return
       call identify(moving, strobe, returns, max_period, cycle_found, ok)
       if (ok) then
-        if (.not. holds(catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
+        if (.not. holds(moving, catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
         return
       end if
       if (.not. has_no_clock(moving)) call tell_family(moving, strobe, stretch%amplitude, min(max_period, longest_period), found)
@@ -238,12 +238,15 @@ contains
   end subroutine recognise_by_event
 
   !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
-  pure logical function holds(catalogue, found)
+  pure logical function holds(moving, catalogue, found)
+    type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:), found
     if (found%any_place) then
       holds = find_box(catalogue, [spread(0.0_wp, 1, found%places), found%points(:, 1)], found%features%regime) > 0
+    else if (found%by_event) then
+      holds = find_capture(catalogue, found%points(:, 1), .true., by_event=.true.) > 0
     else
-      holds = find_capture(catalogue, found%points(:, 1), .not. found%rests, found%by_event) > 0
+      holds = captor_of_point(moving, catalogue, found%points(:, 1), .not. found%rests) > 0
     end if
   end function holds
 

@@ -78,8 +78,15 @@ contains
         (a%by_event .neqv. b%by_event)) return
     if ((a%kind == kind_family) .neqv. (b%kind == kind_family)) return
     if (abs(a%features%rotation - b%features%rotation) > 0 .and. a%period > 0) return
-    if (a%rests .or. a%period == 0) then
+    if (a%period == 0) then
       distance = 0
+      return
+    end if
+    if (a%rests) then
+      ! The nearest positions of rest, however far: they have no size of their own.
+      associate (away => norm2(point_near(b%points(:n, 1), a%points(:n, 1), a%turn) - a%points(:n, 1)))
+        distance = farthest*away/(1 + away)
+      end associate
       return
     end if
     do i = 1, b%period

@@ -3,6 +3,7 @@
 
 !> What must hold between the values of a case, here and for every combination of its axes.
 module case_check
+  use angle_units, only: unit_of
   use axis, only: axis_t
   use build_jointed, only: is_jointed
   use build_motion, only: machine_of
@@ -17,6 +18,7 @@ module case_check
   use law_table, only: effect_family, families, law_choice_t
   use motion, only: motion_t
   use motion_state, only: options_t
+  use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
   use strobe, only: start_is_allowed
   use text, only: to_text
@@ -289,7 +291,7 @@ contains
     character(len=:), allocatable :: problem, upper_key, lower_key
     character(len=*), parameter :: second_key = 'effect.second_barrier.position'
     character(len=*), parameter :: driver_key = 'body.driver_x0'
-    character(len=:), allocatable :: from_driver
+    character(len=:), allocatable :: from_driver, unit
     real(wp) :: upper, lower, second, driver(2)
     integer :: i
     problem = ''
@@ -321,10 +323,11 @@ contains
       upper = second
       upper_key = second_key
     end if
-    if (x - driver(1) > upper) problem = 'found x0 = '//to_text(x)//' m, allowed at most the barrier '//upper_key//' = '// &
-                                         to_text(upper)//' m'//from_driver
-    if (x - driver(2) < lower) problem = 'found x0 = '//to_text(x)//' m, allowed at least the barrier '//lower_key//' = '// &
-                                         to_text(lower)//' m'//from_driver
+    unit = ' '//unit_of('m', position_is_angle(the_case%laws))
+    if (x - driver(1) > upper) problem = 'found x0 = '//to_text(x)//unit//', allowed at most the barrier '//upper_key//' = '// &
+                                         to_text(upper)//unit//from_driver
+    if (x - driver(2) < lower) problem = 'found x0 = '//to_text(x)//unit//', allowed at least the barrier '//lower_key//' = '// &
+                                         to_text(lower)//unit//from_driver
   end function beyond
 
   !> A basin needs two axes or more. Code 65.

@@ -8,15 +8,16 @@ module case_parameters
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
-    path_of, split_element
+    part_family, path_of, split_element
+  use part_angles, only: is_of_angle
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
   private
 
-  public :: canonical_name, is_start, find_parameter, parameter_bounds, &
-    parameter_names, parameter_value, set_parameter, row_bounds
+  public :: canonical_name, find_parameter, is_of_position, is_start, parameter_bounds, parameter_names, parameter_value, &
+    row_bounds, set_parameter
 
 contains
 
@@ -60,11 +61,19 @@ contains
     end do
   end subroutine find_parameter
 
-  !> Bounds and unit of a row of the law table.
-  pure type(bounds_t) function row_bounds(row)
+  !> Bounds and unit of a row of the law table, where a position is an angle or not.
+  pure type(bounds_t) function row_bounds(row, is_angle)
     type(parameter_row_t), intent(in) :: row
+    logical, intent(in) :: is_angle
     row_bounds = bounds_t(lower=row%range%lower, upper=row%range%upper, lower_open=row%range%lower_open, unit=row%unit)
+    if (is_of_position(row)) row_bounds%unit = unit_of(row%unit, is_angle)
   end function row_bounds
+
+  !> Whether a parameter is a position or a velocity.
+  pure logical function is_of_position(row)
+    type(parameter_row_t), intent(in) :: row
+    is_of_position = row%unit == 'm' .or. row%unit == 'm/s'
+  end function is_of_position
 
   !> Bounds and unit of the parameter `path`; `found` is false if there is none.
   pure subroutine parameter_bounds(laws, path, bounds, found)
@@ -87,7 +96,11 @@ contains
       found = law > 0
       if (.not. found) return
       rows = parameters_of(laws(law)%family, laws(law)%name)
-      bounds = row_bounds(rows(row))
+      if (laws(law)%family == part_family) then
+        bounds = row_bounds(rows(row), is_of_angle(laws, law))
+      else
+        bounds = row_bounds(rows(row), position_is_angle(laws))
+      end if
     end select
   end subroutine parameter_bounds
 

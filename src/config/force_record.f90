@@ -36,7 +36,7 @@ contains
     if (allocated(error)) then
       problem = error%message
     else if (first_bad_byte(text) > 0) then
-      problem = path//': found a byte that is no text, allowed is UTF-8'
+      problem = path//': found a byte that is no text, allowed UTF-8'
     end if
     if (allocated(problem)) return
     number = 0

@@ -3,6 +3,7 @@
 
 !> What must hold between the values of one choice of laws.
 module law_check
+  use angle_units, only: unit_of
   use build_jointed, only: is_jointed, jointed_of
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
@@ -16,6 +17,7 @@ module law_check
   use lever_reach, only: check_assembly
   use oscillator, only: refuse_pair
   use pair, only: build_pair, is_pair, pair_t
+  use restoring_law, only: position_is_angle
   use text, only: to_text
   implicit none
   private
@@ -79,6 +81,7 @@ contains
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: at
+    character(len=:), allocatable :: unit
     real(wp) :: upper, lower, tension
     tension = parameter_value(laws, 'contact.tension', 1.0_wp)
     if (tension > 0 .and. tension < 1) call report(source, 'contact.tension', 'found '//to_text(tension)//', allowed 0 or 1'//at)
@@ -89,8 +92,8 @@ contains
       call report(source, 'contact.law', 'found "'//trim(laws(contact_law)%name)// &
                   '" without a barrier, allowed with upper, lower or both')
     else if (lower > upper) then
-      call report(source, 'contact.lower', 'found '//to_text(lower)//' m, allowed at most upper = '// &
-                  to_text(upper)//' m'//at)
+      unit = ' '//unit_of('m', position_is_angle(laws))
+      call report(source, 'contact.lower', 'found '//to_text(lower)//unit//', allowed at most upper = '//to_text(upper)//unit//at)
     end if
   end subroutine check_barriers
 

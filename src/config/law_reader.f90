@@ -3,9 +3,9 @@
 
 !> The tables [body], [restoring], [friction], [contact], [drive] and [effect.NAME], read by the law table.
 module law_reader
-  use case_parameters, only: find_parameter, row_bounds
+  use case_parameters, only: find_parameter
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
-  use case_values, only: take_real, take_reals, take_text
+  use case_values, only: take_text
   use drive_law, only: ends_with_its_first
   use force_record, only: read_force
   use kinds, only: wp
@@ -15,6 +15,8 @@ module law_reader
   use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, &
     parameter_row_t, parameters_of, set_value, table_of
   use pair_rows, only: pair_laws
+  use restoring_law, only: position_is_angle
+  use row_reader, only: take_row
   use suggest, only: nearest_word
   use text, only: join
   use toml_bindings, only: toml_string
@@ -35,7 +37,7 @@ contains
     allocate (choices(size(families)))
     if (has_parts(source)) then
       choices(1) = law_choice('body', 'structure')
-      if (.not. is_table(source, 'body.in_sequence')) call read_parameters(source, choices(1))
+      if (.not. is_table(source, 'body.in_sequence')) call read_parameters(source, .false., choices(1))
       do i = 2, size(families)
         choices(i) = law_choice(families(i), 'none')
       end do
@@ -43,11 +45,11 @@ contains
       call read_parts(source, choices)
       return
     end if
-    call read_law(source, 'body', '', choices(1))
+    call read_law(source, 'body', '', .false., choices(1))
     body = choices(1)%name
     if (has_problems(source, 'body.law')) body = ''
     do i = 2, size(families)
-      call read_law(source, trim(families(i)), body, choices(i))
+      call read_law(source, trim(families(i)), body, position_is_angle(choices(:i - 1)), choices(i))
     end do
     call resolve_static_friction(choices)
     call read_effects(source, choices)
@@ -67,7 +69,7 @@ contains
       choice = law_choice(effect_family, trim(laws(i)%name))
       call enter_table(source, table_of(effect_family, laws(i)%name), found)
       if (found) then
-        call read_parameters(source, choice)
+        call read_parameters(source, position_is_angle(choices), choice)
         choices = [choices, choice]
       else
         rows = parameters_of(effect_family, laws(i)%name)
@@ -78,10 +80,12 @@ contains
     end do
   end subroutine read_effects
 
-  !> The law of a family beside the law `body` of [body], '' if that is not known.
-  subroutine read_law(source, family, body, choice)
+  !> The law of a family beside the law `body` of [body], '' if that is not known; the laws before it make a position an angle
+  !> or not.
+  subroutine read_law(source, family, body, is_angle, choice)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: family, body
+    logical, intent(in) :: is_angle
     type(law_choice_t), intent(out) :: choice
     character(len=:), allocatable :: name, default, names
     integer :: at
@@ -113,7 +117,7 @@ contains
       call know_all_below(source, family)
     else
       choice = law_choice(family, name)
-      call read_parameters(source, choice)
+      call read_parameters(source, is_angle, choice)
     end if
   end subroutine read_law
 
@@ -159,11 +163,11 @@ contains
     if (len(meant) > 0) text = ' (did you mean "'//meant//'"?)'
   end function hint
 
-  subroutine read_parameters(source, choice)
+  subroutine read_parameters(source, is_angle, choice)
     type(case_source_t), intent(inout) :: source
+    logical, intent(in) :: is_angle
     type(law_choice_t), intent(inout) :: choice
     type(parameter_row_t), allocatable :: rows(:)
-    character(len=:), allocatable :: path
     integer :: i
     logical :: from_file
     rows = parameters_of(choice%family, choice%name)
@@ -172,14 +176,7 @@ contains
     if (any(rows%name == 'ratio')) call refuse_frequency(source, choice%name, rows)
     do i = 1, size(rows)
       if (from_file .and. (rows(i)%name == 'interval' .or. rows(i)%name == 'force')) cycle
-      path = table_of(rows(i)%family, rows(i)%law)//'.'//trim(rows(i)%name)
-      if (rows(i)%list) then
-        call take_reals(source, path, row_bounds(rows(i)), choice%parameters(i)%values, &
-                        required=.not. rows(i)%optional)
-      else
-        call take_real(source, path, row_bounds(rows(i)), choice%parameters(i)%values(1), &
-                       required=.not. rows(i)%optional)
-      end if
+      call take_row(source, table_of(rows(i)%family, rows(i)%law), rows(i), is_angle, choice%parameters(i)%values)
     end do
     if (choice%name == 'measured_force' .and. find(source, 'drive.periodic') == 0) then
       call set_value(choice, 'periodic', [merge(0.0_wp, 1.0_wp, ends_with_its_first(list_of(choice, 'force')))])

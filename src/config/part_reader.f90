@@ -4,14 +4,16 @@
 !> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME],
 !> [contact.NAME], [drive.NAME] and [watch].
 module part_reader
-  use case_parameters, only: row_bounds
+  use case_parameters, only: is_of_position
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
-  use case_values, only: take_real, take_reals, take_text
+  use case_values, only: take_text
   use drive_record, only: read_record
   use kinds, only: wp
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
-    parameters_of, part_family, part_kind, part_law, set_value, value_of
+    parameters_of, part_family, part_kind, part_law, path_of, set_value, value_of
+  use part_angles, only: is_of_angle
   use part_names, only: check_columns, check_names, ground, names_of
+  use row_reader, only: take_row
   use structure_reader, only: read_structure
   use suggest, only: nearest_word
   use text, only: join, number_in, to_text
@@ -89,7 +91,24 @@ contains
       end do
       choices = [choices, structures]
     end do
+    call read_positions(source, choices)
   end subroutine read_parts
+
+  !> Positions and velocities of the parts, once all joints tell which of them are angles.
+  subroutine read_positions(source, choices)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(inout) :: choices(:)
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i, k
+    do i = 1, size(choices)
+      if (choices(i)%family /= part_family .or. .not. any(kinds_of_parts == part_kind(choices(i)%name))) cycle
+      rows = parameters_of(choices(i)%family, choices(i)%name)
+      do k = 1, size(rows)
+        if (is_hidden(rows(k)) .or. .not. is_of_position(rows(k))) cycle
+        call take_row(source, path_of(choices(i)), rows(k), is_of_angle(choices, i), choices(i)%parameters(k)%values)
+      end do
+    end do
+  end subroutine read_positions
 
   !> Keys of a table without the name of a part, as one body has them.
   subroutine refuse_keys(source, kind)
@@ -174,14 +193,8 @@ contains
     if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
-      if (is_hidden(rows(i)) .or. from_record) cycle
-      if (rows(i)%list) then
-        call take_reals(source, path//'.'//trim(rows(i)%name), row_bounds(rows(i)), choice%parameters(i)%values, &
-                        required=.not. rows(i)%optional)
-      else
-        call take_real(source, path//'.'//trim(rows(i)%name), row_bounds(rows(i)), choice%parameters(i)%values(1), &
-                       required=.not. rows(i)%optional)
-      end if
+      if (is_hidden(rows(i)) .or. from_record .or. is_of_position(rows(i))) cycle
+      call take_row(source, path, rows(i), .false., choice%parameters(i)%values)
     end do
     if (kind == 'friction') then
       ! Break-away friction that is not given equals sliding friction.

@@ -177,9 +177,9 @@ contains
       found = found//trim(grid%axes(i)%name)
     end do
     if (allocated(grid%drawn)) then
-      call fail(error, exit_bad_case, "'"//path//"': found starts drawn at random, allowed is a map over two axes of starts")
+      call fail(error, exit_bad_case, "'"//path//"': found starts drawn at random, allowed a map over two axes of starts")
     else if (any(axes == 0)) then
-      call fail(error, exit_bad_case, "'"//path//"': found the axes "//found//', allowed is a map over two axes of starts')
+      call fail(error, exit_bad_case, "'"//path//"': found the axes "//found//', allowed a map over two axes of starts')
     else if (.not. (any(grid%start_axis == axes(1)) .and. any(grid%start_axis == axes(2)))) then
       call fail(error, exit_bad_case, "'"//path//"': found the axes "//found//', allowed are two axes of starts (x0, v0, '// &
                 'crank_angle, ...) and any others: between two values of a parameter lie other machines with other attractors')

@@ -52,7 +52,7 @@ contains
     name = canonical_name(command%free)
     call parameter_bounds(the_case%laws, name, bounds, found)
     if (.not. found .or. is_start(name) .or. name == search%family%path) then
-      call fail(error, exit_bad_case, "--free: found '"//name//"', allowed is another one of "//parameter_names(the_case%laws))
+      call fail(error, exit_bad_case, "--free: found '"//name//"', allowed another one of "//parameter_names(the_case%laws))
       return
     end if
     given = [command%has_free_from, command%has_free_to]
@@ -73,7 +73,7 @@ contains
     curves%value = parameter_value(the_case%laws, name, 0.0_wp)
     if (.not. (range(1) < range(2) .and. range(1) <= curves%value .and. curves%value <= range(2))) then
       call fail(error, exit_bad_case, '--free-from, --free-to: found '//to_text(range(1))//' and '//to_text(range(2))// &
-                ', allowed is a range that rises and holds '//name//' = '//to_text(curves%value)//' of the case')
+                ', allowed a range that rises and holds '//name//' = '//to_text(curves%value)//' of the case')
       return
     end if
     curves%plan = curve_plan_t(name, [search%plan%lowest, range(1)], [search%plan%highest, range(2)])

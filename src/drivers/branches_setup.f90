@@ -70,7 +70,7 @@ contains
     end do
     if (.not. range(1) < range(2)) then
       call fail(error, exit_bad_case, '--from, --to: found '//to_text(range(1))//' and '//to_text(range(2))// &
-                ', allowed is a range that rises')
+                ', allowed a range that rises')
       return
     end if
     search%plan%lowest = range(1)

@@ -122,8 +122,12 @@ contains
           line = line//', period '//to_text(attractor%period)
         end if
       end select
-      line = line//', amplitude '//range_text(attractors%features%amplitude, 5)//' '//unit_of('m', is_angle)//', '// &
-             to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
+      if (attractor%rests) then
+        line = line//', x = '//to_text(attractor%section(1), 5)//' '//unit_of('m', is_angle)
+      else
+        line = line//', amplitude '//range_text(attractors%features%amplitude, 5)//' '//unit_of('m', is_angle)
+      end if
+      line = line//', '//to_text(attractor%features%impacts_per_period, 4)//' impacts per period'
       if (attractor%kind == kind_cycle .and. abs(attractor%features%rotation) > 0) then
         line = line//', rotation number '//to_text(attractor%features%rotation, 4)
       end if

@@ -130,7 +130,7 @@ contains
     else if (command%name == 'points' .and. len(command%list) == 0) then
       call fail(error, exit_usage, 'points: --list ICS.csv is missing')
     else if (command%name == 'stability' .and. command%periods < 64) then
-      call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed is a whole number from 64')
+      call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed a whole number from 64')
     else if (command%name == 'branches' .and. len(command%parameter) == 0) then
       call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
     else if (len(command%free) == 0 .and. (command%has_free_from .or. command%has_free_to)) then
@@ -267,7 +267,7 @@ contains
       call read_number_in(name, value, tiny(1.0_wp), huge(1.0_wp), 'seconds', command%progress, error)
     case ('--device')
       command%device = value
-      if (.not. any(devices == value)) call fail(error, exit_usage, name//": found '"//value//"', allowed is "//join(devices, ', '))
+      if (.not. any(devices == value)) call fail(error, exit_usage, name//": found '"//value//"', allowed "//join(devices, ', '))
     case ('--ranks-per-node')
       call read_integer(name, value, 1, command%ranks_per_node, error)
     case ('--sample')
@@ -319,7 +319,7 @@ contains
     if (slash > 0) call read_integer('--shard', value(:slash - 1), 1, command%shard, error)
     if (slash > 0 .and. .not. allocated(error)) call read_integer('--shard', value(slash + 1:), 1, command%shard_count, error)
     if (slash == 0 .or. allocated(error) .or. command%shard > command%shard_count) then
-      call fail(error, exit_usage, "--shard: found '"//value//"', allowed is I/N with whole numbers from 1/1 to N/N")
+      call fail(error, exit_usage, "--shard: found '"//value//"', allowed I/N with whole numbers from 1/1 to N/N")
     end if
   end subroutine read_shard
 
@@ -361,7 +361,7 @@ contains
     range = ' from '//to_text(lowest)//' to '//to_text(highest)
     if (highest >= huge(highest)) range = ' above 0'
     if (lowest <= -huge(lowest)) range = ''
-    call fail(error, exit_usage, name//": found '"//value//"', allowed is a number of "//unit//range)
+    call fail(error, exit_usage, name//": found '"//value//"', allowed a number of "//unit//range)
   end subroutine read_number_in
 
   subroutine read_integer(name, value, least, number, error, most)
@@ -380,7 +380,7 @@ contains
     end if
     call parse_integer(value, number, status)
     if (status /= 0 .or. number < least .or. number > largest) then
-      call fail(error, exit_usage, name//": found '"//value//"', allowed is a whole number"//range)
+      call fail(error, exit_usage, name//": found '"//value//"', allowed a whole number"//range)
     end if
   end subroutine read_integer
 

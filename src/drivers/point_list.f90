@@ -3,6 +3,7 @@
 
 !> Reads a list of starts: CSV with a header of x0, v0 and optionally ratio and the starts of further bodies, in any order.
 module point_list
+  use angle_units, only: unit_of
   use axis, only: name_length
   use case_parameters, only: parameter_bounds
   use case_values, only: bounds_t
@@ -12,6 +13,7 @@ module point_list
   use kinds, only: int64, wp
   use law_table, only: is_start_parameter, law_choice_t
   use output_check, only: is_folder
+  use restoring_law, only: position_is_angle
   use status, only: exit_bad_case, exit_no_input
   use text, only: parse_number, replace_all, starts_with, to_text
   use toml_bindings, only: first_bad_byte, read_text_file
@@ -61,7 +63,7 @@ contains
     from = first_bad_byte(text)
     if (from > 0) then
       call fail(error, exit_bad_case, path//':'//to_text(1 + count_lines(text(:from - 1)))// &
-                ': found a byte that is no text, allowed is UTF-8')
+                ': found a byte that is no text, allowed UTF-8')
       return
     end if
     number = 0
@@ -78,7 +80,8 @@ contains
         call read_header(path, number, line, laws, columns, list%names, width, error)
         if (.not. allocated(error)) list%further = reshape([real(wp) ::], [size(list%names), 0])
       else
-        call read_row(path, number, line, columns, list%names, width, default_ratio, contact, row, error)
+        call read_row(path, number, line, columns, list%names, width, default_ratio, contact, ' '//unit_of('m', &
+          position_is_angle(laws)), row, error)
         if (.not. allocated(error)) call append(list, row)
       end if
       if (allocated(error)) exit
@@ -157,12 +160,13 @@ contains
 
   end subroutine read_header
 
-  subroutine read_row(path, number, line, columns, further, width, default_ratio, contact, row, error)
+  subroutine read_row(path, number, line, columns, further, width, default_ratio, contact, unit, row, error)
     character(len=*), intent(in) :: path, line
     integer, intent(in) :: number, columns(:), width
     character(len=*), intent(in) :: further(:)
     real(wp), intent(in) :: default_ratio
     type(contact_t), intent(in) :: contact
+    character(len=*), intent(in) :: unit
     real(wp), allocatable, intent(out) :: row(:)
     type(error_t), allocatable, intent(out) :: error
     character(len=name_length) :: names(size(columns))
@@ -181,30 +185,31 @@ contains
       word = field(line, columns(k))
       call parse_number(word, row(k), status)
       if (status /= 0) then
-        call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed is a finite number")
+        call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed a finite number")
         return
       end if
     end do
     if (beyond_barrier(contact, row(1))) then
-      call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))// &
-                ' m, allowed is '//between_barriers(contact))
+      call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))//unit// &
+                ', allowed '//between_barriers(contact, unit))
     else if (columns(3) > 0 .and. .not. row(3) > 0) then
-      call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed is a number above 0')
+      call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed a number above 0')
     else if (columns(3) > 0 .and. .not. default_ratio > 0) then
       call fail(error, exit_bad_case, where_found//'ratio: the drive of the case has no ratio')
     end if
   end subroutine read_row
 
-  pure function between_barriers(contact) result(words)
+  pure function between_barriers(contact, unit) result(words)
     type(contact_t), intent(in) :: contact
+    character(len=*), intent(in) :: unit
     character(len=:), allocatable :: words
     real(wp) :: barriers(2)
     barriers = barrier_positions(contact)
     words = ''
-    if (barriers(2) > -unreachable) words = 'at least the lower barrier '//to_text(barriers(2))//' m'
+    if (barriers(2) > -unreachable) words = 'at least the lower barrier '//to_text(barriers(2))//unit
     if (barriers(1) > unreachable) return
     if (len(words) > 0) words = words//', '
-    words = words//'at most the upper barrier '//to_text(barriers(1))//' m'
+    words = words//'at most the upper barrier '//to_text(barriers(1))//unit
   end function between_barriers
 
   pure integer function count_fields(line)

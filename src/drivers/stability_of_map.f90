@@ -107,7 +107,7 @@ contains
     if (allocated(error)) return
     if (kind /= 'basin' .or. .not. reader%has('/catalogue/period')) then
       call fail(error, exit_bad_case, ''''//reader%path//''' is a file of kind '//kind// &
-                ', allowed is a map (basin) with a catalogue, or a case')
+                ', allowed a map (basin) with a catalogue, or a case')
       return
     end if
     call reader%read_text('/provenance/resolved_case', resolved, error)

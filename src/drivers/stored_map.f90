@@ -82,7 +82,7 @@ contains
     call reader%close(ignored)
     if (allocated(error)) return
     if (kind /= 'basin') then
-      call fail(error, exit_bad_case, "'"//path//"': found a file of the kind '"//kind//"', allowed is a map that basin wrote")
+      call fail(error, exit_bad_case, "'"//path//"': found a file of the kind '"//kind//"', allowed a map that basin wrote")
     else if (nint(complete) /= 1) then
       call fail(error, exit_resumable, "'"//path//"' is not complete: go on with the run that writes it")
     else

@@ -94,7 +94,7 @@ contains
     else if (is_folder(path)) then
       call fail(error, exit_no_input, ''''//path//''' is a folder')
     else if (is_text(path)) then
-      call fail(error, exit_bad_case, ''''//path//''' is a text, allowed is '//allowed)
+      call fail(error, exit_bad_case, ''''//path//''' is a text, allowed '//allowed)
     end if
     if (allocated(error)) return
     call h5_open(path, reader%file, error)

@@ -8,7 +8,7 @@ module part_angles
   implicit none
   private
 
-  public :: names_of_angles, watched_is_angle
+  public :: is_of_angle, names_of_angles, watched_is_angle
 
 contains
 
@@ -40,6 +40,24 @@ contains
     names = pack(choices%label, [(is_place(choices(i)), i=1, size(choices))])
     names = pack(names, are_angles(choices))
   end function names_of_angles
+
+  !> Whether the positions that a part (number `part` of the choices) has or acts on are angles.
+  pure logical function is_of_angle(choices, part)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: part
+    logical, allocatable :: angles(:)
+    integer :: ends(2), i
+    angles = are_angles(choices)
+    ends = 0
+    if (is_place(choices(part))) then
+      ends(1) = count([(is_place(choices(i)), i=1, part)])
+    else if (is_joint(choices(part))) then
+      ends = nint([value_of(choices(part), 'first_end'), value_of(choices(part), 'second_end')])
+    else if (index(choices(part)%name, 'drive:') == 1) then
+      ends(1) = nint(value_of(choices(part), 'body'))
+    end if
+    is_of_angle = any(angles(pack(ends, ends > 0 .and. ends <= size(angles))))
+  end function is_of_angle
 
   !> Whether the position that the start and the results refer to is an angle.
   pure logical function watched_is_angle(choices) result(is_angle)

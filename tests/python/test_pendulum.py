@@ -130,3 +130,43 @@ def test_a_sweep_counts_the_turns(run, source_dir, separatrix, tmp_path):
         assert (np.abs(file["rotation_number"][:]) == 1).all()
         assert (file["period"][:] == 1).all()
         assert (np.abs(file["strobe_x"][:]) <= np.pi).all()
+
+
+STOPS = """
+[contact.stops]
+law = "newton"
+between = ["first"]
+lower = "{0}"
+upper = "45 {1}"
+restitution = 0.5
+"""
+
+
+def test_stops_of_an_angle_are_angles(separatrix, tmp_path):
+    """Also those of a body that a spring joins to a pendulum, and of one body alone; a length is rejected."""
+    (tmp_path / "case.toml").write_text(PARTS + STOPS.format("-0.7 rad", "deg").replace("first", "second"))
+    run = [separatrix, "trajectory", "case.toml", "--dry-run"]
+    subprocess.run(run, check=True, cwd=tmp_path)
+    (tmp_path / "case.toml").write_text(PARTS + STOPS.format("-0.7 rad", "mm"))
+    ended = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True)
+    assert ended.returncode == 65
+    assert "'contact.stops.upper': found \"45 mm\", allowed a number in rad" in ended.stderr
+
+
+def test_an_axis_of_stops_of_one_body_is_an_angle(separatrix, source_dir):
+    case = source_dir / "examples" / "basin_pendulum.toml"
+    stop = [
+        'contact.law="newton"',
+        'contact.upper="90 deg"',
+        "contact.restitution=0.5",
+        "run.duration=10",
+        "run.window=9.5",
+    ]
+    axis = ['axis[1].name="contact.upper"', 'axis[1].from="80 deg"', 'axis[1].to="{}"']
+    for end, code in [("90 deg", 0), ("90 mm", 65)]:
+        options = [word for one in (*stop, *axis) for word in ("--set", one.format(end))]
+        ended = subprocess.run(
+            [separatrix, "basin", case, "--dry-run", *SMALL, *options], capture_output=True, text=True
+        )
+        assert ended.returncode == code, ended.stderr
+    assert "'axis[1].to': found \"90 mm\", allowed a number in rad" in ended.stderr

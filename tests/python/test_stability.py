@@ -172,7 +172,7 @@ def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tm
     subprocess.run([separatrix, "trajectory", case, "-o", target, "-q"], check=True)
     ended = subprocess.run([separatrix, "stability", target], capture_output=True, text=True, check=False)
     assert ended.returncode == 65
-    assert "allowed is a map (basin) with a catalogue, or a case" in ended.stderr
+    assert "allowed a map (basin) with a catalogue, or a case" in ended.stderr
     (tmp_path / "torn.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 50)
     ended = subprocess.run(
         [separatrix, "stability", tmp_path / "torn.h5"], capture_output=True, text=True, check=False

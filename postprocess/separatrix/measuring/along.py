@@ -132,7 +132,7 @@ def _map_of(
 def _parameter(result: xr.Dataset, parameter: str | None, chosen: Mapping[str, float] | None) -> str:
     if result.separatrix.kind != "basin" or "attractor" not in result:
         raise SeparatrixError(
-            "measures_along: found no map of attractors, allowed is the result of basin", USAGE
+            "measures_along: found no map of attractors, allowed the result of basin", USAGE
         )
     fixed = {key.replace(".", "_") for key in chosen or {}}
     free = [str(name) for name in result["attractor"].dims if not is_start(str(name)) and name not in fixed]

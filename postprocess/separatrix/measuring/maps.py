@@ -116,7 +116,7 @@ def slice_of(
 
 def _require_map(result: xr.Dataset) -> None:
     if result.separatrix.kind != "basin" or "attractor" not in result:
-        raise SeparatrixError("measures: found no map of attractors, allowed is the result of basin", USAGE)
+        raise SeparatrixError("measures: found no map of attractors, allowed the result of basin", USAGE)
     if "sample" in result["attractor"].dims:
         raise SeparatrixError(
             "measures: this map has starts drawn at random: it has basin_stability alone", USAGE

@@ -15,6 +15,7 @@ module fuzz_targets
   use hdf5, only: h5close_f
   use info_driver, only: run_info
   use kinds, only: int64, wp
+  use law_table, only: law_choice_t
   use map_file, only: create_working, map_file_t, open_working
   use map_schema, only: schema_t, type_float32, type_int8
   use motion, only: motion_t
@@ -104,8 +105,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(point_list_t) :: list
     type(contact_t) :: contact
+    type(law_choice_t) :: laws(0)
     contact%upper = 1.1_wp
-    call read_point_list(path, 1.2_wp, contact, list, error)
+    call read_point_list(path, 1.2_wp, contact, laws, list, error)
   end subroutine read_points
 
   !> The record of a force, as a case names it.
