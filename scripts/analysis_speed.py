@@ -134,14 +134,15 @@ def integrity(shell: Shell) -> Figure:
 
 PAGE = """# Time of the analysis
 
-Written by `scripts/analysis_speed.py`; do not edit. One core, release build; *processor*: seconds of one core
-that the work takes, which other work on the machine changes little; *wall*: on this machine as it was.
+Written by `scripts/analysis_speed.py`; do not edit. The release build runs on one core. The column
+*processor* is the CPU time, which other work on the machine hardly affects; *wall* is the elapsed time
+under the given load.
 {machine}
 
 {rows}
 
-A row above its bar is marked. The spectrum is gathered from 16 motions on the same attractor, side by side in
-vectors; its transient is flown event by event.
+A row above its limit is marked. The spectrum is accumulated over 16 motions on the same attractor, computed
+together in vectors; its transient is computed event by event.
 """
 
 
@@ -173,7 +174,7 @@ def main() -> None:
         ]
         for one in found
     ]
-    rows = table(["work", "machine", "size", "processor", "wall", "bar"], rows)
+    rows = table(["work", "machine", "size", "processor", "wall", "limit"], rows)
     if options.print:
         sys.stdout.write(rows + "\n")
         return

@@ -279,7 +279,7 @@ def refusals(program: Path) -> tuple[list[list[str]], list[str]]:
         # from there, so that the page names no folder of the machine
         ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=SOURCE)
         said = ended.stderr.strip().removeprefix("separatrix: ")
-        lines.append([f"`{name}`", said])
+        lines.append([f"`{name}`", f"`{said}`"])
         if ended.returncode != 65 or "\n" in said:
             wrong.append(f"{name}: code {ended.returncode}")
     return lines, wrong
@@ -287,27 +287,36 @@ def refusals(program: Path) -> tuple[list[list[str]], list[str]]:
 
 PAGE = """# Branches of every example
 
-Written by `scripts/branch_checks.py`; do not edit. Each example is followed over a parameter twice,
-from orbits at different values. *Multiplier*: how far one is from +1 at an `SN` or `BP`, from -1 at
-a `PD`, from the unit circle at an `NS`, at most. *Product*: of the multipliers, less what damping
-and impacts make of it, where that has a formula and no multiplier is above {calm:g}. *Apart*: the
-labels of the two runs (how many both found; how many only one: what is found depends on the
-starts). CPU seconds of the first run. Bars: {bars}.
+Written by `scripts/branch_checks.py`; do not edit. Each example is followed over a parameter twice, starting
+from orbits at different values. The columns are:
+
+* *multiplier*: largest distance of a multiplier from +1 at an `SN` or `BP`, from -1 at a `PD`, and from the
+  unit circle at an `NS`;
+* *product*: difference between the product of the multipliers and its value from damping and impacts, for
+  cycles of period 1 and of longer periods. It is empty if no formula exists, and excludes points with a
+  multiplier above {calm:g};
+* *apart*: distance between the labels of the two runs. In parentheses: the number of labels that both runs
+  found, and the number that only one found. The second number depends on the initial orbits;
+* *s*: CPU time of the first run in seconds.
+
+Tolerances: {bars}.
 
 {cases}
 
 ## Jumps of the sweeps
 
-The brackets that `sweep` finds and the labels of the branches in them. A run down loses its chaos after a
-transient, not at an orbit: such a bracket has a label only by chance.
+The table lists the brackets that `sweep` finds, and the labels of the branches inside them. In a downward
+sweep chaos ends after a transient, not at an orbit; such a bracket contains a label only by chance.
 
 {jumps}
 
-## Not followed
+## Examples that are not followed
+
+The command `branches` rejects these examples with the message in the table.
 
 {refused}
 
-## Not as it must be
+## Failed checks
 
 {wrong}
 """
@@ -345,8 +354,8 @@ def main() -> None:
         bars=", ".join(f"{name} {bar:g}" for name, bar in BARS.items()),
         cases=table(head, lines),
         jumps=table(["example", "limit", "bracket", "labels in it"], brackets),
-        refused=table(["example", "what the program says"], refused),
-        wrong="\n".join(f"* {item}" for item in wrong) if wrong else "Nothing.",
+        refused=table(["example", "message of the program"], refused),
+        wrong="\n".join(f"* {item}" for item in wrong) if wrong else "None.",
     )
     (SOURCE / "docs" / "branch_checks.md").write_text(page)
     sys.exit(1 if wrong else 0)

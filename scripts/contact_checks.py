@@ -62,7 +62,7 @@ def hunt_crossley(program: Program) -> list[Check]:
         )
         checks.append(
             Check(
-                f"C.2 area of the loop, n = {n} (J) = loss of the body",
+                f"C.2 area of the loop, n = {n} (J) = energy loss of the body",
                 [run.number("contact_work") for run in runs],
                 [(1 - restitution_of(run) ** 2) / 2 for run in runs],
                 1e-8,
@@ -72,7 +72,7 @@ def hunt_crossley(program: Program) -> list[Check]:
     law = 'law="hunt_crossley_exact", stiffness=1e6, speed=1, restitution='
     checks.append(
         Check(
-            "C.2 e of hunt_crossley_exact for e asked",
+            "C.2 e of hunt_crossley_exact for nominal e",
             [restitution_of(impact(program, f"{law}{e}")) for e in ASKED],
             ASKED,
             1e-8,
@@ -101,7 +101,9 @@ def formulas(program: Program) -> list[Check]:
             restitution_of(impact(program, f'law="{law}", stiffness=1e6, speed=1, restitution={e}'))
             for e in ASKED
         ]
-        checks.append(Check(f"C.3 {law}, asked for 0.95, 0.9, 0.8 ... 0.1", found, printed, 5.1e-4, digits=3))
+        checks.append(
+            Check(f"C.3 {law}, nominal e = 0.95, 0.9, 0.8 ... 0.1", found, printed, 5.1e-4, digits=3)
+        )
     found = [
         restitution_of(impact(program, f'law="hunt_crossley", stiffness=1e6, damping={d}'))
         for d in EXACT_DAMPING
@@ -125,7 +127,7 @@ def kelvin_voigt(program: Program) -> list[Check]:
         checks.append(
             Check(f"C.4 e released at {what}, zeta = 0.05, 0.1, 0.2, 0.3, 0.5", found, closed, 1e-8, digits=6)
         )
-        checks.append(Check(f"C.4 the same as printed, {what}", found, printed, 5.1e-5, digits=4))
+        checks.append(Check(f"C.4 e as printed, released at {what}", found, printed, 5.1e-5, digits=4))
     jumps = [
         impact(program, f'law="kelvin_voigt", stiffness=1e6, damping={d}', 1e-12, "start.x0=0").number(
             "peak_force"
@@ -162,7 +164,7 @@ def books(program: Program) -> list[Check]:
         "platform with a controller": ("pair_platform", controlled),
         "sampled controller": ("pair_platform", controlled.replace("}", ", sample_time=0.01}")),
         "bouncing on a linear stop": ("pair_platform", linear),
-        "linear stop that does not pull": ("pair_platform", linear.replace("}", ", tension=0}")),
+        "linear stop without tension": ("pair_platform", linear.replace("}", ", tension=0}")),
         "one body, Coulomb friction, impacts": ("trajectory_coulomb_1.05",),
         "one body on a linear barrier": ("contact_kelvin_voigt",),
     }
@@ -188,22 +190,24 @@ def hard(program: Program) -> list[Check]:
 
     def ended(name: str, run: Run, what: str, found: float, expected: float, bar: float) -> None:
         over = run.data.attrs["reason"] == "time_over"
-        rows.append(check(f"{name}: runs to its end (1 = yes)", over, 1, 0))
+        rows.append(check(f"{name}: run completes (1 = yes)", over, 1, 0))
         rows.append(check(f"{name}: {what}", found, expected, bar))
 
     run = program.trajectory("pair_platform", no_room, shake, "start.v0=0")
-    ended("no gap, stop on the ground", run, "m2 moves at most (m)", np.abs(run.data["x"]).max(), 0, 0)
+    ended(
+        "no gap, stop on the ground", run, "largest displacement of m2 (m)", np.abs(run.data["x"]).max(), 0, 0
+    )
     run = program.trajectory("pair_backlash", no_room, "start.x0=0")
     apart = np.abs(run.data["x"] - run.data["driver_x"]).max()
-    ended("no gap, stop on m1", run, "x2 - x1 is at most (m)", apart, 0, 1e-14)
+    ended("no gap, stop on m1", run, "largest x2 - x1 (m)", apart, 0, 1e-14)
     run = program.trajectory("pair_platform", stop.format(0, 1))
     lost = run.number("energy_lost_to_contacts")
-    ended("e = 0", run, "lost to the stop (J) = m2 V^2/2", lost, 0.7 * 0.5**2 / 2, 1e-14)
+    ended("e = 0", run, "energy loss at the stop (J) = m2 V^2/2", lost, 0.7 * 0.5**2 / 2, 1e-14)
     run = program.trajectory("pair_platform", stop.format(1, 1), "run.duration=40")
     speeds = run.of("event_v_before", "impact_upper")
-    ended("e = 1", run, "slowest impact (m/s) = V", speeds.min(), 0.5, 1e-12)
+    ended("e = 1", run, "lowest impact speed (m/s) = V", speeds.min(), 0.5, 1e-12)
     run = program.trajectory("pair_platform", "run.duration=1.9", "run.window=1")
-    ended("equal velocities at the start", run, "events before the stop", run.kinds.size, 0, 0)
+    ended("equal velocities at the start", run, "events before the first impact", run.kinds.size, 0, 0)
     body = 'body={law="friction_pair", mass=1, driven_mass=0.7, friction=0}'
     run = program.trajectory("pair_platform", body, "start.v0=0.1", "run.duration=20")
     ended("b = 0", run, "x2 after 20 s, one impact at 10 s (m)", run.data["x"][-1], 0.4, 1e-12)
@@ -214,7 +218,7 @@ def hard(program: Program) -> list[Check]:
     body = f'body={{law="friction_pair", mass=1, driven_mass=0.5, friction=0.1, driver_x0={amplitude!r}}}'
     run = program.trajectory("pair_free", body)
     lost = run.number("energy_lost_to_friction")
-    ended("stuck exactly at the limit", run, "friction loss (J)", lost, 0, 1e-12)
+    ended("sticking exactly at the friction limit", run, "friction loss (J)", lost, 0, 1e-12)
     for case in ("pair_platform", "contact_hunt_crossley", "pair_backlash"):
         code = program.refused("trajectory", case, "start.x0=1.5")
         # a soft stop may be pressed from the start

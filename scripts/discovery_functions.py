@@ -51,25 +51,26 @@ POINTS = 101
 """Speeds at which the function is held against its band."""
 BAR_FAMILY, BAR_BAND = 0.95, 0.90
 
-PAGE = """# Restitutions of several shapes: what is found of the function
+PAGE = """# Restitutions of several shapes: the function that is found
 
-Written by `scripts/discovery_functions.py`; do not edit. In {asked} cases of seed {seed} the restitution of
-the generator's machines (tests/generator) falls with the speed of impact by a law of each shape, worth 10 or
-30 standard errors in two records; a third is held out. Noise and sensors are those of docs/discovery.md,
-without faults of the rig. {unreachable} cases were left out: no size of their effect was worth that in any
-regime.
+Written by `scripts/discovery_functions.py`; do not edit.
 
-*Family*: all that the verdict reports is of the family "{family}".
-*Function*: the values that the verdict draws, with their 95 % band, at {points} speeds from its first knot to
-its last, that is, over the impacts seen; the law that was hidden is known there. A closed form that is named
-is shown as the function that the same records tell.
+In {asked} cases of seed {seed} the restitution of the generator's machines (`tests/generator`) decreases
+with the impact speed. The law has one of several shapes, and its size is 10 or 30 standard errors in two
+records; a third record is held out. Noise and sensors are those of [the campaign](discovery.md), without
+instrument imperfections. {unreachable} cases were left out: their effect reached this size in no regime.
+
+* *Family*: every effect that the verdict reports belongs to the family "{family}".
+* *Function*: the values in the verdict, with their 95 % band, at {points} speeds between its first and last
+  knot. This is the range of the observed impacts, in which the hidden law is known. A named closed form is
+  represented by the function that the same records determine.
 
 {rows}
 
 | figure | bar | found | met |
 | --- | --- | --- | --- |
 | family right, of all | >= 95 % | {family_all} | {family_all_met} |
-| family right, of those with a name or a set | >= 95 % | {family_said} | {family_said_met} |
+| family right, if there is a name or a set | >= 95 % | {family_said} | {family_said_met} |
 | law within the band, share of the support, mean | >= 90 % | {band:.1f} % of {shown} functions | {band_met} |
 | functions with the law within the band on 90 % of the support | - | {inside} | |
 
@@ -179,7 +180,7 @@ def main() -> None:
     shown = [one.within for one in judged if not math.isnan(one.within)]
     whole = rate([one.right for one in judged])
     said = rate([one.right for one in judged if one.named])
-    head = ["restitution loses", "d'", "cases", "family right", "functions", "law in the band", "half width"]
+    head = ["restitution loss", "d'", "cases", "family right", "functions", "law in the band", "half width"]
     page = PAGE.format(
         asked=options.cases,
         seed=options.seed,
@@ -187,7 +188,8 @@ def main() -> None:
         family=FAMILY,
         points=POINTS,
         rows=table(head, rows_of(judged))
-        + "\n\n*Half width* of the band is a share of what the law changes over the support, median.",
+        + "\n\n*Half width* is the median half width of the band, as a share of the change of the law "
+        "over its support.",
         family_all=whole,
         family_all_met=met(whole, BAR_FAMILY, 1),
         family_said=said,

@@ -31,7 +31,7 @@ SEED = 5
 HIDDEN = (
     ("nothing", "", 0.0, {}),
     ("quadratic drag", "quadratic_drag", 0.05, {}),
-    ("spring that hardens with the power 2.2", "cubic_spring", 20.0, {"cubic_exponent": 2.2}),
+    ("hardening spring, power 2.2", "cubic_spring", 20.0, {"cubic_exponent": 2.2}),
     ("Maxwell element", "maxwell_element", 1.0, {"maxwell_time": 0.1}),
 )
 """What is hidden, its name, its size, and its shape."""
@@ -42,15 +42,16 @@ BAR_WALL, BAR_QUICK, BAR_MEMORY = 600.0, 60.0, 2000.0
 
 PAGE = """# Time of a verdict on missing physics
 
-Written by `scripts/discovery_speed.py`; do not edit. `separatrix-discover` on three records of the published
-machine, two for training and one held out, with a noise of 0.5 % and the crank angle from a mark; made by
-the independent simulator of `tests/generator` (seed {seed}). Each verdict is a process of its own: wall and
-processor seconds, largest resident memory. {processor} {load}
+Written by `scripts/discovery_speed.py`; do not edit. The program `separatrix-discover` is run on three
+records of the published machine, two for training and one held out. They have a noise of 0.5 % and the
+crank angle from a mark. The independent simulator of `tests/generator` produced them (seed {seed}). Each
+verdict is computed in a separate process. The table lists wall time, processor time and peak resident
+memory. {processor} {load}
 
 {rows}
 
-Bars, for 3 records of 60 s at 10 kHz (1.8 million samples): {bar_wall:.0f} s, with `--quick`
-{bar_quick:.0f} s, {bar_memory:.0f} MB. {met}
+Limits for 3 records of 60 s at 10 kHz (1.8 million samples): {bar_wall:.0f} s, with `--quick`
+{bar_quick:.0f} s, and {bar_memory:.0f} MB. {met}
 """
 
 

@@ -33,7 +33,7 @@ def free_bodies(program: Program) -> list[Check]:
     loss = reduced * (v1 - v2) ** 2 / 2
     return [
         check(
-            "A-V1 time until both move as one (s)",
+            "A-V1 time until sticking (s)",
             run.of("event_time", "stick")[0],
             (v1 - v2) * reduced / b,
             1e-12,
@@ -44,7 +44,7 @@ def free_bodies(program: Program) -> list[Check]:
             (m1 * v1 + m2 * v2) / (m1 + m2),
             1e-12,
         ),
-        check("A-V1 loss (J)", run.number("energy_lost_to_friction"), loss, 1e-12),
+        check("A-V1 energy loss (J)", run.number("energy_lost_to_friction"), loss, 1e-12),
         check("A-V1 slip length (m)", slid, loss / b, 1e-12),
     ]
 
@@ -55,9 +55,7 @@ def carried_off(program: Program) -> list[Check]:
     run = program.trajectory("pair_platform", 'contact={law="none"}', "start.v0=0")
     slid = float(run.data["driver_x"][-1] - run.data["x"][-1])
     return [
-        check(
-            "A-V2 time until both move as one (s)", run.of("event_time", "stick")[0], m2 * velocity / b, 1e-12
-        ),
+        check("A-V2 time until sticking (s)", run.of("event_time", "stick")[0], m2 * velocity / b, 1e-12),
         check("A-V2 slip length (m)", slid, m2 * velocity**2 / (2 * b), 1e-12),
     ]
 
@@ -69,22 +67,30 @@ def shaken(program: Program) -> list[Check]:
     limits = program.limits("sweep_pair_kappa")
     slip, stick = 2 / math.sqrt(4 + math.pi**2), 1.0
     return [
-        check("A-V3 events at kappa = 1, started together", stuck.kinds.size, 0, 0),
-        check("A-V3 episodes of stick at kappa = 0.5", slipping.of("event_time", "stick").size, 0, 0),
+        check("A-V3 events at kappa = 1, equal initial velocities", stuck.kinds.size, 0, 0),
+        check("A-V3 stick phases at kappa = 0.5", slipping.of("event_time", "stick").size, 0, 0),
         check("A-V3 peak of v2 at kappa = 0.5 (m/s)", slipping.number("v_max"), math.pi * 0.5 / 2, 1e-9),
         check(
-            "A-V3 kappa where stick begins, run up", limits["non_impact_to_sticking_up"], slip, 5e-5, digits=7
+            "A-V3 kappa at the onset of stick, run-up",
+            limits["non_impact_to_sticking_up"],
+            slip,
+            5e-5,
+            digits=7,
         ),
         check(
-            "A-V3 kappa where stick ends, run down",
+            "A-V3 kappa at the end of stick, run-down",
             limits["sticking_to_non_impact_down"],
             slip,
             5e-5,
             digits=7,
         ),
-        check("A-V3 kappa where slip ends, run up", limits["sticking_to_stuck_up"], stick, 5e-5, digits=7),
+        check("A-V3 kappa at the end of slip, run-up", limits["sticking_to_stuck_up"], stick, 5e-5, digits=7),
         check(
-            "A-V3 kappa where slip begins, run down", limits["stuck_to_sticking_down"], stick, 5e-5, digits=7
+            "A-V3 kappa at the onset of slip, run-down",
+            limits["stuck_to_sticking_down"],
+            stick,
+            5e-5,
+            digits=7,
         ),
     ]
 
@@ -120,9 +126,9 @@ def free_pair(program: Program) -> list[Check]:
         *checks,
         check("P1 events until t = 386.9297 s", run.kinds.size, 200, 0),
         check("P1 time of the last event (s)", run.events["event_time"][-1], 386.929691, 5.1e-7),
-        check("P1 energy after it (J)", energies[-1], 0.045409125, HALF_DIGIT),
-        check("P1 amplitude after it (m)", math.sqrt(2 * energies[-1]), 0.301360663, HALF_DIGIT),
-        check("A-V4 energy lost (J) = b times the slip path", lost, 0.1 * slid, 1e-13, digits=13),
+        check("P1 energy after the last event (J)", energies[-1], 0.045409125, HALF_DIGIT),
+        check("P1 amplitude after the last event (m)", math.sqrt(2 * energies[-1]), 0.301360663, HALF_DIGIT),
+        check("A-V4 energy loss (J) = b times the slip path", lost, 0.1 * slid, 1e-13, digits=13),
     ]
 
 
@@ -190,9 +196,9 @@ def bouncing(program: Program) -> list[Check]:
             1e-10,
         ),
         check("B.3 last sample: distance from the stop (m)", 1 - float(run.data["x"][-1]), 0, 0),
-        check("B.3 last sample leans on the stop (1 = yes)", names[-1] == "upper_barrier", 1, 0),
+        check("B.3 last sample in contact with the stop (1 = yes)", names[-1] == "upper_barrier", 1, 0),
         check(
-            "B.3 friction while leaning (W) = b V",
+            "B.3 friction power in contact (W) = b V",
             float(np.diff(run.data["friction_loss"].values[-2:])[0])
             / float(np.diff(run.data["time"].values[-2:])[0]),
             b * velocity,
@@ -214,20 +220,20 @@ def hammer(program: Program) -> list[Check]:
     v1 = both.data["driver_v"].values[both.data["time"].values > both.of("event_time", "impact_upper")[0]][0]
     return [
         check(
-            "B.3 hammer: velocity at the stop (m/s)",
+            "B.3 hammer: velocity before the impact (m/s)",
             run.of("event_v_before", "impact_upper")[0],
             arrival,
             1e-12,
         ),
         check(
-            "B.3 hammer: velocity after it (m/s)",
+            "B.3 hammer: velocity after the impact (m/s)",
             run.of("event_v_after", "impact_upper")[0],
             -e * arrival,
             1e-12,
         ),
-        check("B.3 hammer: place of rest (m)", run.of("event_x", "stick")[0], rest, 1e-12),
+        check("B.3 hammer: rest position (m)", run.of("event_x", "stick")[0], rest, 1e-12),
         check("B.2 stop on m1: relative velocity after an impact (m/s)", v2 - v1, -0.85 * w, 1e-12),
-        check("B.2 stop on m1: momentum after it (N s)", v1 + 0.5 * v2, 0.5 * w, 1e-12),
+        check("B.2 stop on m1: momentum after an impact (N s)", v1 + 0.5 * v2, 0.5 * w, 1e-12),
     ]
 
 

@@ -96,8 +96,8 @@ def starts() -> str:
         if len(found) > 1:
             sys.exit(f"published: the starts of {motion} differ between the friction laws")
         start = case_of(f"trajectory_coulomb_{motion}")["start"]
-        texts.append(f"({start['x0']}, {start['v0']}) for {text}")
-    return "; ".join(texts)
+        texts.append(f"* ({start['x0']}, {start['v0']}) for {text}")
+    return "\n".join(texts)
 
 
 def axes(path: Path) -> str:

@@ -29,16 +29,16 @@ SECTIONS = {
 }
 # what no case file can show: a law over random machines, or a second method
 TESTS = (
-    ("energy never grows without a drive, the book closes", "test_pair_motion", "the_book_closes"),
+    ("energy never grows without a drive; the balance closes", "test_pair_motion", "the_book_closes"),
     ("the same with soft stops", "test_pair_contact", "the_book_closes"),
     ("the same, one body between soft barriers", "test_contact_flight", "energy_never_grows"),
-    ("implicit steps with projection converge, order 1", "test_pair_motion", "time_stepping_converges"),
-    ("random hard cases end, no stop is passed", "test_pair_ties", "hard_cases_at_random"),
-    ("stops without room, with every kind of drive", "test_pair_ties", "stops_without_room"),
+    ("implicit steps with projection converge with order 1", "test_pair_motion", "time_stepping_converges"),
+    ("random limiting cases complete; no stop is penetrated", "test_pair_ties", "hard_cases_at_random"),
+    ("stops without clearance, with every kind of drive", "test_pair_ties", "stops_without_room"),
     ("no gap, e = 0, e = 1, a gap of 1e-9 m, e near 1", "test_pair_impact", "hard_cases"),
-    ("several events at one instant", "test_pair_impact", "together_into_the_stop"),
-    ("hard contacts tend to the rigid law as K^(-2/5)", "test_pair_contact", "stiff_limit_is_newton"),
-    ("a sampled controller tends to the continuous one, order 1", "test_pair_impact", "sampled_controller"),
+    ("simultaneous events", "test_pair_impact", "together_into_the_stop"),
+    ("stiff contacts converge to the rigid law as K^(-2/5)", "test_pair_contact", "stiff_limit_is_newton"),
+    ("sampled control converges to continuous control, order 1", "test_pair_impact", "sampled_controller"),
 )  # fmt: skip
 MOST_COMMANDS = 20
 DRAWN = ("pair_free", "pair_platform", "hammer", "pair_backlash")
@@ -89,10 +89,10 @@ def run_tests(build: Path) -> list[list[str]]:
 
 def commands_of(commands: list[str]) -> str:
     """Return the first commands of a section behind a fold; the others differ in numbers and laws."""
-    lines = "\n".join(f"    {command}" for command in commands[:MOST_COMMANDS])
+    lines = "\n".join(commands[:MOST_COMMANDS])
     more = len(commands) - MOST_COMMANDS
-    tail = f"\n\n... and {more} with the other laws and numbers of the table." if more > 0 else ""
-    return f"<details><summary>{len(commands)} runs</summary>\n\n{lines}{tail}\n\n</details>"
+    tail = f"\n\nThe other {more} runs use the remaining laws and numbers of the table." if more > 0 else ""
+    return f"<details><summary>{len(commands)} runs</summary>\n\n```sh\n{lines}\n```{tail}\n\n</details>"
 
 
 def draw(program: Program, folder: Path) -> None:
@@ -126,12 +126,12 @@ def main() -> int:
         sections = run_sections(program)
         tests = run_tests(build)
         draw(program, folder)
-    head = ["what", "found", "expected", "difference", "bar", ""]
+    head = ["quantity", "computed", "expected", "difference", "tolerance", ""]
     fields = dict(line.split(" ", 1) for line in version)
     for name, (items, commands) in sections.items():
         fields[name] = table(head, [row(item) for item in items])
         fields[f"{name}_runs"] = commands_of(commands)
-    fields["tests"] = table(["what", "test", ""], tests)
+    fields["tests"] = table(["property", "test", ""], tests)
     missed = [item.name for items, _ in sections.values() for item in items if not item.met]
     missed += [line[1] for line in tests if line[-1] != "passed"]
     fields["count"] = sum(len(items) for items, _ in sections.values())

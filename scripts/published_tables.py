@@ -255,7 +255,7 @@ def failures(files: dict[str, Path]) -> str:
     if missed:
         return "\n".join(f"* {', '.join(row[:3])}: {row[-2]}" for row in missed)
     worst = max(steady, key=lambda row: abs(float(row[-2].split()[0])))
-    return f"Nothing. The largest difference of a steady value is {worst[-2]} ({', '.join(worst[:3])})."
+    return f"None. The largest difference of a steady value is {worst[-2]} ({', '.join(worst[:3])})."
 
 
 # name in the page, heads of the columns, rows

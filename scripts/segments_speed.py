@@ -31,25 +31,28 @@ LAWS = (
     ("Stribeck effect, 0.2 m/s", "stribeck", {"excess": 0.5, "velocity": 0.2}),
     ("Dahl's friction, 300 N/m", "dahl", {"stiffness": 300.0}),
     ("restitution falls linearly", "restitution_slope", {"slope": 0.05}),
-    ("Kelvin-Voigt wall, never pulls", "kelvin_voigt_contact", {"stiffness": 1e5, "damping": 20.0}),
+    ("Kelvin-Voigt wall, no tension", "kelvin_voigt_contact", {"stiffness": 1e5, "damping": 20.0}),
     ("Hunt-Crossley wall, 1e6 N/m^1.5", "compliant_contact", {"stiffness": 1e6}),
 )
 
 PAGE = """# Time of the segments
 
-Written by `scripts/segments_speed.py`; do not edit. What the discovery compares with records: {segments}
-segments of half a drive period with {samples} samples each, of the published machine with one law more;
-*derivatives* by its parameters, along {directions} directions or one more, and by the start, each a neighbour
-that flies too. Microseconds of processor time a segment, least of {rounds} rounds in which both take turns.
-*Apart*: largest difference of a place, as a share of the largest; the event loop has a tolerance of 1e-9
-where it is adaptive.
+Written by `scripts/segments_speed.py`; do not edit. The discovery compares segments of a motion with
+records. The table is for {segments} segments of half a drive period with {samples} samples each, of the
+published machine with one additional law. Times are microseconds of processor time per segment, the
+minimum of {rounds} rounds in which both methods alternate. The column *apart* is the largest difference
+of a position relative to the largest position. An adaptive event loop has a tolerance of 1e-9.
+
+Derivatives are with respect to the parameters of the machine, in {directions} directions or one more, and
+with respect to the start. Each direction requires a neighbouring trajectory.
+
 {processor}
 
 {rows}
 
-In all rows both meet the same impacts and hold the same segments steady. A segment that a lane leaves to the
-event loop flies there with all its neighbours, as all do with `integrator.lanes = "off"`. Structures,
-measured forces and what is compared in force fly in the event loop.
+In all rows both methods find the same impacts and classify the same segments as steady. A segment that a
+lane leaves to the event loop is computed there with all its neighbours, as are all segments with
+`integrator.lanes = "off"`. Structures, measured forces and comparisons in force also use the event loop.
 """
 
 

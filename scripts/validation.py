@@ -11,6 +11,7 @@ import argparse
 import os
 import subprocess
 import sys
+import textwrap
 from itertools import groupby
 from pathlib import Path
 
@@ -28,7 +29,7 @@ import compare  # noqa: E402
 
 
 def line(row: Row) -> list[str]:
-    """A row as cells: number, theirs, ours, difference, bar, verdict."""
+    """A row as cells: quantity, theirs, ours, difference, tolerance, verdict."""
     _, what, theirs, bar = THEIRS[row.key]
     apart = f"{row.difference:.1e}" if row.difference else "0"
     verdict = row.verdict if row.verdict == "agrees" else f"**{row.verdict}**"
@@ -36,15 +37,17 @@ def line(row: Row) -> list[str]:
 
 
 def section(source: str, found: list[Row]) -> str:
-    """The rows of one source under its name, and how ours were computed."""
-    head = ["number", "theirs", "ours", "difference", "bar", "verdict"]
-    ways: dict[str, list[str]] = {}
-    for row in found:
-        ways.setdefault(row.how, []).append(THEIRS[row.key][1])
-    told = "\n".join(
-        f"* {how}" + ("" if len(ways) == 1 else f": {'; '.join(what)}") for how, what in ways.items()
+    """The rows of one source under its name, and the methods by which ours were computed."""
+    head = ["quantity", "theirs", "ours", "difference", "tolerance", "verdict", "method"]
+    ways = list(dict.fromkeys(row.how for row in found))
+    lines = [[*line(row), str(ways.index(row.how) + 1)] for row in found]
+    methods = "\n".join(
+        textwrap.fill(
+            f"{number}. {how}", 120, subsequent_indent="   ", break_long_words=False, break_on_hyphens=False
+        )
+        for number, how in enumerate(ways, 1)
     )
-    return f"### {source}\n\n{table(head, [line(row) for row in found])}\n\nHow ours were computed:\n\n{told}"
+    return f"### {source}\n\n{table(head, lines)}\n\nMethods:\n\n{methods}"
 
 
 def page(
@@ -55,20 +58,20 @@ def page(
     found = sorted(found, key=lambda row: order.index(row.key))
     parts = [section(name, list(group)) for name, group in groupby(found, key=lambda row: THEIRS[row.key][0])]
     missed = [[THEIRS[row.key][0], *line(row)] for row in found if row.verdict != "agrees"]
-    head = ["source", "number", "theirs", "ours", "difference", "bar", "verdict"]
+    head = ["source", "quantity", "theirs", "ours", "difference", "tolerance", "verdict"]
     return (
         (SOURCE / "scripts" / "validation.md.in")
         .read_text()
         .format(
             **version,
-            differs=table(head, missed) if missed else "Nothing.",
+            differs=table(head, missed) if missed else "None.",
             count=len(found),
             tables="\n\n".join(parts),
             structures=validation_structures.section(structures),
             public=validation_public.section(public),
             public_count=len(public),
             measures=validation_measures.section(measures),
-            not_yet=table(["source", "what", "why"], [list(item) for item in NOT_YET]),
+            not_yet=table(["source", "quantity", "reason"], [list(item) for item in NOT_YET]),
             referee=compare.summary_table(report),
             disagreements=compare.disagreements(report),
         )

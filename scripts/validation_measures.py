@@ -18,7 +18,7 @@ from separatrix.measuring.sampling import Region
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 import synthetic_sets as sets  # noqa: E402
 
-KNOWN = "sets with known answers"
+KNOWN = "sets with known values"
 PEERS = "Attractors.jl and Basins.jl, tests"
 GREBOGI = "C. Grebogi, S. W. McDonald, E. Ott, J. A. Yorke, Phys. Lett. A 99 (1983)"
 
@@ -76,7 +76,7 @@ def spheres() -> list[Row]:
         Row(KNOWN, "ellipse: LIM, its minor semi-axis", 0.3, 1e-9, radius(sets.ellipse((0.7, 0.3)), (0, 0))),
         Row(KNOWN, "half plane: LIM", 0.5, 1e-9, radius(sets.half_plane((0.6, 0.8), 0.5), (0, 0))),
         Row(KNOWN, "annulus: IF, its half width", 0.3, 1e-5, largest.inner),
-        Row(PEERS, "Newton's method for z^3 = 1: least shock out of the basin of 1", 0.622, 5e-4,
+        Row(PEERS, "Newton's method for z^3 = 1: smallest perturbation out of the basin of 1", 0.622, 5e-4,
             radius(sets.newton, (1, 0))),
     ]  # fmt: skip
 
@@ -107,7 +107,13 @@ def entropies() -> list[Row]:
         false += one.probability < 0.05
     # 99.9 % of binomial draws
     found.append(
-        Row(KNOWN, "1000 smooth boundaries: share called rough at the level 0.05", 0.05, 0.0227, false / 1000)
+        Row(
+            KNOWN,
+            "1000 smooth boundaries: share classified as rough at the level 0.05",
+            0.05,
+            0.0227,
+            false / 1000,
+        )
     )
     return found
 
@@ -202,7 +208,7 @@ def _cells(row: Row) -> list[str]:
 
 def section(found: list[Row]) -> str:
     """The tables, by source."""
-    head = ["number", "theirs", "ours", "difference", "bar", "verdict"]
+    head = ["quantity", "theirs", "ours", "difference", "tolerance", "verdict"]
     parts = []
     for source in dict.fromkeys(row.source for row in found):
         lines = [_cells(row) for row in found if row.source == source]

@@ -36,7 +36,7 @@ def differs(number: Number) -> bool:
 
 def section(found: list[Number]) -> str:
     """The numbers as a table."""
-    head = ["source", "number", "theirs", "ours", "difference", "bar", "verdict"]
+    head = ["source", "quantity", "theirs", "ours", "difference", "tolerance", "verdict"]
     lines = []
     for one in found:
         verdict = one.verdict if one.verdict == "agrees" else f"**{one.verdict}**"

@@ -31,7 +31,11 @@ def sciml(program: Program) -> list[Number]:
     theirs = (1 + speed) / 9.8 + 2 * 0.5 * speed / (9.8 * 0.5)
     return [
         Number(
-            source, "ball, e = 0.5, thrown upwards above the floor: lies still (s)", theirs, found[0, 0], 1e-9
+            source,
+            "ball, e = 0.5, thrown upwards above the floor: time of rest (s)",
+            theirs,
+            found[0, 0],
+            1e-9,
         )
     ]
 
@@ -78,9 +82,11 @@ def hertz(program: Program) -> list[Number]:
     lasts = 0.8 * sqrt(pi) * gamma(0.4) / gamma(0.9) * deep / speed
     return [
         Number(source, "two spheres of glass at 20 m/s: largest overlap (m)", deep, ours, 1e-13),
-        Number(source, "the same: contact lasts (s)", lasts, at[1] - at[0], 1e-13),
+        Number(source, "the same: contact duration (s)", lasts, at[1] - at[0], 1e-13),
         Number(source, "the same: largest force (N)", stiffness * deep**1.5, stiffness * ours**1.5, 1e-5),
-        Number(source, "the same: speed after it (m/s)", speed, ends(program, "hertz_spheres", "v")[0], 1e-9),
+        Number(
+            source, "the same: speed after contact (m/s)", speed, ends(program, "hertz_spheres", "v")[0], 1e-9
+        ),
     ]
 
 
@@ -97,7 +103,7 @@ def rocking(program: Program) -> list[Number]:
     still = events(program, "rocking_block", "chatter_lower", "contact.ground")[0, 0]
     return [
         largest(source, "rocking block: times of impacts", theirs, found[:, 0], 1e-9),
-        Number(source, "the same: stands still", total, still, 1e-9),
+        Number(source, "the same: end of the rocking", total, still, 1e-9),
     ]
 
 
@@ -145,8 +151,8 @@ def plastic(program: Program) -> list[Number]:
         ours = found["impact_lower"][found["impact_lower"] > leave][0] - leave
         source = "T. Gilet, N. Vandewalle, S. Dorbolo (2009), closed form"
         what = f"ball without rebound on a vibrating plate, Gamma = {strength:g}: flight"
-        numbers.append(Number(source, f"{what} lasts", lasts, ours, 1e-9))
-        numbers.append(Number(source, f"{what} begins at phase", begin, leave % (2 * pi), 1e-9))
+        numbers.append(Number(source, f"{what} duration", lasts, ours, 1e-9))
+        numbers.append(Number(source, f"{what} phase at take-off", begin, leave % (2 * pi), 1e-9))
     return numbers
 
 
@@ -175,7 +181,7 @@ def drill(program: Program) -> list[Number]:
         ours = float(file.attrs["cycle_time"])
     own, twist = sqrt(473 / 374), 1000 / 473
     theirs = 2 * (pi - atan(own * twist / 6)) / own + 2 * twist / 6
-    return [Number(source, "drill string: cycle of stick and slip (s)", theirs, ours, 1e-9)]
+    return [Number(source, "drill string: stick-slip period (s)", theirs, ours, 1e-9)]
 
 
 def mathieu(program: Program) -> list[Number]:
@@ -183,7 +189,7 @@ def mathieu(program: Program) -> list[Number]:
     place, rate = ends(program, "mathieu", "x", "v")
     source = "M. Abramowitz, I. A. Stegun, table 20.1, a_1(1) = 1.85910 807"
     return [
-        Number(source, "Mathieu's equation: place after a period, from 1", 1.0, place, 1e-9),
+        Number(source, "Mathieu's equation: position after one period, initially 1", 1.0, place, 1e-9),
         Number(source, "the same: velocity", 0.0, rate, 1e-9),
     ]
 
@@ -199,7 +205,7 @@ def stacked(program: Program) -> list[Number]:
     ours = ends(program, "stacked_balls", "v", run__duration=0.5)[0]
     first = sqrt(2 / 9.81)
     return [
-        Number(source, "small ball on a large one: they meet (s)", first + late, found[0, 0], 1e-12),
+        Number(source, "small ball on a large one: collision (s)", first + late, found[0, 0], 1e-12),
         Number(
             source,
             "the same: velocity of the small one (m/s)",
@@ -223,8 +229,8 @@ def cradle(program: Program) -> list[Number]:
     source = "Newton's cradle, by elliptic integrals"
     return [
         largest(source, "three pendulums, 1e-9 rad apart: times of impacts (s)", theirs, kinds["left"], 1e-7),
-        Number(source, "the same: the third turns at (rad)", 0.5, third[1], 1e-8),
-        Number(source, "the same: the first meanwhile (rad)", 0.0, third[0], 1e-8),
+        Number(source, "the same: amplitude of the third (rad)", 0.5, third[1], 1e-8),
+        Number(source, "the same: angle of the first at that time (rad)", 0.0, third[0], 1e-8),
     ]
 
 

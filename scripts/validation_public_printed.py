@@ -39,7 +39,7 @@ def reference_fmu(program: Program) -> list[Number]:
     numbers.append(
         Settled(source, "the same: speed before impact 5 (m/s)", 1.06326, abs(found[4, 2]), 5e-6, speed)
     )
-    return [*numbers, Number(CLOSED, "the same: lies still (s)", fall * (1 + 2 * 0.7 / 0.3), rest, 1e-9)]
+    return [*numbers, Number(CLOSED, "the same: time of rest (s)", fall * (1 + 2 * 0.7 / 0.3), rest, 1e-9)]
 
 
 def petsc(program: Program) -> list[Number]:
@@ -80,7 +80,7 @@ def scipy_cannon(program: Program) -> list[Number]:
     hit = events(program, "cannon", "impact_lower", "contact.ground")
     at_end = ends(program, "cannon", "x", "v")
     return [
-        Number(source, "shot upwards: hits the ground (s)", 40.0, hit[0, 0], 1e-12),
+        Number(source, "upward shot: impact on the ground (s)", 40.0, hit[0, 0], 1e-12),
         Number(CLOSED, "the same, no rebound: speed 10 s later", 0.0, abs(at_end[1]), 0),
     ]
 
@@ -92,7 +92,7 @@ def simulink(program: Program) -> list[Number]:
     fall = np.sqrt(15**2 + 2 * 9.81 * 10)
     theirs = (15 + fall) / 9.81 + 2 * 0.8 * fall / 9.81 / (1 - 0.8)
     source = "Simulink, Simulation of a Bouncing Ball; closed form"
-    return [Number(source, "ball, e = 0.8: lies still (s)", theirs, rest, 1e-9)]
+    return [Number(source, "ball, e = 0.8: time of rest (s)", theirs, rest, 1e-9)]
 
 
 def modelica_force(program: Program) -> list[Number]:
@@ -104,13 +104,13 @@ def modelica_force(program: Program) -> list[Number]:
         *(
             modelica(source, f"driven mass with Stribeck friction: {what} (s)", theirs, ours)
             for what, theirs, ours in zip(
-                ("slides", "turns", "turns again"),
+                ("onset of sliding", "first reversal", "second reversal"),
                 (0.410143135, 2.442688825, 4.441939901),
                 happened,
                 strict=True,
             )
         ),
-        modelica(source, "the same: place after 5 s (m)", 1.768462821, place),
+        modelica(source, "the same: position after 5 s (m)", 1.768462821, place),
         modelica(source, "the same: velocity after 5 s (m/s)", 6.864858590, rate),
     ]
 
@@ -130,8 +130,10 @@ def modelica_stop(program: Program) -> list[Number]:
     )
     found = sorted({round(at, 12) for _, at in times(program, "stribeck_stop")})
     return [
-        largest(source, "mass on a spring with stops: impact, turns and stick (s)", theirs, found, 2e-5),
-        modelica(source, "the same: sticks at (m)", -0.247515848, ends(program, "stribeck_stop", "x")[0]),
+        largest(source, "mass on a spring with stops: impact, reversals and stick (s)", theirs, found, 2e-5),
+        modelica(
+            source, "the same: position in stick (m)", -0.247515848, ends(program, "stribeck_stop", "x")[0]
+        ),
     ]
 
 
@@ -143,7 +145,7 @@ def modelica_clutch(program: Program) -> list[Number]:
     return [
         largest(
             source,
-            "clutch: closes, slips, closes (s)",
+            "clutch: closing, slip, closing (s)",
             theirs,
             [at for _, at in times(program, "clutch")],
             2e-6,
@@ -177,9 +179,9 @@ def rao(program: Program) -> list[Number]:
     source = "S. S. Rao, Mechanical Vibrations, problem on Coulomb damping"
     happened = times(program, "rao_coulomb")
     return [
-        Number(source, "20 kg, 50 N of friction: half cycles until it sticks", 5, len(happened), 0),
-        Number(CLOSED, "the same: sticks (s)", 5 * np.pi / np.sqrt(500), happened[-1][1], 1e-12),
-        Number(CLOSED, "the same: its place (m)", 0.0, ends(program, "rao_coulomb", "x")[0], 1e-14),
+        Number(source, "20 kg, 50 N of friction: half cycles until stick", 5, len(happened), 0),
+        Number(CLOSED, "the same: onset of stick (s)", 5 * np.pi / np.sqrt(500), happened[-1][1], 1e-12),
+        Number(CLOSED, "the same: rest position (m)", 0.0, ends(program, "rao_coulomb", "x")[0], 1e-14),
     ]
 
 
@@ -192,10 +194,10 @@ def five_cycles(program: Program) -> list[Number]:
         period, amplitude = entries["period"][:], entries["amplitude"][:]
     numbers = [Number(source, "Duffing oscillator: coexisting cycles", 5, len(share), 0)]
     kinds = (
-        ("the small one of period 1", 0.2027, (period == 1) & (amplitude < 0.5)),
-        ("the large one of period 1", 0.4950, (period == 1) & (amplitude > 0.5)),
-        ("both of period 2", 0.0545, period == 2),
-        ("that of period 3", 0.2478, period == 3),
+        ("the small cycle of period 1", 0.2027, (period == 1) & (amplitude < 0.5)),
+        ("the large cycle of period 1", 0.4950, (period == 1) & (amplitude > 0.5)),
+        ("both cycles of period 2", 0.0545, period == 2),
+        ("the cycle of period 3", 0.2478, period == 3),
     )
     for what, theirs, which in kinds:
         bar = 2 * np.sqrt(theirs * (1 - theirs) * (1 / 10000 + 1 / label.size))
@@ -212,20 +214,24 @@ def chaos(program: Program) -> list[Number]:
     return [
         Number(
             source,
-            "double well under a force: largest exponent, theirs in the middle (1/s)",
+            "forced double well: largest exponent, mean of their estimates (1/s)",
             0.1199,
             first,
             0.0205,
         ),
         Number(
-            "fixed steps of Runge and Kutta", "the same, by 200 pairs of motions", pairs_part(), first, 0.015
+            "Runge-Kutta method with fixed steps",
+            "the same, from 200 pairs of motions",
+            pairs_part(),
+            first,
+            0.015,
         ),
         Number(CLOSED, "the same: sum of the exponents (1/s)", -0.1, first + second, 1e-8),
     ]
 
 
 def pairs_part(count: int = 200, periods: int = 120, steps: int = 100, apart: float = 1e-8) -> float:
-    """How pairs of motions of the double well part, after 50 periods, by fixed steps of Runge and Kutta."""
+    """How pairs of motions of the double well part, after 50 periods, by fixed Runge-Kutta steps."""
     random = np.random.default_rng(1)
     state = random.uniform(-1, 1, (2, count))
     state = np.concatenate([state, state + [[apart], [0]]], axis=1)

@@ -52,7 +52,7 @@ def moving_belt(program: Program) -> list[Number]:
     machine.run([2 / TURN], [0], 100)
     return [
         by_steps(
-            "PathSim, stick slip", "box on a belt to and fro", machine, program, "belt_back_and_forth", 100
+            "PathSim, stick slip", "box on an oscillating belt", machine, program, "belt_back_and_forth", 100
         )
     ]
 
@@ -79,7 +79,7 @@ def modelica(program: Program) -> list[Number]:
     rotational = "Modelica Standard Library, Rotational.Examples.Friction"
     return [
         by_steps(source, "driven mass", driven, program, "stribeck_force", 5),
-        Number(own, "the same: place after 5 s (m)", end[0], place, 1e-8),
+        Number(own, "the same: position after 5 s (m)", end[0], place, 1e-8),
         Number(own, "the same: velocity after 5 s (m/s)", end[1], rate, 1e-8),
         by_steps(rotational, "clutch", clutch, program, "clutch", 0.5),
         Number(
@@ -109,7 +109,7 @@ def row(program: Program) -> list[Number]:
     end = solve_ivp(slope, (0, 20), [-0.01, 0, 0, 1, 0, 0], "DOP853", rtol=1e-12, atol=1e-14, max_step=0.01)
     ours = ends(program, "hertz_row", "first_v", "second_v", "third_v")
     source = "E. J. Hinch, S. Saint-Jean (1999), equations, by scipy's DOP853"
-    what = "three balls with Hertz contacts: velocity after it (m/s) of ball"
+    what = "three balls with Hertz contacts: velocity afterwards (m/s) of ball"
     return [Number(source, f"{what} {k + 1}", end.y[3 + k, -1], ours[k], 1e-8) for k in range(3)]
 
 

@@ -70,7 +70,7 @@ def chaos(program: Program) -> list[Row]:
         Row(
             "dux.exponent",
             exponent,
-            "`examples/validation/budd_dux.toml`, 200 pairs of motions of the library",
+            "`examples/validation/budd_dux.toml`, 200 pairs of neighbouring motions of the library",
         ),
         Row("dux.sum", found.sum_found - lost, "`separatrix stability examples/validation/budd_dux.toml`"),
     ]
@@ -209,7 +209,7 @@ def den_hartog(program: Program) -> list[Row]:
                 Row(
                     f"hartog.{name}{side}",
                     onset,
-                    f"{command}{words}` over drive ratios, narrowed to where the regime changes",
+                    f"{command}{words}` over drive ratios, refined to the change of regime",
                 )
             )
     low = f"drive.ratio={next(row.ours for row in rows if row.key == 'hartog.low')!r}"
@@ -296,7 +296,7 @@ def followed(program: Program) -> list[Row]:
         for key, pick in keys.items():
             found[f"{key}.branches"] = float(pick(labels))
             how[f"{key}.branches"] = (
-                f"`separatrix branches examples/validation/{case}.toml --parameter {parameter}`{words}"
+                f"`separatrix branches examples/validation/{case}.toml --parameter {parameter}{words}`"
             )
 
     def graze(labels: Labels) -> float:

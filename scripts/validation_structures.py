@@ -141,7 +141,7 @@ def ball(program: Program) -> list[Number]:
     # the fifth rebound, then a geometric series of bounces
     end = theirs[4] + 2 * 4.372701821 / (10 * (1 - 0.8))
     ended = program.events("ball", "chatter_lower", "contact.room")[0, 0]
-    return [*found, Number(source, "the same: end of its chatter on the floor (s)", end, ended, 1e-9)]
+    return [*found, Number(source, "the same: end of the chatter on the floor (s)", end, ended, 1e-9)]
 
 
 def hitting(file: h5py.File) -> np.ndarray:
@@ -197,7 +197,7 @@ def dampers(program: Program) -> list[Number]:
         )
 
     edge = crossing(half, [0.725, 0.7265, 0.728, 0.7295], 1.0)
-    found.append(Number(source, "cavity: amplitude at which symmetry breaks", 0.7321398724, edge, 1e-6))
+    found.append(Number(source, "cavity: amplitude at the symmetry breaking", 0.7321398724, edge, 1e-6))
     return found
 
 
@@ -249,11 +249,13 @@ def blocks(program: Program) -> list[Number]:
         times = program.events(case, "release", "friction.first", **settings)[:, 0]
         ours = sorted(np.diff(times)[-len(intervals) :])
         for theirs, mine in zip(intervals, ours, strict=True):
-            what = f"{case}, belt {belt} m/s, friction {kinetic}, at rest {static}: interval of releases (s)"
+            what = (
+                f"{case}, belt {belt} m/s, kinetic friction {kinetic}, static {static}: release interval (s)"
+            )
             found.append(Number(source, what, theirs, mine, bar))
         with h5py.File(program.run("trajectory", case, **settings)) as file:
             cycle = file.attrs.get("cycle_time", np.nan)
-        what = f"{case}, belt {belt} m/s, friction {kinetic}, at rest {static}: limit cycle (s)"
+        what = f"{case}, belt {belt} m/s, kinetic friction {kinetic}, static {static}: limit cycle (s)"
         found.append(Number(source, what, sum(intervals), cycle, 2 * bar))
     return found
 
@@ -291,7 +293,7 @@ def end_of_sticking(mass: float = 1, damping: float = 0.05, kinetic: float = 1, 
 def end_of_stick_slip(program: Program) -> list[Number]:
     """Where the branch of the motion that sticks on a belt ends."""
     labels = program.labels("belt_coulomb", "friction.belt.velocity", 0.5, 1)
-    what = "mass on a belt, `branches`: velocity at which the motion that sticks ends (m/s)"
+    what = "mass on a belt, `branches`: velocity at the end of the sticking motion (m/s)"
     return [Number(CLOSED, what, end_of_sticking(), labels["stick_onset"], 1e-11)]
 
 
@@ -334,7 +336,9 @@ def turning_pendulum(program: Program) -> list[Number]:
         atol=1e-13,
         events=lambda t, y: sin((y[0] - np.pi) / 2),
     ).t_events[0]
-    found.append(Number("scipy, DOP853", "the same: time of a turn (s)", turns[-1] - turns[-2], cycle, 1e-9))
+    found.append(
+        Number("scipy, DOP853", "the same: period of a rotation (s)", turns[-1] - turns[-2], cycle, 1e-9)
+    )
     return found
 
 
@@ -358,7 +362,7 @@ def belt_by_steps(file: h5py.File, rests: np.ndarray) -> list[Number]:
         (max(slips(*start, 90, 1e-8), default=0) > 60) == rest
         for start, rest in zip(starts, rests, strict=False)
     )
-    what = f"the same: labels of {len(starts)} starts that differ"
+    what = f"the same: differing labels of {len(starts)} initial conditions"
     return [*found, Number(source, what, 0, other, 0)]
 
 
@@ -388,7 +392,7 @@ def numbers(program: Program) -> list[Number]:
 
 def section(found: list[Number]) -> str:
     """The numbers as a table."""
-    head = ["source", "number", "theirs", "ours", "difference", "bar", "verdict"]
+    head = ["source", "quantity", "theirs", "ours", "difference", "tolerance", "verdict"]
     lines = []
     for one in found:
         verdict = one.verdict if one.verdict == "agrees" else f"**{one.verdict}**"

@@ -94,10 +94,10 @@ def cantilever(program: Program) -> list[Number]:
         case = program.folder / f"cantilever_{n}.toml"
         lists = {"frequency": frequency, "point.tip": tip, "x0": place, "v0": velocity}
         beam_case(case, lists, tip @ place, tip @ velocity, phase)
-        what = f"cantilever by {n} modes, one impact a period"
+        what = f"cantilever by {n} modes, one impact per period"
         ends = last(program.run("trajectory", case), "x", "v")
-        found.append(Number(CLOSED, f"{what}, flown without the stop: speed", speed, ends[1], 5e-10))
-        found.append(Number(CLOSED, "the same: where it then is, the stop", GAP, ends[0], 1e-12))
+        found.append(Number(CLOSED, f"{what}, computed without the stop: speed", speed, ends[1], 5e-10))
+        found.append(Number(CLOSED, "the same: final position, at the stop", GAP, ends[0], 1e-12))
         stop = '[contact.stop]\nbetween = ["beam.tip"]\nlaw = "newton"\n'
         case.write_text(f"{case.read_text()}{stop}restitution = {LOSS}\nupper = {GAP}\n")
         machine = beam_bounces(frequency, tip)
@@ -107,7 +107,7 @@ def cantilever(program: Program) -> list[Number]:
         hits = program.events(case, "impact_upper", "contact.stop")
         ours = hits[hits[:, 0] > 0, 0][: len(theirs)]
         miss = float(np.max(abs(ours - theirs))) if len(ours) == len(theirs) else np.inf
-        name = f"the same with the stop: hit after {theirs[0] / TURN:.3f} periods, {len(theirs)} impacts"
+        name = f"the same with the stop: impact after {theirs[0] / TURN:.3f} periods, {len(theirs)} impacts"
         found.append(Number(BOUNCES, name, 0, miss, 1e-10))
     return found
 
@@ -149,14 +149,14 @@ def capture(program: Program) -> list[Number]:
         ours = ours[ours > 0]
         end = float(lost(ours))
         what = f"vibro-impact nonlinear energy sink, mass ratio {mass:g}"
-        found.append(Number("other code", f"{what}: captured until (s)", other, end, bar))
+        found.append(Number("other code", f"{what}: end of the resonance capture (s)", other, end, bar))
         machine.run(start, until, touched=0)
         theirs = lost(np.array([time for time, *_ in machine.impacts]))
         found.append(Number(BOUNCES, "the same (s)", theirs, end, 1e-6))
         scaled.append(end * mass)
     # What is left goes as the mass to the power 2/3: the passage of a fold.
     limit = scaled[1] - (scaled[0] - scaled[1]) / (10 ** (2 / 3) - 1)
-    what = "the same times the mass ratio, carried on to the ratio 0"
+    what = "the same times the mass ratio, extrapolated to ratio 0"
     return [*found, Number("asymptotics", what, 1.28243, limit, 2e-3)]
 
 
@@ -184,23 +184,27 @@ def chatter(program: Program) -> list[Number]:
         found.append(
             Number(
                 BOUNCES,
-                f"{what}: the others after it",
+                f"{what}: state of the others after it",
                 0,
                 float(np.max(abs(every - theirs[[1, 2, 4, 5]]))),
                 1e-9,
             )
         )
         found.append(
-            Number(CLOSED, "the same: it stays, place and velocity", 0, float(np.max(np.abs(stays))), 0)
+            Number(
+                CLOSED,
+                "the same: position and velocity of the resting body",
+                0,
+                float(np.max(np.abs(stays))),
+                0,
+            )
         )
         settings["contact__floor__restitution"] = 0
         once = np.array(last(program.run("trajectory", "chatter", **settings), *names))
         differences.append(float(np.max(abs(once - every)[2:])))
     for k, speed in enumerate((0.01, 0.001)):
         order = float(np.log10(differences[k] / differences[k + 1]))
-        what = (
-            f"one plastic impact in the place of all: order in the speed of the difference, at {speed:g} m/s"
-        )
+        what = f"one plastic impact instead of all: order of the error in the speed, at {speed:g} m/s"
         found.append(Number("theorem (docs/theory.md)", what, 3, order, 0.1))
     return found
 

@@ -46,7 +46,7 @@ def grazes(program: Program) -> list[Number]:
         }
         with h5py.File(program.run("trajectory", "two_masses", **settings)) as file:
             largest = float(file.attrs["x_max"])
-        what = f"two masses, {frequency} rad/s, a graze: largest place of the second, its stop at 1"
+        what = f"two masses, {frequency} rad/s, graze: largest position of the second, stop at 1"
         found.append(Number(CLOSED, what, 1.0, largest, 1e-9))
     return found
 
@@ -64,7 +64,7 @@ def single_impacts(program: Program) -> list[Number]:
     for k, body in enumerate(("first", "second")):
         start |= {f"body__{body}__x0": place[k], f"body__{body}__v0": velocity[k]}
     hit = program.events("three_masses", "impact_upper", "contact.stop", run__duration=130, **start)[-1]
-    what = "three masses with a stop, 0.5 rad/s: impact speed ten periods later"
+    what = "three masses with a stop, 0.5 rad/s: impact speed after ten periods"
     found.append(Number(CLOSED, what, 1.965215727977, hit[2], 1e-9))
     # Structure and particle just after the upper wall.
     speed, ratio, loss, clearance, frequency = -4.467709642531, 0.1, 0.8, 10, 1.1
@@ -93,7 +93,13 @@ def beads(program: Program) -> list[Number]:
     place, lowest, highest = last(output, "b1_x", "b1_v", "b10_v")
     source = "Siconos, BeadColumnED_NewtonLaw"
     found = [
-        Number(source, "column of ten beads at 0.493 s: lowest (m)", 1.602081295401314e-2, place, 1e-13),
+        Number(
+            source,
+            "column of ten beads at 0.493 s: position of the lowest (m)",
+            1.602081295401314e-2,
+            place,
+            1e-13,
+        ),
         Number(source, "the same: velocity of the lowest", -0.8745122353873974, lowest, 1e-12),
         Number(source, "the same: velocity of the highest", -0.8745122353873974, highest, 1e-12),
     ]
@@ -133,14 +139,18 @@ def stack(program: Program) -> list[Number]:
             program.events("stack", "release", f"friction.{joint}", **settings)[:, 0]
             for joint in ("ground", "between")
         ]
-        what = f"two bodies on each other, {between} N between: the lower lets go (s)"
+        what = f"two stacked bodies, {between} N between: release of the lower (s)"
         found.append(Number(CLOSED, what, asin(2 / 2.5) / 0.01, times[0][0], 1e-9))
         if together:
-            found.append(Number(CLOSED, "the same: the upper at once (s)", times[0][0], times[1][0], 0))
+            found.append(
+                Number(CLOSED, "the same: simultaneous release of the upper (s)", times[0][0], times[1][0], 0)
+            )
         else:
             # Together 0.5 m/s^2; the upper stays until it would need more than 0.6.
             slow = times[1][0] if len(times[1]) else np.inf
-            found.append(Number(CLOSED, "the same: the upper later (s)", asin(2.2 / 2.5) / 0.01, slow, 1e-9))
+            found.append(
+                Number(CLOSED, "the same: later release of the upper (s)", asin(2.2 / 2.5) / 0.01, slow, 1e-9)
+            )
     return found
 
 
@@ -189,8 +199,8 @@ def beam(program: Program) -> list[Number]:
             largest = float(np.max(abs(file["x"][-2000:])))
         what = f"beam with dry friction, {frequency:g} rad/s"
         found.append(Number(source, f"{what}: largest deflection (m)", tip, largest, 5e-13))
-        found.append(Number(source, f"{what}: begins to slide (periods)", release, shares[0], 1e-5))
-        found.append(Number(source, f"{what}: sticks (periods)", stick, shares[1], 1e-5))
+        found.append(Number(source, f"{what}: onset of sliding (periods)", release, shares[0], 1e-5))
+        found.append(Number(source, f"{what}: onset of stick (periods)", stick, shares[1], 1e-5))
         if frequency != 200:
             machine = rubbed(modes, 0.2 * modes.shapes[14], frequency, modes.shapes[4], 1.5, turn / 100)
             machine.run("stuck", modes.start(), 10 * turn)
@@ -243,13 +253,15 @@ def bar(program: Program) -> list[Number]:
         energy = file["energy"][:]
     force = mass * (after + SPEED) / (leave - touch)
     source = "Siconos, ImpactingBar; waves"
-    what = f"bar on a wall, {KEPT} modes and the flexibility of the others"
+    what = f"bar on a wall, {KEPT} modes and residual flexibility"
     return [
-        Number(source, f"{what}: contact lasts (s)", 2 * LENGTH / wave, leave - touch, 4e-6),
-        Number(EXPONENTIALS, "the same: contact lasts (s)", lasted, leave - touch, 1e-12),
+        Number(source, f"{what}: contact duration (s)", 2 * LENGTH / wave, leave - touch, 4e-6),
+        Number(EXPONENTIALS, "the same: contact duration (s)", lasted, leave - touch, 1e-12),
         Number(source, "the same: mean force (N)", DENSITY * wave * AREA * SPEED, force, 13),
-        Number(CLOSED, "the same: energy after over that before", 1, float(energy[-1] / energy[0]), 1e-9),
-        Number(source, "the same: velocity after it (m/s)", SPEED, after, 5e-4),
+        Number(
+            CLOSED, "the same: ratio of the energies after and before", 1, float(energy[-1] / energy[0]), 1e-9
+        ),
+        Number(source, "the same: velocity after contact (m/s)", SPEED, after, 5e-4),
     ]
 
 
@@ -292,7 +304,13 @@ def cage(program: Program) -> list[Number]:
         ]
         half = (hits[0][-1, 0] - hits[1][-1, 0]) % turn
         found.append(
-            Number(CLOSED, "the same: impacts of the symmetric orbit apart (periods)", 0.5, half / turn, 1e-8)
+            Number(
+                CLOSED,
+                "the same: interval of impacts of the symmetric orbit (periods)",
+                0.5,
+                half / turn,
+                1e-8,
+            )
         )
     return found
 
@@ -309,7 +327,7 @@ def pair(program: Program) -> list[Number]:
                 times.append(np.unique(file["event_time"][:]))
         same = len(times[0]) == len(times[1])
         miss = float(np.max(abs(times[0] - times[1]))) if same else np.inf
-        what = f"pair with backlash from ({start}, {speed}), by its law and by bodies: difference in time of "
+        what = f"pair with backlash from ({start}, {speed}), as a law and as bodies: difference in time of "
         found.append(Number("pair of Separatrix", f"{what}{len(times[0])} events", 0, miss, 1e-9))
     return found
 

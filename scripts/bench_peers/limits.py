@@ -173,7 +173,7 @@ def limits_table(found: list[Limits]) -> str:
     """A column for each machine."""
     rows = [
         ["trajectories/s/core, 50 s", *(f"{one.rate:,.0f}".replace(",", " ") for one in found)],
-        ["events of a trajectory", *(f"{one.counts.events:.1f}" for one in found)],
+        ["events per trajectory", *(f"{one.counts.events:.1f}" for one in found)],
         ["evaluations of the motion", *(f"{one.counts.evaluations:.2f}" for one in found)],
         ["arithmetic operations", *(f"{one.arithmetic:,.0f}".replace(",", " ") for one in found)],
         [
@@ -181,12 +181,12 @@ def limits_table(found: list[Limits]) -> str:
             *(f"{one.instructions:,.0f}".replace(",", " ") for one in found),
         ],
         ["cycles", *(f"{one.cycles:,.0f}".replace(",", " ") for one in found)],
-        ["operations in a cycle", *(f"{one.arithmetic / one.cycles:.2f}" for one in found)],
-        [f"share of the peak, {PEAK} in a cycle", *(f"{100 * one.share:.0f} %" for one in found)],
-        ["bound: cycles", *(f"{one.bound:,.1f}".replace(",", " ") for one in found)],
-        ["times the bound", *(f"{one.cycles / one.bound:.1f}" for one in found)],
+        ["operations per cycle", *(f"{one.arithmetic / one.cycles:.2f}" for one in found)],
+        [f"share of the peak, {PEAK} per cycle", *(f"{100 * one.share:.0f} %" for one in found)],
+        ["lower bound of the cycles", *(f"{one.bound:,.1f}".replace(",", " ") for one in found)],
+        ["cycles relative to the bound", *(f"{one.cycles / one.bound:.1f}" for one in found)],
     ]
-    return table(["per event but for the first two rows", *(one.row.title for one in found)], rows)
+    return table(["per event except in the first two rows", *(one.row.title for one in found)], rows)
 
 
 def shares_table(program: Program, build: Path) -> str:
@@ -200,7 +200,7 @@ def shares_table(program: Program, build: Path) -> str:
             told = [f"{found.events:.1f}", f"{found.evaluations:.2f}", f"{100 * found.left:.3f} %"]
             rows.append([row.title, *told])
     return table(
-        ["machine", "events of a trajectory", "evaluations of an event", "left to the event loop"], rows
+        ["machine", "events per trajectory", "evaluations per event", "left to the event loop"], rows
     )
 
 

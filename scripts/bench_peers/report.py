@@ -72,13 +72,13 @@ def speed_table(results: Results) -> str:
             ]
         )
     header = [
-        "contestant",
+        "program",
         "trajectories/s/core (CPU time)",
         "all rounds",
         "by wall time",
-        "trajectories timed",
-        "our full runs are faster by",
-        "our settle-and-stop is faster by",
+        "timed trajectories",
+        "speed-up of our full runs",
+        "speed-up of our settle-and-stop",
     ]
     return table(header, rows)
 
@@ -99,13 +99,13 @@ def accuracy_table(results: Results) -> str:
             ]
         )
     header = [
-        "contestant",
+        "program",
         "starts compared",
         "largest relative deviation of a final state",
-        "impact counts that differ",
-        "labels that differ",
-        "stick phases met",
-        "impacts that event location missed",
+        "differing impact counts",
+        "differing labels",
+        "stick phases",
+        "impacts missed by event location",
     ]
     return table(header, rows)
 
@@ -137,7 +137,12 @@ def bar_table(results: Results) -> str:
             f"{number(coulomb)} and {number(viscous)}",
             met[min(coulomb, viscous) >= 1e5],
         ],
-        ["times the best peer at 1e-9", ">= 60", f"{number(times)} ({NAMES[best]})", met[times >= 60]],
+        [
+            "relative to the fastest peer at 1e-9",
+            ">= 60",
+            f"{number(times)} ({NAMES[best]})",
+            met[times >= 60],
+        ],
         [
             "settle-and-stop [trajectories/s/core]",
             ">= 300 000",
@@ -174,7 +179,7 @@ def bar_table(results: Results) -> str:
         ["simulated 10 000 ranks", ">= 90 % efficiency", away, ""],
         ["memory per rank", "constant in the map size", away, ""],
     ]
-    return table(["figure", "bar", "now", ""], rows)
+    return table(["quantity", "target", "result", ""], rows)
 
 
 def agreement(found: Accuracy) -> str:

@@ -166,7 +166,7 @@ ROWS = (
     ),
     Row(
         "kelvin_voigt",
-        "Kelvin-Voigt wall, pulls",
+        "Kelvin-Voigt wall, tension",
         50_000,
         {"contact": KELVIN_VOIGT | {"tension": 1}},
         linear=True,
@@ -174,7 +174,7 @@ ROWS = (
     ),
     Row(
         "kelvin_voigt_cut",
-        "Kelvin-Voigt wall, never pulls",
+        "Kelvin-Voigt wall, no tension",
         50_000,
         {"contact": KELVIN_VOIGT | {"tension": 0}},
         linear=True,

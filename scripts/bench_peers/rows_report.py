@@ -61,7 +61,7 @@ def speed_table(results: list[RowResult]) -> str:
     rows = []
     for result in in_order(results):
         peer, mine = best_peer(result), rate(result, "full")
-        bar = "none ran" if peer is None else number(times(result, peer))
+        bar = "no peer" if peer is None else number(times(result, peer))
         if peer is not None and times(result, peer) < TIMES_WANTED:
             bar = f"**{bar}**"
         rows.append(
@@ -81,7 +81,7 @@ def speed_table(results: list[RowResult]) -> str:
         "goal",
         "settle-and-stop",
         *PEERS.values(),
-        "full runs, times the best peer",
+        "full runs, relative to the fastest peer",
         "commit",
     ]
     return table(header, rows)
@@ -92,7 +92,9 @@ def reached(results: list[RowResult]) -> str:
     goals = sum(rate(result, "full") >= ROW[result.key].goal for result in results)
     raced = [(result, best_peer(result)) for result in results if best_peer(result)]
     bars = sum(times(result, peer) >= TIMES_WANTED for result, peer in raced)
-    return f"{goals} of {len(results)}; at least {TIMES_WANTED} times the best peer: {bars} of {len(raced)}"
+    return (
+        f"{goals} of {len(results)}; at least {TIMES_WANTED} times the fastest peer: {bars} of {len(raced)}"
+    )
 
 
 def against(result: RowResult, name: str, what: str) -> str:
@@ -129,12 +131,12 @@ def accuracy_table(results: list[RowResult]) -> str:
     header = [
         "machine",
         "deviation from quadruple precision",
-        "bar",
-        "impact counts that differ from it",
-        "deviation of the best peer",
-        "impact counts that differ, lanes and one by one",
+        "tolerance",
+        "impact counts differing from it",
+        "deviation of the fastest peer",
+        "impact counts differing between lanes and one by one",
         "deviation of lanes from one by one",
-        "labels of settle-and-stop that differ from full runs",
+        "labels of settle-and-stop differing from full runs",
     ]
     return table(header, rows)
 

@@ -27,16 +27,16 @@ def bars(found: list[Score], with_asked: list[bool]) -> list[list[str]]:
     asked = [one for one in strong if one.answer in ("named", "ambiguous")]
     rows = [
         at_least(
-            "right of the decided, d' >= 5, noise <= 1 %", 0.95, [o.right for o in decided if o.noise <= 0.01]
+            "right among decided, d' >= 5, noise <= 1 %", 0.95, [o.right for o in decided if o.noise <= 0.01]
         ),
         at_least(
-            "right of the decided, d' >= 5, noise 3 %", 0.90, [o.right for o in decided if o.noise == 0.03]
+            "right among decided, d' >= 5, noise 3 %", 0.90, [o.right for o in decided if o.noise == 0.03]
         ),
         at_least(
-            "right of the decided, d' >= 5, noise 5 %", 0.80, [o.right for o in decided if o.noise == 0.05]
+            "right among decided, d' >= 5, noise 5 %", 0.80, [o.right for o in decided if o.noise == 0.05]
         ),
         at_least("decided, d' >= 5", 0.85, [o.decided for o in strong]),
-        at_least("truth in the set reported, d' >= 5", 0.98, [o.contains for o in asked]),
+        at_least("truth in the reported set, d' >= 5", 0.98, [o.contains for o in asked]),
         at_most("wrong name, all cases", 0.03, [o.wrong_name for o in found]),
         at_most(
             "anything reported where nothing is hidden", 0.05, [o.alarm for o in found if o.kind == "none"]
@@ -48,21 +48,21 @@ def bars(found: list[Score], with_asked: list[bool]) -> list[list[str]]:
     closes = [one.character_closes for one in outside if one.depends_rightly]
     share = statistics.median(closes) if closes else math.nan
     rows += [
-        at_least("outside the catalogue, rightly told on what it depends", 0.60, told),
+        at_least("outside the catalogue, dependence right", 0.60, told),
         [
-            "held-out gap that those would close",
+            "held-out gap that these forces would close",
             ">= 80 %",
             f"{100 * share:.1f} % (median of {len(closes)})",
             met(rate([one >= 0.8 for one in closes]), 0.5, 1),
         ],
-        at_most("a decoy could be named, all cases", 0.02, [o.decoy for o in found]),
+        at_most("a negative control could be named, all cases", 0.02, [o.decoy for o in found]),
         at_least(
-            "region of the effect, d' >= 5, rightly named",
+            "region of rightly named effects, d' >= 5",
             0.90,
             [o.region for o in strong if o.region is not None],
         ),
     ]
-    rows.append(at_least("a set becomes the right name with the record that it asks for", 0.80, with_asked))
+    rows.append(at_least("set resolved to the right name by the proposed record", 0.80, with_asked))
     quick = [one.seconds for one in found if one.whole < LONG]
     mean = statistics.fmean(quick) if quick else math.nan
     rows.append(

@@ -5,6 +5,7 @@
 import json
 import math
 import statistics
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -20,6 +21,9 @@ from scoring import HAVE_A_TERM, PRECISE, SEPARABLE, STRONG, Score, score
 
 TEMPLATE = Path(__file__).resolve().parent / "discovery.md.in"
 METHODS = ("STLSQ", "ensemble SINDy")
+NOTHING = "nothing was detected"
+"""The reason where a verdict gives none."""
+WIDTH = 120
 
 
 class Broken(Exception):
@@ -157,15 +161,20 @@ def undecided(folders: object, found: list[Score]) -> list[list[str]]:
         if not one.strong or one.decided:
             continue
         verdict = folders.told(folders.result(one.number))["verdict"]
-        for text in verdict.get("reasons") or ["nothing was detected"]:
+        for text in verdict.get("reasons") or [NOTHING]:
             key = (one.column, text)
             reasons[key] = reasons.get(key, 0) + 1
     return [[*key, str(count)] for key, count in sorted(reasons.items(), key=lambda item: -item[1])]
 
 
+def quoted(reason: str) -> str:
+    """The message of a verdict as a page shows it."""
+    return reason if reason == NOTHING else f"`{reason}`"
+
+
 def page(folders: object, found: list[Score], unreachable: int, seed: int, asked: int) -> str:
     """The text of the page."""
-    rate_head = "cases, decided, right of the decided, truth in the set reported, wrong name".split(", ")
+    rate_head = "cases, decided, right among decided, truth in the reported set, wrong name".split(", ")
     noises = sorted({one.noise for one in found})
     strong = [one for one in found if one.strong]
     pairs = followed.followed(folders, found)
@@ -174,7 +183,7 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "asked": asked,
         "unreachable": unreachable,
         "seed": seed,
-        "developed_on": seeds.developed_on(),
+        "developed_on": textwrap.fill(seeds.developed_on(), WIDTH),
         "of_this_seed": seeds.of_page(seed),
         "version": versions(folders, found),
         "none": sum(one.kind == "none" for one in found),
@@ -196,17 +205,17 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
         "rows": table(["hidden", "cases, d' >= 5", "decided"], rows_of_strong(found)),
         "bars": table(["figure", "bar", "found", "met"], bars(found, followed.rightly(pairs))),
         "followed": table(
-            ["hidden", "sets with such a record", "rightly answered with it", "wrongly named", "still a set"],
+            ["hidden", "sets with such a record", "right with it", "wrongly named", "still a set"],
             followed.rows(pairs),
         ),
         "followed_seconds": followed.seconds(pairs),
         "separable_bars": table(
-            ["effects with d' of at least 5", "decided", "right of the decided", "wrong name"],
+            ["effects with d' of at least 5", "decided", "right among decided", "wrong name"],
             [
                 [name, str(decided(group)), str(right(group)), str(rate([one.wrong_name for one in group]))]
                 for name, group in (
-                    ("told from any other", [one for one in strong if one.separable]),
-                    ("hidden behind another", [one for one in strong if not one.separable]),
+                    ("distinguishable from any other", [one for one in strong if one.separable]),
+                    ("imitated by another", [one for one in strong if not one.separable]),
                 )
             ],
         ),
@@ -238,8 +247,11 @@ def page(folders: object, found: list[Score], unreachable: int, seed: int, asked
             baselines(found),
         ),
         "without_term": ", ".join(f"`{name}`" for name in effects.CATALOGUE if name not in HAVE_A_TERM),
-        "leaves": table(["what is left", "names and sets", "truth in it", "wrong name"], leavings(found)),
-        "undecided": table(["answer", "reason", "cases"], undecided(folders, found)),
+        "leaves": table(["remainder", "names and sets", "truth contained", "wrong name"], leavings(found)),
+        "undecided": table(
+            ["answer", "reason", "cases"],
+            [[answer, quoted(reason), count] for answer, reason, count in undecided(folders, found)],
+        ),
         "failed": str(rate([one.answer == "failed" for one in found])),
     }
     return TEMPLATE.read_text().format(**fields)
@@ -252,7 +264,7 @@ def leavings(found: list[Score]) -> list[list[str]]:
     for name in ("noise", "little of the gap", "larger noise", ""):
         group = [one for one in asked if one.leaves == name]
         cells = [rate([one.contains for one in group]), rate([one.wrong_name for one in group])]
-        rows.append([name or "more: a doubted name", str(len(group)), *map(str, cells)])
+        rows.append([name or "more: a name in doubt", str(len(group)), *map(str, cells)])
     return rows
 
 
@@ -292,11 +304,11 @@ def conditions(found: list[Score]) -> list[list[str]]:
         lambda one: one.colour + " noise",
         density,
         lambda one: "position and velocity" if one.velocity else "position only",
-        lambda one: "crank angle measured" if one.crank_angle else "crank angle from a mark",
+        lambda one: "crank angle measured" if one.crank_angle else "crank angle at the first sample",
         lambda one: f"regime `{one.regime}`",
         lambda one: "one effect" if one.kind == "single" else "two effects",
         lambda one: "law of another shape" if one.shaped else "law of the catalogue",
-        lambda one: "small faults of the rig" if one.rig else "no fault of the rig",
+        lambda one: "small imperfections" if one.rig else "no imperfections",
         lambda one: "50 000 samples or more" if one.whole >= LONG else "fewer than 50 000 samples",
     ):
         rows += classes(

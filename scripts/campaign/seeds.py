@@ -41,7 +41,7 @@ def of_page(seed: int) -> str:
     """What has to be said of a page of this seed."""
     if seed in BLIND_UP_TO:
         last = BLIND_UP_TO[seed]
-        return f"Verdicts on {seed} up to commit {last} were given before anybody looked, later ones not."
+        return f"Verdicts on {seed} up to commit {last} preceded any look at the truths, later ones did not."
     if seed in DEVELOPED_ON:
         return f"**The seed of this page, {seed}, is one of them.**"
     return "The seed of this page is not among them."

@@ -70,9 +70,9 @@ def remark(results: Results) -> str:
     if not busy(results):
         return ""
     return (
-        "**This machine was busy with other work: two independent programs side by side gained "
-        f"{ceiling(results, 2):.2f} x over one alone. The times of this run say nothing about two free "
-        "cores, only the idle shares do.**\n\n"
+        "**This machine was busy with other work: two simultaneous independent programs gained "
+        f"{ceiling(results, 2):.2f} x over one alone. The times of this run do not apply to two free cores; "
+        "the idle shares do.**\n\n"
     )
 
 
@@ -95,11 +95,11 @@ def strong_table(results: Results) -> str:
     header = [
         "ranks",
         "whole program: median (all repetitions)",
-        "times one rank",
+        "relative to one rank",
         "tiles alone",
-        "times one rank",
+        "relative to one rank",
         "idle while tiles are left",
-        "independent copies: times one",
+        "independent copies, relative to one",
     ]
     return table(header, rows)
 
@@ -144,7 +144,7 @@ def check_table(results: Results) -> str:
                 percent(expected.idle),
             ]
         )
-    header = ["what ran", "ranks", "per node", "questions", "model", "tiles of a rank", "model"]
+    header = ["run", "ranks", "per node", "questions", "model", "tiles per rank", "model"]
     return table([*header, "time", "model", "idle", "model"], rows)
 
 
@@ -166,7 +166,7 @@ def tiles_table(results: Results) -> str:
 def looks_table(results: Results) -> str:
     """Efficiency against the looks of rank 0."""
     rows = [[str(looks), *map(percent, line)] for looks, line in results.simulated.by_looks.items()]
-    header = ["looks of rank 0 per tile", *(f"{seconds:g} s a tile" for seconds in simulation.TILE_SECONDS)]
+    header = ["polls of rank 0 per tile", *(f"{seconds:g} s per tile" for seconds in simulation.TILE_SECONDS)]
     return table(header, rows)
 
 
@@ -182,7 +182,7 @@ def packing_table(found: packing.Packing) -> str:
         ]
         for size, runs in enumerate(found.runs)
     ]
-    return table(["points", "whole run", "final file", "share", "of it by rank 0 alone"], rows)
+    return table(["points", "whole run", "final file", "share", "by rank 0 alone"], rows)
 
 
 def memory_table(peaks: list[memory.Peak], last: list[int] | None = None) -> str:
@@ -206,8 +206,7 @@ def bar_table(results: Results) -> str:
     finish = results.packing.middle(-1, "share")
     many = simulated.by_ranks[simulation.BAR_SPREAD][place]
     groups = [
-        f"{min(p.bytes for p in peaks) / MIB:.1f} to {max(p.bytes for p in peaks) / MIB:.1f} MiB from "
-        f"{number(peaks[0].points)} to {number(peaks[-1].points)} points ({how})"
+        f"{min(p.bytes for p in peaks) / MIB:.1f} to {max(p.bytes for p in peaks) / MIB:.1f} MiB ({how})"
         for how, peaks in (("whole runs", found.whole), ("stopped early", found.started))
     ]
     rows = [
@@ -223,7 +222,7 @@ def bar_table(results: Results) -> str:
             f">= {100 * BAR_EFFICIENCY:.0f} %",
             f"{percent(many)} with {simulation.USUAL} tiles per rank; "
             + (
-                f"from {simulated.least_tiles} tiles per rank on"
+                f"at least {100 * BAR_EFFICIENCY:.0f} % from {simulated.least_tiles} tiles per rank on"
                 if simulated.least_tiles
                 else "no number of tiles per rank"
             ),
@@ -239,12 +238,11 @@ def bar_table(results: Results) -> str:
         [
             "memory per rank",
             "constant in the map size",
-            f"{groups[0]}, {groups[1]}; {found.bytes_per_tile:.0f} bytes for each tile, of which there are "
-            f"at most {number(MOST_TILES)} unless the case asks for more",
+            f"{groups[0]}, {groups[1]}; {found.bytes_per_tile:.0f} bytes per tile",
             met[found.growth <= BAR_MEMORY],
         ],
     ]
-    return table(["figure", "bar", "now", ""], rows)
+    return table(["quantity", "target", "result", ""], rows)
 
 
 def conditions(results: Results) -> str:

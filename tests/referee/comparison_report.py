@@ -8,8 +8,8 @@ PARTS = ("basin", "points", "runs", "starts")
 # Disagreements that were looked into: (case, part) and why, with the evidence.
 EXPLAINED: dict[tuple[str, str], str] = {}
 CAUSES = {
-    "not known": "silence: the program does not say what it is",
-    "rounding": "the referee agrees in extended precision or 1e-12 beside the start",
+    "not known": "the program leaves the motion unclassified",
+    "rounding": "the referee agrees in extended precision or with the start shifted by 1e-12",
     "unfounded": "a cycle closed by rounding: the motion is unstable for too long between two chatters",
     "wrong": "**not explained**",
 }
@@ -85,7 +85,7 @@ def disagreements(reports: dict[str, dict]) -> str:
                         cause,
                     ]
                 )
-    head = ["machine", "part", "verdict", "number", "first", "ours", "referee", "cause"]
+    head = ["machine", "part", "verdict", "count", "first case", "program", "referee", "cause"]
     return table(head, rows) if rows else "None."
 
 
