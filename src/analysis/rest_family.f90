@@ -7,8 +7,8 @@ module rest_family
   use body_family, only: family_t
   use equilibrium, only: correct_equilibrium, equilibrium_t
   use errors, only: error_t
-  use jointed, only: joint_elastic, joint_friction, most_joints
-  use jointed_state, only: joint_motion, turning_at
+  use multibody, only: joint_elastic, joint_friction, most_joints
+  use multibody_state, only: joint_motion, turning_at
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood, watched_rows
   use structure, only: count_joints, mode_number, structure_t

@@ -8,9 +8,9 @@ module structure_exponents
   use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
-  use jointed, only: joint_contact, joint_soft
-  use jointed_section, only: jointed_point, lay_out
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use multibody, only: joint_contact, joint_soft
+  use multibody_section, only: multibody_point, lay_out
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: int64, wp
   use motion, only: start_state
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_touch_lower, &
@@ -44,7 +44,7 @@ contains
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
     type(state_t) :: state
-    type(jointed_state_t) :: jointed
+    type(multibody_state_t) :: multibody
     select type (machine => machines%centre)
     type is (one_body_t)
       state = start_state(machine%moving, start(1), start(2), start(3))
@@ -55,8 +55,8 @@ contains
       end if
       call look_at_section(machines, series, spectrum)
     type is (structure_t)
-      jointed = state_at_start(machine, start)
-      call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
+      multibody = state_at_start(machine, start)
+      call exponents_of_structure(machines, machine, multibody, transient, sections, spectrum, series)
     end select
   end subroutine exponents_of_machine
 
@@ -78,12 +78,12 @@ contains
     integer, intent(in) :: transient, sections
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
-    type(jointed_state_t) :: jointed
+    type(multibody_state_t) :: multibody
     logical :: ok
     select type (machine => machines%centre)
     type is (structure_t)
-      call start_of_structure(machine, point, jointed, ok)
-      if (ok) call exponents_of_structure(machines, machine, jointed, transient, sections, spectrum, series)
+      call start_of_structure(machine, point, multibody, ok)
+      if (ok) call exponents_of_structure(machines, machine, multibody, transient, sections, spectrum, series)
     class default
       call exponents_of_machine(machines, [point, 0.0_wp], transient, sections, spectrum, series)
     end select
@@ -94,7 +94,7 @@ contains
   subroutine exponents_of_structure(machines, structure, state, transient, sections, spectrum, series)
     type(neighbourhood_t), intent(in) :: machines
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     integer, intent(in) :: transient, sections
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
@@ -176,11 +176,11 @@ contains
   !> Takes from a structure that nothing ties to the ground the drift of the whole, which would run out of its digits.
   pure subroutine bring_back(structure, state)
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), dimension(structure%frame%moving%machine%n) :: q, v
     associate (moving => structure%frame%moving)
       if (structure%places == size(q) .and. structure%frame%speeds == size(q)) return
-      call lay_out(moving, jointed_point(moving, state), q, v)
+      call lay_out(moving, multibody_point(moving, state), q, v)
       state%q(:size(q)) = q
       state%v(:size(v)) = v
     end associate
@@ -190,7 +190,7 @@ contains
   !> up; `smooth` where a transition is not known to be smooth.
   subroutine advance_alone(structure, state, events, lasted, reason, smooth)
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     type(event_t), allocatable, intent(inout) :: events(:)
     real(wp), intent(out) :: lasted
     integer, intent(out) :: reason
@@ -213,7 +213,7 @@ contains
   subroutine advance_with_frame(machines, structure, state, frame, growth, events, lasted, reason)
     type(neighbourhood_t), intent(in) :: machines
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(inout) :: frame(:, :)
     real(wp), intent(out) :: growth(:), lasted
     type(event_t), allocatable, intent(inout) :: events(:)
@@ -239,7 +239,7 @@ contains
   !> The watched position; what may be anywhere is watched by what does not run away.
   pure real(wp) function place_of(structure, state) result(place)
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: point(structure%n)
     place = state%q(structure%frame%moving%machine%watched)
     if (structure%places == structure%frame%moving%machine%n) return
@@ -369,7 +369,7 @@ contains
     type(event_t), intent(in) :: event
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:)
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp) :: slope(structure%n), s, u, given
     associate (machine => structure%frame%moving%machine, p => structure%places)
       state = state_in(structure, mode, event%time, y(:structure%n))

@@ -7,8 +7,8 @@ module structure_margins
   use guards, only: force_ends, force_returns, guards_of, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, &
     slide_ends, slides_down, slides_up, turns_round
   use hybrid_machine, only: event_t, hybrid_t
-  use jointed, only: most_joints
-  use jointed_state, only: jointed_state_t
+  use multibody, only: most_joints
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use motion_state, only: event_release
@@ -167,7 +167,7 @@ contains
     type(event_t) :: probe
     real(wp) :: y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(most_guards)
     real(wp) :: least_t, least
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     integer :: i, g, at, count_guards, count_looks
     state = state_in(machine, mode, from, start)
     call flow_of(machine%frame%moving, state%phase, at, spare)

@@ -7,7 +7,7 @@ module structure_sequence
   use contact_law, only: contact_kelvin_voigt
   use guards, only: force_ends, leaves, meets_lower, meets_upper, slide_ends, slides_down, slides_up
   use hybrid_machine, only: event_t
-  use jointed, only: joint_contact, joint_friction, joint_soft, most_joints
+  use multibody, only: joint_contact, joint_friction, joint_soft, most_joints
   use kinds, only: wp
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_release, &
     event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point

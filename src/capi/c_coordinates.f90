@@ -9,7 +9,7 @@ module c_coordinates
   use c_text, only: answer, to_c
   use coordinate_segments, only: coordinate_report_t, coordinate_samples_t, propagate_coordinates
   use errors, only: error_t, fail
-  use jointed, only: integral_of, is_stop, jointed_t
+  use multibody, only: integral_of, is_stop, multibody_t
   use kinds, only: wp
   use machine_facts, only: is_one_body, structure_in
   use model_type, only: check_values, model_options, model_t
@@ -31,7 +31,7 @@ contains
     character(kind=c_char), intent(inout) :: name(*), message(*)
     integer(c_size_t), value :: name_size, message_size
     type(error_t), allocatable :: error
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     call build(model, machine, error)
     if (.not. allocated(error)) then
       if (index < 0 .or. index >= machine%n) then
@@ -49,7 +49,7 @@ contains
     character(kind=c_char), intent(inout) :: name(*), message(*)
     integer(c_size_t), value :: name_size, message_size
     type(error_t), allocatable :: error
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     integer, allocatable :: contacts(:)
     integer :: i
     call build(model, machine, error)
@@ -68,7 +68,7 @@ contains
   !> The structure of a model as it is.
   subroutine build(model, machine, error)
     type(c_ptr), intent(in) :: model
-    type(jointed_t), intent(out) :: machine
+    type(multibody_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(model_t), pointer :: self
     type(motion_t) :: moving
@@ -131,7 +131,7 @@ contains
     type(coordinate_report_t), intent(out) :: report
     type(error_t), allocatable, intent(out) :: error
     type(family_t) :: family
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     call check_values(self, chosen, values, error)
     if (.not. allocated(error)) call check_directions(directions, derivatives, error)
     if (.not. allocated(error)) call check_tolerance(tolerance, error)
@@ -152,7 +152,7 @@ contains
 
   !> A start has all that the motion depends on. Code 65, or 64 for the wrong number of coordinates.
   subroutine check_machine(machine, rows, error)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: rows
     type(error_t), allocatable, intent(out) :: error
     if (rows /= 2*machine%n) then
@@ -169,7 +169,7 @@ contains
 
   !> Whether stops of two bodies move on for ever.
   pure logical function runs_on(machine)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     runs_on = .false.
     if (allocated(machine%driver)) runs_on = abs(machine%driver%stops_run) > 0
   end function runs_on

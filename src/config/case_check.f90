@@ -5,7 +5,7 @@
 module case_check
   use angle_units, only: unit_of
   use axis, only: axis_t
-  use build_jointed, only: is_jointed
+  use build_multibody, only: is_multibody
   use build_motion, only: machine_of
   use case_parameters, only: is_start, parameter_value, set_parameter
   use case_source, only: case_source_t, report
@@ -169,7 +169,7 @@ contains
     character(len=:), allocatable :: problem
     integer :: i, j
     logical :: is_axis
-    if (is_jointed(the_case%laws)) then
+    if (is_multibody(the_case%laws)) then
       if (is_good(source, ['spring  ', 'friction', 'drive   ', 'watch   '])) call check_bodies_at_start(source, the_case)
       return
     end if

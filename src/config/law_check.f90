@@ -4,14 +4,14 @@
 !> What must hold between the values of one choice of laws.
 module law_check
   use angle_units, only: unit_of
-  use build_jointed, only: is_jointed, jointed_of
+  use build_multibody, only: is_multibody, multibody_of
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
   use drive_law, only: ends_with_its_first
   use effect_check, only: refuse_effects
   use errors, only: error_t
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
   use lever_reach, only: check_assembly
@@ -122,11 +122,11 @@ contains
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: at
     type(pair_t) :: pair
-    type(jointed_t) :: jointed
+    type(multibody_t) :: multibody
     type(error_t), allocatable :: error
-    if (is_jointed(laws)) then
+    if (is_multibody(laws)) then
       if (.not. is_good(source, ['spring   ', 'structure'])) return
-      call jointed_of(laws, jointed, error)
+      call multibody_of(laws, multibody, error)
     else if (is_pair(laws)) then
       call build_pair(laws, pair, error)
     else

@@ -5,7 +5,7 @@
 module structure_reader
   use case_source, only: case_source_t, description, enter_table, find, know, know_all_below, list_size, report
   use case_values, only: any_number, at_least, take_integer, take_real, take_reals, take_text
-  use jointed, only: most_degrees
+  use multibody, only: most_degrees
   use kinds, only: real64, wp
   use law_table, only: label_length, law_choice, law_choice_t, part_family, set_value
   use matrix_market, only: read_matrix_market

@@ -4,10 +4,10 @@
 !> As `segments`, of a structure: stretches of a motion of all its coordinates, each from a start of its own, with the derivatives
 !> of the samples along directions in the space of the parameters and by the start.
 module coordinate_segments
-  use jointed, only: is_stop, joint_elastic
-  use jointed_motion, only: advance_jointed, advance_jointed_period, jointed_motion_t
-  use jointed_section, only: start_of_jointed
-  use jointed_state, only: joint_motion, jointed_state_t, rounding_of_speed, turning_at
+  use multibody, only: is_stop, joint_elastic
+  use multibody_motion, only: advance_multibody, advance_multibody_period, multibody_motion_t
+  use multibody_section, only: start_of_multibody
+  use multibody_state, only: joint_motion, multibody_state_t, rounding_of_speed, turning_at
   use kinds, only: wp
   use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
     tally_t
@@ -73,14 +73,14 @@ contains
     total = 0
     do i = 1, size(start, 2)
       associate (from => first(i) + 1, to => first(i + 1))
-        call fly(family%moving%jointed, start(:, i), times(from:to), base)
+        call fly(family%moving%multibody, start(:, i), times(from:to), base)
         samples%motion(:, from:to) = base%motion
         report%impacts(i) = base%count
         report%reason(i) = base%reason
         report%steady(i) = base%reason == 0
         if (derivatives) then
           if (any(base%impact(3, :base%count) < family%least_speed)) report%steady(i) = .false.
-          if (allocated(family%adaptive)) call fly(family%adaptive%jointed, start(:, i), times(from:to), adaptive)
+          if (allocated(family%adaptive)) call fly(family%adaptive%multibody, start(:, i), times(from:to), adaptive)
           call differentiate(family, start(:, i), times(from:to), base, adaptive, other, samples%slope(:, :, from:to), &
                              report%steady(i))
         end if
@@ -100,10 +100,10 @@ contains
 
   !> One segment of one machine.
   pure subroutine fly(moving, start, times, run)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:), times(:)
     type(run_t), intent(inout) :: run
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     type(tally_t) :: tally
     integer :: n, done
     n = moving%machine%n
@@ -117,7 +117,7 @@ contains
     allocate (run%motion(2*n, size(times)))
     if (all(ieee_is_finite(start))) then
       associate (watched => moving%machine%watched)
-        state = start_of_jointed(moving, start(watched), start(n + watched), start(2*n + 1), &
+        state = start_of_multibody(moving, start(watched), start(n + watched), start(2*n + 1), &
                                  reshape(transpose(reshape(start(:2*n), [n, 2])), [2*n]))
       end associate
       if (.not. ieee_is_finite(state%q(1))) run%reason = exit_bad_case
@@ -142,8 +142,8 @@ contains
 
   !> Elastic friction slides as its surfaces move.
   pure subroutine let_slide(moving, state)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     complex(wp) :: turning(moving%harmonics)
     real(wp) :: s, u
     integer :: j
@@ -161,24 +161,24 @@ contains
 
   !> Moves to `until` [s on the clock of the log].
   pure subroutine fly_to(moving, until, state, tally, run)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: until
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     type(run_t), intent(inout) :: run
     do while (until - run%log%origin >= moving%machine%period)
-      call advance_jointed_period(moving, state, tally, run%reason, run%log)
+      call advance_multibody_period(moving, state, tally, run%reason, run%log)
       if (run%reason /= 0) return
       ! Budgets are of one period.
       tally%events = 0
       tally%steps = 0
     end do
-    call advance_jointed(moving, state, until - run%log%origin, tally, run%reason, run%log)
+    call advance_multibody(moving, state, until - run%log%origin, tally, run%reason, run%log)
   end subroutine fly_to
 
   !> Takes the impacts out of the events. Contacts are counted by themselves: a neighbour may have further joints.
   pure subroutine read_impacts(moving, run)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     type(run_t), intent(inout) :: run
     real(wp) :: side, after
     integer :: i, k, contact
@@ -229,7 +229,7 @@ contains
         step = sense*family%start_step(merge(3, merge(1, 2, k <= n), k > 2*n))
         moved = start
         moved(k) = start(k) + step
-        call compare(family%moving%jointed, moved, moved(k) - start(k), times, base, other, open, slope(row, :, :), steady)
+        call compare(family%moving%multibody, moved, moved(k) - start(k), times, base, other, open, slope(row, :, :), steady)
         if (.not. any(open)) exit
         sense = -sense
       end do
@@ -254,18 +254,18 @@ contains
       associate (variant => family%further(k))
         if (.not. abs(variant%step) > 0) return
         if (variant%leaves_exact) then
-          call compare(variant%moving%jointed, start, variant%step, times, adaptive, other, open, slope, steady)
+          call compare(variant%moving%multibody, start, variant%step, times, adaptive, other, open, slope, steady)
         else
-          call compare(variant%moving%jointed, start, variant%step, times, base, other, open, slope, steady)
+          call compare(variant%moving%multibody, start, variant%step, times, base, other, open, slope, steady)
         end if
       end associate
     else
       associate (variant => family%back(k))
         if (.not. abs(variant%step) > 0) return
         if (variant%leaves_exact) then
-          call compare(variant%moving%jointed, start, variant%step, times, adaptive, other, open, slope, steady)
+          call compare(variant%moving%multibody, start, variant%step, times, adaptive, other, open, slope, steady)
         else
-          call compare(variant%moving%jointed, start, variant%step, times, base, other, open, slope, steady)
+          call compare(variant%moving%multibody, start, variant%step, times, base, other, open, slope, steady)
         end if
       end associate
     end if
@@ -275,7 +275,7 @@ contains
   !> between an impact of the base and the same impact of the neighbour. A neighbour that cannot be flown fills in none. Takes
   !> the steadiness away if the two do not meet the same stops in the same order.
   pure subroutine compare(moving, start, step, times, base, other, open, slope, steady)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:), step, times(:)
     type(run_t), intent(in) :: base
     type(run_t), intent(inout) :: other

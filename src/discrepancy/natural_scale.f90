@@ -4,7 +4,7 @@
 !> The natural size of a quantity for a machine: what its unit is worth in the length, time and mass that the machine itself
 !> sets. Steps of finite differences are shares of it, so that a parameter whose value is 0 has one too.
 module natural_scale
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: wp
   use oscillator, only: oscillator_t
   implicit none
@@ -31,7 +31,7 @@ contains
 
   !> The length that stops and forces of a structure set, the time of a radian of its section, its heaviest body.
   pure function scales_of_structure(machine) result(scales)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(scales_t) :: scales
     integer :: i
     if (machine%frequency > 0) scales%time = 1/machine%frequency

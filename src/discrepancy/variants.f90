@@ -10,7 +10,7 @@ module variants
   use build_motion, only: limit_budgets, machine_of
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
   use machine_facts, only: is_one_body, structure_in
@@ -130,7 +130,7 @@ contains
   !> Whether no mode of a machine is flown adaptively.
   pure logical function all_exact(moving)
     type(motion_t), intent(in) :: moving
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     if (is_one_body(moving)) then
       all_exact = moving%exact .and. .not. moving%layer > 0 .and. .not. moving%machine%contact%soft
     else

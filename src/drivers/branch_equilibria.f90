@@ -7,7 +7,7 @@ module branch_equilibria
   use branch_search, only: search_t
   use equilibrium, only: count_unstable, equilibrium_t
   use errors, only: error_t
-  use jointed, only: is_stop
+  use multibody, only: is_stop
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use machine_family, only: machine_of_family

@@ -3,7 +3,7 @@
 
 !> What a case leaves to defaults, and what is allowed in it and hardly meant.
 module case_warnings
-  use build_jointed, only: jointed_of
+  use build_multibody, only: multibody_of
   use case_parameters, only: parameter_value
   use case_setup, only: grid_of
   use case_type, only: case_t
@@ -13,7 +13,7 @@ module case_warnings
   use errors, only: error_t
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
-  use jointed, only: joint_contact, jointed_t
+  use multibody, only: joint_contact, multibody_t
   use journal, only: journal_t
   use kinds, only: int64, wp
   use machine_facts, only: contact_sizes, stops_of
@@ -75,11 +75,11 @@ contains
   subroutine warn_about_impulses(the_case, journal)
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     type(error_t), allocatable :: error
     integer :: i
     if (.not. any(the_case%laws%family == 'body' .and. the_case%laws%name == 'structure')) return
-    call jointed_of(the_case%laws, machine, error)
+    call multibody_of(the_case%laws, machine, error)
     if (allocated(error) .or. .not. allocated(machine%impulses)) return
     do i = 1, size(machine%impulses)
       if (machine%impulses(i)%time <= the_case%run%duration) cycle
@@ -104,11 +104,11 @@ contains
   subroutine warn_about_modes(the_case, journal)
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     type(error_t), allocatable :: error
     real(wp) :: share
     integer :: j
-    call jointed_of(the_case%laws, machine, error)
+    call multibody_of(the_case%laws, machine, error)
     if (allocated(error)) return
     do j = 1, size(machine%joints)
       if (machine%joints(j)%kind /= joint_contact) cycle
@@ -122,7 +122,7 @@ contains
 
   !> Share of the upper half of the undamped modes in the mobility along a row.
   function upper_share(machine, row) result(share)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     real(wp), intent(in) :: row(:)
     real(wp) :: share, squares(machine%n), shapes(machine%n, machine%n), part(machine%n)
     share = 0

@@ -14,7 +14,7 @@ module trajectory_driver
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
@@ -151,7 +151,7 @@ contains
     type(span_t), intent(in) :: span
     type(log_t), intent(in) :: log
     type(features_t), intent(inout) :: features
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     integer :: i
     if (is_one_body(moving) .or. features%regime /= regime_non_impact) return
     if (has_drive_period(moving) .or. has_driver(moving)) return

@@ -5,8 +5,8 @@
 !> exponential series.
 module flight_path
   use elementary, only: exponential, sine_cosine
-  use jointed, only: joint_elastic, joint_friction, joint_soft, jointed_t, most_degrees
-  use jointed_state, only: acts_as_spring, is_curved, is_held, joint_force, jointed_state_t, running_control, turning_at
+  use multibody, only: joint_elastic, joint_friction, joint_soft, multibody_t, most_degrees
+  use multibody_state, only: acts_as_spring, is_curved, is_held, joint_force, multibody_state_t, running_control, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of, mode_flow_t
   use polynomial, only: value_at
@@ -41,9 +41,9 @@ contains
 
   !> The motion from `state` on.
   pure subroutine begin_path(machine, flow, state, path)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(path_t), intent(out) :: path
     integer :: n
     n = machine%n
@@ -60,12 +60,12 @@ contains
   !> How far apart two motions of one mode are: nothing drives their difference, which starts as `q`, `v`, under the constant
   !> `force` on the coordinates; in modes with a closed form the `surface`s of constraints may run at constant speeds [m/s].
   pure subroutine begin_change(machine, flow, q, v, force, path, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     real(wp), intent(in) :: q(:), v(:), force(:)
     type(path_t), intent(out) :: path
     real(wp), intent(in), optional :: surface(:)
-    type(jointed_state_t) :: change
+    type(multibody_state_t) :: change
     real(wp) :: still(size(machine%joints))
     change%q(:machine%n) = q
     change%v(:machine%n) = v
@@ -82,8 +82,8 @@ contains
 
   !> Forces of the joints that do not depend on the state within the mode, and the load.
   pure subroutine constant_forces(machine, state, force, rate)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: force(:), rate(:)
     real(wp) :: r, now, zero, k, c
     integer :: j
@@ -120,9 +120,9 @@ contains
 
   !> `surface` are the speeds at which constraints hold [m/s].
   pure subroutine begin_modal(machine, flow, state, surface, path)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(in) :: surface(:)
     type(path_t), intent(inout) :: path
     real(wp), dimension(most_degrees) :: q, v, place, speed, push, push_rate
@@ -157,7 +157,7 @@ contains
 
   !> What constraints do to all coordinates, `q` [m] being the start.
   pure subroutine carry_along(machine, flow, q, surface, path)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     real(wp), intent(in) :: q(:), surface(:)
     type(path_t), intent(inout) :: path
@@ -233,9 +233,9 @@ contains
 
   !> The unknowns of the series, and its matrix with what is constant in this flight.
   pure subroutine begin_series(machine, flow, state, path)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(path_t), intent(inout) :: path
     real(wp) :: push(machine%n), push_rate(machine%n)
     integer :: n, i
@@ -254,8 +254,8 @@ contains
 
   !> Coordinates, speeds, one, time since the start, cosines and sines.
   pure function unknowns_of(machine, state, turning) result(y)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp) :: y(2*machine%n + 2 + 2*size(turning))
     integer :: n, m
@@ -286,7 +286,7 @@ contains
 
   !> Coordinates and speeds `t` [s] after the start of the path.
   pure subroutine path_at(machine, flow, path, t, q, v)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     real(wp), intent(in) :: t
@@ -328,7 +328,7 @@ contains
 
   !> The same by stretches of the series.
   pure subroutine series_at(machine, flow, path, t, q, v)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     real(wp), intent(in) :: t

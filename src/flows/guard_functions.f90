@@ -7,7 +7,7 @@ module guard_functions
   use elementary, only: exponential, sine_cosine
   use flight_path, only: path_t
   use guards, only: joint_guard_t, most_guards
-  use jointed, only: jointed_t, most_degrees
+  use multibody, only: multibody_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use path_rows, only: force_powers, place_powers
@@ -40,7 +40,7 @@ contains
 
   !> The guards `list` of a path; row `watched` of the coordinates is the last function.
   pure subroutine prepare_search(machine, flow, path, list, count_guards, watched, search)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     type(joint_guard_t), intent(in) :: list(:)
@@ -104,7 +104,7 @@ contains
 
   !> What a force of a constraint, as the value and first three derivatives of a guard have it, is a sum of beside the exponentials.
   pure function blur_of_drive(machine, flow, path, guard) result(blur)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     type(joint_guard_t), intent(in) :: guard

@@ -1,12 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What ends a flight of a jointed structure: functions that are positive as long as the joints stay in their phases, all
+!> What ends a flight of a multibody structure: functions that are positive as long as the joints stay in their phases, all
 !> of one form, constant + place s + speed u + force lambda of a joint.
 module guards
   use contact_law, only: contact_kelvin_voigt
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, jointed_t, most_joints
-  use jointed_state, only: jointed_state_t
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, multibody_t, most_joints
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
@@ -38,9 +38,9 @@ contains
 
   !> The guards of a state, at the beginning of `list`.
   pure subroutine guards_of(machine, flow, state, list, count_guards)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards
     integer :: j, phase, held
@@ -91,9 +91,9 @@ contains
 
   !> Whether a joint has no speed and gets none in this mode.
   pure logical function lies_still(machine, flow, state, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: j
     real(wp) :: u
     associate (joint => machine%joints(j), v => state%v(:machine%n))
@@ -104,9 +104,9 @@ contains
 
   !> Sizes of sums for their rounding.
   pure subroutine set_blur(machine, flow, state, list)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(joint_guard_t), intent(inout) :: list(:)
     real(wp) :: force(machine%n), acceleration(machine%n), place, speed, change
     integer :: g, n
@@ -138,8 +138,8 @@ contains
 
   !> The gaps to both stops.
   pure subroutine gap_guards(machine, state, j, list, count_guards)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: j
     type(joint_guard_t), intent(inout) :: list(:)
     integer, intent(inout) :: count_guards
@@ -153,8 +153,8 @@ contains
 
   !> A soft contact: its gap, or its penetration p = d (s - stop), and its force k p + c p', or 1 + a p'.
   pure subroutine soft_guards(machine, state, j, list, count_guards)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: j
     type(joint_guard_t), intent(inout) :: list(:)
     integer, intent(inout) :: count_guards

@@ -7,8 +7,8 @@ module linear_flight
   use guard_functions, only: prepare_search, search_t
   use guard_search, only: find_first
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards
-  use jointed, only: jointed_t
-  use jointed_state, only: jointed_state_t
+  use multibody, only: multibody_t
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use path_rows, only: guard_row, size_of_row
@@ -36,9 +36,9 @@ contains
   !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `fallen` those that fell together at
   !> the end, none if the time is over. `path` is the way.
   pure subroutine fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards
@@ -65,13 +65,13 @@ contains
 
   !> The same by stretches of the exponential series.
   pure subroutine fly_series(machine, flow, path, list, count_guards, duration, state, time, fallen, watch)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     type(joint_guard_t), intent(in) :: list(:)
     integer, intent(in) :: count_guards
     real(wp), intent(in) :: duration
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(out) :: time
     logical, intent(out) :: fallen(:)
     type(watch_t), intent(inout) :: watch

@@ -7,8 +7,8 @@ module marched_flight
   use flight_path, only: begin_series, constant_forces, path_t
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step
   use guards, only: guards_of, joint_guard_t, most_guards
-  use jointed, only: joint_soft, jointed_t
-  use jointed_state, only: is_curved, jointed_state_t, turning_at
+  use multibody, only: joint_soft, multibody_t
+  use multibody_state, only: is_curved, multibody_state_t, turning_at
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use linear_flight, only: watch_t
@@ -48,9 +48,9 @@ contains
 
   !> Begins a flight from `state`; `tolerance` is relative.
   pure subroutine begin_flight(machine, flow, state, tolerance, flight)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(in) :: tolerance
     type(marched_flight_t), intent(out) :: flight
     type(path_t) :: path
@@ -84,9 +84,9 @@ contains
 
   !> The guards as margins of the system; those that are zero now rise from there.
   pure subroutine set_guards(machine, flow, state, path, flight)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(path_t), intent(in) :: path
     type(marched_flight_t), intent(inout) :: flight
     real(wp), dimension(size(path%unknowns)) :: row, sizes
@@ -157,9 +157,9 @@ contains
   !> coordinates do not have excepted, or those of the contacts that are pressed. `length` is the depth of the thinnest one [m],
   !> `contact_time` that in which its force changes [s], huge without one.
   pure subroutine set_sizes(machine, system, state, y, scale, length, contact_time)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(marched_t), intent(in) :: system
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(in) :: y(:)
     real(wp), intent(out) :: scale(:), length, contact_time
     real(wp) :: slope(size(y)), mass, force, p, u
@@ -204,9 +204,9 @@ contains
   !> One step, until `until` [s after the section] at most. `path` is the step; `fallen` are the guards that fell together at its
   !> end; `ended` says that the flight is over, `failed` that no step is small enough.
   pure subroutine step_flight(machine, flight, state, until, path, fallen, ended, failed, watch)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(marched_flight_t), intent(inout) :: flight
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(path_t), intent(inout) :: path
     logical, intent(out) :: fallen(most_guards), ended, failed
@@ -319,7 +319,7 @@ contains
 
   !> Extremes of the watched coordinate on a step up to a fraction of it.
   pure subroutine look_along(machine, path, fraction, watch)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(path_t), intent(in) :: path
     real(wp), intent(in) :: fraction
     type(watch_t), intent(inout) :: watch

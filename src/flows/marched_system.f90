@@ -8,8 +8,8 @@ module marched_system
   use elementary, only: sine_cosine
   use flight_path, only: path_t
   use guarded_march, only: watched_system_t
-  use jointed, only: joint_soft, joint_spring, joint_t, jointed_t, most_joints
-  use jointed_state, only: is_curved, joint_force, joint_motion, jointed_state_t, spring_terms, strength_now
+  use multibody, only: joint_soft, joint_spring, joint_t, multibody_t, most_joints
+  use multibody_state, only: is_curved, joint_force, joint_motion, multibody_state_t, spring_terms, strength_now
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
@@ -40,9 +40,9 @@ contains
 
   !> What is integrated.
   pure subroutine set_system(machine, flow, state, path, system)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(path_t), intent(in) :: path
     type(marched_t), intent(inout) :: system
     real(wp) :: s, u
@@ -109,7 +109,7 @@ contains
 
   !> Accelerations under a force of 1 N along `row`, with the constraints held.
   pure function held_push(machine, flow, row) result(push)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     real(wp), intent(in) :: row(:)
     real(wp) :: push(machine%n), free(machine%n)
@@ -232,9 +232,9 @@ contains
   !> Forces [N], one for each joint that is not linear, of which rounding takes a share: a displacement is known to a share of the
   !> places it is the difference of, and the force to that times its slope.
   pure function digits_of_forces(machine, system, state, turning) result(sizes)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(marched_t), intent(in) :: system
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp) :: sizes(system%count_joints), s, u, strength, r, by_place, by_speed
     integer :: j, k

@@ -1,15 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The linear motion of a jointed structure in one mode: which joints are constraints or springs. The constrained structure
+!> The linear motion of a multibody structure in one mode: which joints are constraints or springs. The constrained structure
 !> is taken apart into modes: pairs of complex exponentials, exponentials, and rigid motions; the response to each harmonic
 !> of the drive is periodic. Where the modes are too near to being one, or the drive to one of them, `modal` is false and
 !> the motion is the exponential series of `matrix`, which every linear structure has.
 module mode_flow
   use boxed_forces, only: dependent, shared_inverse
   use eigen, only: general_eigen, modulus, refine_mode, solve_complex, symmetric_eigen, undamped_modes
-  use jointed, only: harmonics_in, integral_of, joint_contact, joint_soft, jointed_t, offset_of
-  use jointed_state, only: is_held
+  use multibody, only: harmonics_in, integral_of, joint_contact, joint_soft, multibody_t, offset_of
+  use multibody_state, only: is_held
   use kinds, only: wp
   use matrices, only: solve
   use mode_flow_type, only: mode_flow_t
@@ -29,7 +29,7 @@ contains
 
   !> Number of harmonics that a machine knows.
   pure integer function harmonics_of(machine) result(harmonics)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer :: j
     harmonics = size(machine%force, 2)
     do j = 1, size(machine%joints)
@@ -42,7 +42,7 @@ contains
 
   !> The flow of the mode `key` (a bit per joint); `with_matrix` asks for the series beside the modes.
   pure subroutine build_flow(machine, key, with_matrix, flow)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: key
     logical, intent(in) :: with_matrix
     type(mode_flow_t), intent(out) :: flow
@@ -85,7 +85,7 @@ contains
 
   !> What the constraints do to forces and accelerations. Those that depend on others share their force evenly.
   pure subroutine set_constraints(machine, flow)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     real(wp), allocatable :: w(:, :), g(:, :), column(:), unit(:), answer(:)
     real(wp) :: left
@@ -136,7 +136,7 @@ contains
 
   !> Whether the speed of joint `j` is constant in this mode: nothing is left of its row by the constraints.
   pure logical function keeps_still(machine, flow, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     integer, intent(in) :: j
     real(wp) :: alone(machine%n), left(machine%n)
@@ -156,7 +156,7 @@ contains
   !> Harmonics of the forces on the coordinates, those of springs on moving surfaces included, and of the surfaces of the
   !> constraints.
   pure subroutine set_forcing(machine, flow, harmonics, forcing, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     integer, intent(in) :: harmonics
     complex(wp), allocatable, intent(out) :: forcing(:, :), surface(:, :)
@@ -185,7 +185,7 @@ contains
 
   !> Modes of the constrained structure, if they are well apart.
   pure subroutine set_modes(machine, flow, forcing, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     real(wp), allocatable :: squares(:), damping(:, :)
@@ -198,7 +198,7 @@ contains
 
   !> Undamped modes of the constrained structure: flexible ones first, then rigid ones with damping, then those without.
   pure subroutine set_basis(machine, flow, squares, damping)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     real(wp), allocatable, intent(out) :: squares(:), damping(:, :)
     real(wp), allocatable :: free(:, :), reduced(:, :), turned(:, :), levels(:), rigid_damping(:, :)
@@ -237,7 +237,7 @@ contains
 
   !> The part of the undamped shapes that moves no constraint, made orthonormal by the mass, longest first.
   pure subroutine free_shapes(machine, flow, free)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     real(wp), allocatable, intent(out) :: free(:, :)
     real(wp), allocatable :: squares(:), all_shapes(:, :)
@@ -358,7 +358,7 @@ contains
 
   !> Periodic response to the harmonics of the drive.
   pure subroutine set_response(machine, flow, damping, squares, forcing, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     real(wp), intent(in) :: damping(:, :), squares(:)
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)

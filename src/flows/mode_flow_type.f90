@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What the linear motion of a jointed structure in one mode of its joints is made of.
+!> What the linear motion of a multibody structure in one mode of its joints is made of.
 module mode_flow_type
   use kinds, only: wp
   implicit none

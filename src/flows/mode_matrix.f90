@@ -1,10 +1,10 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The motion of a jointed structure in one mode as y' = A y: for the exponential series, which every linear structure has.
+!> The motion of a multibody structure in one mode as y' = A y: for the exponential series, which every linear structure has.
 module mode_matrix
   use eigen, only: modulus
-  use jointed, only: jointed_t, offset_of
+  use multibody, only: multibody_t, offset_of
   use kinds, only: wp
   use mode_flow_type, only: mode_flow_t
   implicit none
@@ -17,7 +17,7 @@ contains
   !> The matrix of the motion with everything that drives it. Constant and linear parts of the forces belong to the flight:
   !> their columns are left to it.
   pure subroutine set_matrix(machine, flow, forcing, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     real(wp), allocatable :: push(:, :), power(:, :)
@@ -59,7 +59,7 @@ contains
   !> Joint coordinates, speeds and forces of constraints as rows over the unknowns of the matrix; their constant and linear
   !> parts are left to the flight.
   pure subroutine set_matrix_rows(machine, flow, forcing, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     complex(wp), allocatable :: driven(:)
@@ -98,7 +98,7 @@ contains
 
   !> Accelerations per force on the coordinates, with the constraints held.
   pure function held_mobility(machine, flow) result(push)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     real(wp) :: push(machine%n, machine%n)
     integer :: i, k

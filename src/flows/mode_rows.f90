@@ -1,10 +1,10 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The modes of a jointed structure as its joints and constraints see them.
+!> The modes of a multibody structure as its joints and constraints see them.
 module mode_rows
   use eigen, only: modulus
-  use jointed, only: jointed_t, offset_of
+  use multibody, only: multibody_t, offset_of
   use kinds, only: wp
   use mode_flow_type, only: mode_flow_t
   implicit none
@@ -16,7 +16,7 @@ contains
 
   !> Shapes and responses along the rows of the joints and in the forces of the constraints.
   pure subroutine set_rows(machine, flow, forcing, surface)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     complex(wp) :: iw

@@ -5,7 +5,7 @@
 module path_rows
   use flight_path, only: path_t
   use guards, only: joint_guard_t
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
@@ -17,7 +17,7 @@ contains
 
   !> Powers of time in a joint coordinate.
   pure function place_powers(machine, path, j) result(p)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(path_t), intent(in) :: path
     integer, intent(in) :: j
     real(wp) :: p(0:3)
@@ -30,7 +30,7 @@ contains
 
   !> Powers of time in the force of constraint number `i` of the mode.
   pure function force_powers(machine, flow, path, i) result(p)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     integer, intent(in) :: i
@@ -47,7 +47,7 @@ contains
 
   !> The row of a guard over the unknowns of the series.
   pure function guard_row(machine, flow, path, guard) result(row)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     type(joint_guard_t), intent(in) :: guard
@@ -68,7 +68,7 @@ contains
 
   !> Sizes of what the row of a guard is a sum of, for its rounding.
   pure function size_of_row(machine, flow, path, guard) result(row)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     type(joint_guard_t), intent(in) :: guard

@@ -3,10 +3,10 @@
 
 !> From laws to a machine ready to move, of one body, two, or several.
 module build_motion
-  use build_jointed, only: is_jointed, jointed_of
+  use build_multibody, only: is_multibody, multibody_of
   use errors, only: error_t
-  use jointed, only: jointed_t
-  use jointed_motion, only: prepare_jointed
+  use multibody, only: multibody_t
+  use multibody_motion, only: prepare_multibody
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
   use motion, only: motion_t, prepare_motion
@@ -28,9 +28,9 @@ contains
     type(motion_t), intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
     type(oscillator_t) :: machine
-    type(jointed_t) :: structure
-    if (is_jointed(laws)) then
-      call jointed_of(laws, structure, error)
+    type(multibody_t) :: structure
+    if (is_multibody(laws)) then
+      call multibody_of(laws, structure, error)
     else if (is_pair(laws)) then
       call structure_of_two(laws, structure, error)
     else
@@ -44,24 +44,24 @@ contains
   !> The structure of two bodies that friction couples.
   pure subroutine structure_of_two(laws, machine, error)
     type(law_choice_t), intent(in) :: laws(:)
-    type(jointed_t), intent(out) :: machine
+    type(multibody_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(pair_t) :: pair
     call build_pair(laws, pair, error)
     if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
   end subroutine structure_of_two
 
-  !> A machine of several bodies, in `moving%jointed`; `moving%machine` has its section, and the mass that is watched.
+  !> A machine of several bodies, in `moving%multibody`; `moving%machine` has its section, and the mass that is watched.
   pure subroutine set_structure(machine, options, moving)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(options_t), intent(in) :: options
     type(motion_t), intent(out) :: moving
     moving%options = options
     moving%machine%mass = machine%mass(machine%watched, machine%watched)
     moving%machine%period = machine%period
     moving%machine%drive_frequency = machine%frequency
-    allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%jointed)
-    call prepare_jointed(machine, options, moving%jointed)
+    allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%multibody)
+    call prepare_multibody(machine, options, moving%multibody)
   end subroutine set_structure
 
   !> So many events and steps a trajectory may take at most, or fewer where it may take fewer already.
@@ -70,7 +70,7 @@ contains
     integer(int64), intent(in) :: events, steps
     moving%options%event_budget = min(moving%options%event_budget, events)
     moving%options%step_budget = min(moving%options%step_budget, steps)
-    if (allocated(moving%jointed)) moving%jointed%options = moving%options
+    if (allocated(moving%multibody)) moving%multibody%options = moving%options
   end subroutine limit_budgets
 
   !> Period of the section of the machine that `laws` describe [s].
@@ -80,11 +80,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(oscillator_t) :: machine
     type(pair_t) :: pair
-    type(jointed_t) :: jointed
+    type(multibody_t) :: multibody
     period = 0
-    if (is_jointed(laws)) then
-      call jointed_of(laws, jointed, error)
-      if (.not. allocated(error)) period = jointed%period
+    if (is_multibody(laws)) then
+      call multibody_of(laws, multibody, error)
+      if (.not. allocated(error)) period = multibody%period
     else if (is_pair(laws)) then
       call build_pair(laws, pair, error)
       if (.not. allocated(error)) period = pair%period

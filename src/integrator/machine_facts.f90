@@ -6,8 +6,8 @@ module machine_facts
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
   use eigen, only: undamped_modes
-  use jointed, only: is_stop, jointed_t
-  use jointed_state, only: acts_as_spring
+  use multibody, only: is_stop, multibody_t
+  use multibody_state, only: acts_as_spring
   use kinds, only: wp
   use motion, only: motion_t
   use two_bodies, only: contact_at
@@ -22,21 +22,21 @@ contains
   !> Whether `moving%machine` says all of the machine.
   pure logical function is_one_body(moving)
     type(motion_t), intent(in) :: moving
-    is_one_body = .not. allocated(moving%jointed)
+    is_one_body = .not. allocated(moving%multibody)
   end function is_one_body
 
   !> The structure that moves; that of one body has no coordinates.
-  pure type(jointed_t) function structure_in(moving) result(machine)
+  pure type(multibody_t) function structure_in(moving) result(machine)
     type(motion_t), intent(in) :: moving
     allocate (machine%joints(0))
-    if (allocated(moving%jointed)) machine = moving%jointed%machine
+    if (allocated(moving%multibody)) machine = moving%multibody%machine
   end function structure_in
 
   !> Whether a drive repeats, so that its period is the time between two sections.
   pure logical function has_drive_period(moving)
     type(motion_t), intent(in) :: moving
-    if (allocated(moving%jointed)) then
-      has_drive_period = moving%jointed%machine%driven
+    if (allocated(moving%multibody)) then
+      has_drive_period = moving%multibody%machine%driven
     else
       has_drive_period = moving%machine%drive%ratio > 0 .or. moving%machine%drive%interval > 0
     end if
@@ -47,11 +47,11 @@ contains
   pure logical function has_mode(moving)
     type(motion_t), intent(in) :: moving
     real(wp), allocatable :: squares(:), shapes(:, :)
-    if (.not. allocated(moving%jointed)) then
+    if (.not. allocated(moving%multibody)) then
       has_mode = moving%machine%natural_frequency > 0
       return
     end if
-    associate (machine => moving%jointed%machine)
+    associate (machine => moving%multibody%machine)
       allocate (squares(machine%n), shapes(machine%n, machine%n))
       call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
       has_mode = squares(machine%n) > 0 .and. all(.not. (abs(machine%joints%moment) > 0 .or. abs(machine%joints%attraction) > 0))
@@ -61,8 +61,8 @@ contains
   !> Whether there is anything to hit.
   pure logical function has_stops(moving)
     type(motion_t), intent(in) :: moving
-    if (allocated(moving%jointed)) then
-      has_stops = any(is_stop(moving%jointed%machine%joints%kind))
+    if (allocated(moving%multibody)) then
+      has_stops = any(is_stop(moving%multibody%machine%joints%kind))
     else
       has_stops = any(abs(barrier_positions(moving%machine%contact)) < unreachable)
     end if
@@ -72,7 +72,7 @@ contains
   pure logical function has_driver(moving)
     type(motion_t), intent(in) :: moving
     has_driver = .false.
-    if (allocated(moving%jointed)) has_driver = allocated(moving%jointed%machine%driver)
+    if (allocated(moving%multibody)) has_driver = allocated(moving%multibody%machine%driver)
   end function has_driver
 
   !> Whether bodies that do not slip may well move: they ride along.
@@ -86,7 +86,7 @@ contains
   pure logical function rest_lasts(moving)
     type(motion_t), intent(in) :: moving
     rest_lasts = .true.
-    if (has_driver(moving)) rest_lasts = moving%jointed%machine%driver%at == 0
+    if (has_driver(moving)) rest_lasts = moving%multibody%machine%driver%at == 0
   end function rest_lasts
 
   !> Half range [m] of a motion below which it is one of the rounding: a thousandth of what the forces do.
@@ -97,7 +97,7 @@ contains
       smallest = 1e-3_wp*moving%machine%force_scale/moving%machine%restoring%stiffness
     end if
     if (has_driver(moving)) then
-      smallest = 1e-3_wp*moving%jointed%machine%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
+      smallest = 1e-3_wp*moving%multibody%machine%force_scale/(moving%machine%mass*moving%machine%drive_frequency**2)
     end if
   end function smallest_motion
 
@@ -107,8 +107,8 @@ contains
     integer :: stop
     stops = moving%machine%contact
     if (.not. has_driver(moving)) return
-    stop = contact_at(moving%jointed%machine)
-    if (stop > 0) stops = moving%jointed%machine%joints(stop)%contact
+    stop = contact_at(moving%multibody%machine)
+    if (stop > 0) stops = moving%multibody%machine%joints(stop)%contact
   end function stops_of
 
   !> What presses a contact: the mass that an impact feels [kg], the size of the forces [N], and whether it is flown in closed form.
@@ -121,7 +121,7 @@ contains
     force = moving%machine%force_scale
     closed_form = moving%pressed%available
     if (.not. has_driver(moving)) return
-    associate (machine => moving%jointed%machine)
+    associate (machine => moving%multibody%machine)
       stop = contact_at(machine)
       mass = 1/sum(machine%joints(stop)%row*matmul(machine%mobility, machine%joints(stop)%row))
       force = machine%force_scale

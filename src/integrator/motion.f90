@@ -14,7 +14,7 @@ module motion
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
   use exact_flow, only: flow_t, prepare_flow
-  use jointed_motion, only: jointed_motion_t
+  use multibody_motion, only: multibody_motion_t
   use kinds, only: wp
   use layer_transit, only: cross_layer, prepare_transit, transit_t
   use motion_state, only: append_word, event_chatter_lower, &
@@ -57,7 +57,7 @@ module motion
     !> The section is where the motion turns round, in the place of a time.
     logical :: by_event = .false.
     !> Several bodies with joints.
-    type(jointed_motion_t), allocatable :: jointed
+    type(multibody_motion_t), allocatable :: multibody
   end type motion_t
 
 contains

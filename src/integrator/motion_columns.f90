@@ -5,7 +5,7 @@
 !> the driving body, all coordinates of a structure and the joint of each event.
 module motion_columns
   use angle_units, only: unit_of
-  use jointed, only: joint_section, jointed_t
+  use multibody, only: joint_section, multibody_t
   use kinds, only: wp
   use machine_facts, only: has_driver
   use motion, only: motion_t
@@ -35,8 +35,8 @@ contains
     type(motion_column_t), allocatable :: columns(:)
     if (has_driver(moving)) then
       columns = driver_columns(log%sample_driver(:, :log%samples))
-    else if (allocated(moving%jointed)) then
-      columns = coordinate_columns(moving%jointed%machine, log)
+    else if (allocated(moving%multibody)) then
+      columns = coordinate_columns(moving%multibody%machine, log)
     else
       allocate (columns(1))
       call set_column(columns(1), 'drive', unit_of('m', moving%machine%restoring%turn > 0), 'position of the foot of the spring', &
@@ -51,8 +51,8 @@ contains
     type(motion_column_t), allocatable :: columns(:)
     if (has_driver(moving)) then
       columns = driver_columns(log%event_driver(:, :log%events))
-    else if (allocated(moving%jointed)) then
-      columns = joint_columns(moving%jointed%machine, log)
+    else if (allocated(moving%multibody)) then
+      columns = joint_columns(moving%multibody%machine, log)
     else
       allocate (columns(0))
     end if
@@ -69,7 +69,7 @@ contains
 
   !> Position and velocity of every coordinate of a structure; inner ones have a number in the place of a point's name.
   pure function coordinate_columns(machine, log) result(columns)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(log_t), intent(in) :: log
     type(motion_column_t), allocatable :: columns(:)
     character(len=:), allocatable :: name, column
@@ -94,7 +94,7 @@ contains
 
   !> The joint of each event, its coordinate and rates.
   pure function joint_columns(machine, log) result(columns)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(log_t), intent(in) :: log
     type(motion_column_t), allocatable :: columns(:)
     character(len=:), allocatable :: names
@@ -123,7 +123,7 @@ contains
 
   !> Whether a coordinate is an angle.
   pure logical function is_angle(machine, i)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: i
     is_angle = .false.
     if (allocated(machine%angles)) is_angle = any(machine%angles == machine%names(i))
@@ -131,7 +131,7 @@ contains
 
   !> Whether a joint acts between angles.
   pure logical function joins_angles(machine, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     integer :: i
     joins_angles = any([(is_angle(machine, i) .and. abs(machine%joints(j)%row(i)) > 0, i=1, machine%n)])

@@ -5,7 +5,7 @@
 module motion_history
   use contact_law, only: contact_at_speed, force_on_body
   use drive_law, only: foot_motion
-  use jointed, only: integral_of
+  use multibody, only: integral_of
   use kinds, only: wp
   use machine_facts, only: has_driver, stops_of
   use motion, only: motion_t
@@ -25,7 +25,7 @@ contains
     real(wp), allocatable :: place(:, :)
     place = log%sample_data(2:3, :log%samples)
     if (has_driver(moving)) then
-      if (moving%jointed%machine%driver%carries) place = place - log%sample_driver(:, :log%samples)
+      if (moving%multibody%machine%driver%carries) place = place - log%sample_driver(:, :log%samples)
     end if
     forces = force_on_body(contact_at_speed(stops_of(moving), log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
   end function contact_forces
@@ -49,8 +49,8 @@ contains
     real(wp) :: kinetic(log%samples)
     real(wp), allocatable :: velocity(:)
     integer :: i
-    if (allocated(moving%jointed)) then
-      associate (machine => moving%jointed%machine)
+    if (allocated(moving%multibody)) then
+      associate (machine => moving%multibody%machine)
         do i = 1, log%samples
           velocity = log%sample_coordinates(machine%n + 1:, i)
           if (integral_of(machine) > 0) velocity(integral_of(machine)) = 0

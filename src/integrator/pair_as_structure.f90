@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Two bodies coupled by dry friction as a jointed structure.
+!> Two bodies coupled by dry friction as a multibody structure.
 module pair_as_structure
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, index_of, &
     set_sizes
   use constants, only: unreachable
   use control, only: add_controller, add_impulse
   use errors, only: error_t
-  use jointed, only: controller_t, impulse_t, joint_contact, joint_friction, joint_soft, joint_t, jointed_t, wave_t
+  use multibody, only: controller_t, impulse_t, joint_contact, joint_friction, joint_soft, joint_t, multibody_t, wave_t
   use kinds, only: wp
   use pair, only: driven_by_controller, driven_by_force, driven_by_motion, pair_t
   implicit none
@@ -22,7 +22,7 @@ contains
   !> other is given.
   pure subroutine structure_of_pair(pair, machine, error)
     type(pair_t), intent(in) :: pair
-    type(jointed_t), intent(out) :: machine
+    type(multibody_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(controller_t) :: controller
     type(wave_t) :: wave
@@ -64,7 +64,7 @@ contains
   pure subroutine name_driver(pair, wave, machine)
     type(pair_t), intent(in) :: pair
     type(wave_t), intent(in) :: wave
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     allocate (machine%driver)
     associate (driver => machine%driver)
       driver%at = index_of(machine, 'driving')
@@ -88,7 +88,7 @@ contains
   pure subroutine add_joints(pair, friction_row, contact_row, machine)
     type(pair_t), intent(in) :: pair
     real(wp), intent(in) :: friction_row(:), contact_row(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(joint_t) :: friction, contact
     ! Stops without room leave friction along them nothing to do.
     if (pair%friction > 0 .and. .not. (pair%carried .and. .not. pair%contact%soft .and. .not. pair%upper > pair%lower)) then

@@ -9,11 +9,11 @@ module strobe
   use body_section, only: body_at, body_point, coordinates_of_body, resumed_body, scales_of_body, start_of_body
   use contact_law, only: beyond_barrier
   use energy, only: energy_of_body, record_with_book
-  use jointed_log, only: energy_of_jointed, log_sample, watched_state
-  use jointed_motion, only: advance_jointed, advance_jointed_period, start_jointed
-  use jointed_section, only: coordinates_of_jointed, fits_section, free_jointed, jointed_at, jointed_point, keeps_clear, &
-    scales_of_jointed, start_of_jointed
-  use jointed_state, only: jointed_state_t
+  use multibody_log, only: energy_of_multibody, log_sample, watched_state
+  use multibody_motion, only: advance_multibody, advance_multibody_period, start_multibody
+  use multibody_section, only: coordinates_of_multibody, fits_section, free_multibody, multibody_at, multibody_point, keeps_clear, &
+    scales_of_multibody, start_of_multibody
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use machine_facts, only: has_driver
   use motion, only: advance, advance_period, motion_t
@@ -21,8 +21,8 @@ module strobe
   use section_size, only: most_coordinates
   use text, only: to_text
   use timed_actions, only: acts_on_time
-  use turn_section, only: advance_body_to_turn, advance_jointed_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
-    jointed_at_turn, jointed_turn_point, scales_of_turn
+  use turn_section, only: advance_body_to_turn, advance_multibody_to_turn, body_at_turn, body_turn_point, coordinates_of_turn, &
+    multibody_at_turn, multibody_turn_point, scales_of_turn
   use two_bodies, only: driver_of => driver_now, keeps_within
   implicit none
   private
@@ -34,7 +34,7 @@ module strobe
   !> `state` is that of the body, or of the watched one of several.
   type :: strobe_t
     type(state_t) :: state
-    type(jointed_state_t) :: jointed
+    type(multibody_state_t) :: multibody
     !> Time from the last section to this one [s].
     real(wp) :: lasted = 0
   end type strobe_t
@@ -48,14 +48,14 @@ contains
     integer, intent(out) :: places
     places = 0
     free = moving
-    if (allocated(moving%jointed)) call free_jointed(moving%jointed, free%jointed, places)
+    if (allocated(moving%multibody)) call free_multibody(moving%multibody, free%multibody, places)
   end subroutine without_stops
 
   !> Number of a coordinate that is a velocity, of machines of several bodies.
   pure integer function speed_number(moving)
     type(motion_t), intent(in) :: moving
     speed_number = 2
-    if (allocated(moving%jointed)) speed_number = size(moving%jointed%directions, 2) + 1
+    if (allocated(moving%multibody)) speed_number = size(moving%multibody%directions, 2) + 1
   end function speed_number
 
   !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of one body the tally
@@ -66,8 +66,8 @@ contains
     type(tally_t), intent(in) :: tally
     integer, intent(in) :: periods
     real(wp), intent(in) :: distance
-    if (allocated(moving%jointed)) then
-      stays_clear = keeps_clear(moving%jointed, strobe%jointed, periods, distance)
+    if (allocated(moving%multibody)) then
+      stays_clear = keeps_clear(moving%multibody, strobe%multibody, periods, distance)
     else
       stays_clear = distance < tally%grazing_margin
     end if
@@ -78,8 +78,8 @@ contains
     type(motion_t), intent(in) :: moving
     if (moving%by_event) then
       n = coordinates_of_turn(moving)
-    else if (allocated(moving%jointed)) then
-      n = coordinates_of_jointed(moving%jointed)
+    else if (allocated(moving%multibody)) then
+      n = coordinates_of_multibody(moving%multibody)
     else
       n = coordinates_of_body(moving)
     end if
@@ -90,7 +90,7 @@ contains
   pure logical function has_section(moving)
     type(motion_t), intent(in) :: moving
     has_section = .true.
-    if (allocated(moving%jointed)) has_section = fits_section(moving%jointed)
+    if (allocated(moving%multibody)) has_section = fits_section(moving%multibody)
   end function has_section
 
   !> Why it does not, '' if it does.
@@ -99,14 +99,15 @@ contains
     character(len=:), allocatable :: text
     text = ''
     if (has_section(moving)) return
-    if (allocated(moving%jointed)) then
-      text = 'the section has '//to_text(coordinates_of_jointed(moving%jointed))//' coordinates, more than '// &
+    if (allocated(moving%multibody)) then
+      text = 'the section has '//to_text(coordinates_of_multibody(moving%multibody))//' coordinates, more than '// &
              to_text(most_coordinates)
-      if (acts_on_time(moving%jointed%machine)) text = 'with impulses, or samples of a controller, the state at crank angle 0 '// &
+      if (acts_on_time(moving%multibody%machine)) text = &
+        'with impulses, or samples of a controller, the state at crank angle 0 '// &
                                                        'does not tell what follows'
     end if
     if (has_driver(moving)) text = 'with '//trim(merge('body.blow        ', 'drive.sample_time', &
-                                                       allocated(moving%jointed%machine%impulses)))// &
+                                                       allocated(moving%multibody%machine%impulses)))// &
                                    ' the state at crank angle 0 does not tell what follows'
   end function section_obstacle
 
@@ -116,9 +117,9 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
     type(strobe_t) :: strobe
-    if (allocated(moving%jointed)) then
-      strobe%jointed = start_of_jointed(moving%jointed, start(1), start(2), start(3), start(4:))
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      strobe%multibody = start_of_multibody(moving%multibody, start(1), start(2), start(3), start(4:))
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     else
       strobe%state = start_of_body(moving, start)
     end if
@@ -129,10 +130,10 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
     type(strobe_t) :: strobe
-    if (allocated(moving%jointed)) then
+    if (allocated(moving%multibody)) then
       strobe = start_strobe(moving, start)
-      start_is_allowed = .not. any(strobe%jointed%q /= strobe%jointed%q)
-      if (start_is_allowed .and. has_driver(moving)) start_is_allowed = keeps_within(moving%jointed%machine, strobe%jointed)
+      start_is_allowed = .not. any(strobe%multibody%q /= strobe%multibody%q)
+      if (start_is_allowed .and. has_driver(moving)) start_is_allowed = keeps_within(moving%multibody%machine, strobe%multibody)
     else
       start_is_allowed = .not. beyond_barrier(moving%machine%contact, start(1))
     end if
@@ -145,46 +146,46 @@ contains
     type(strobe_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(strobe_t) :: strobe
-    if (allocated(moving%jointed) .and. before%jointed%time >= 0) then
-      strobe = resume_jointed(moving, before, angle)
+    if (allocated(moving%multibody) .and. before%multibody%time >= 0) then
+      strobe = resume_multibody(moving, before, angle)
       return
     end if
     strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
-    if (allocated(moving%jointed) .or. before%state%mode == 0) return
+    if (allocated(moving%multibody) .or. before%state%mode == 0) return
     strobe%state = resumed_body(moving, before%state, angle)
   end function resume_strobe
 
   !> The same of several bodies: all keep their places and velocities.
-  pure function resume_jointed(moving, before, angle) result(strobe)
+  pure function resume_multibody(moving, before, angle) result(strobe)
     type(motion_t), intent(in) :: moving
     type(strobe_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(strobe_t) :: strobe
     logical :: ok
-    type(jointed_state_t) :: from
-    from = before%jointed
-    associate (n => moving%jointed%machine%n)
-      if (has_driver(moving)) from%q(:n) = from%q(:n) - moving%jointed%machine%driver%running*from%clock
-      call start_jointed(moving%jointed, from%q(:n), from%v(:n), angle, strobe%jointed, ok)
+    type(multibody_state_t) :: from
+    from = before%multibody
+    associate (n => moving%multibody%machine%n)
+      if (has_driver(moving)) from%q(:n) = from%q(:n) - moving%multibody%machine%driver%running*from%clock
+      call start_multibody(moving%multibody, from%q(:n), from%v(:n), angle, strobe%multibody, ok)
     end associate
-    strobe%jointed%slider = before%jointed%slider
-    strobe%jointed%integral = before%jointed%integral
-    strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    strobe%multibody%slider = before%multibody%slider
+    strobe%multibody%integral = before%multibody%integral
+    strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     if (.not. ok) strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
-  end function resume_jointed
+  end function resume_multibody
 
   !> The state on the section with the coordinates `point`; what they leave open is zero.
   pure function strobe_at(moving, point) result(strobe)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(strobe_t) :: strobe
-    if (allocated(moving%jointed)) then
+    if (allocated(moving%multibody)) then
       if (moving%by_event) then
-        strobe%jointed = jointed_at_turn(moving%jointed, point)
+        strobe%multibody = multibody_at_turn(moving%multibody, point)
       else
-        strobe%jointed = jointed_at(moving%jointed, point)
+        strobe%multibody = multibody_at(moving%multibody, point)
       end if
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     else if (moving%by_event) then
       strobe%state = body_at_turn(moving, point(1))
     else
@@ -200,8 +201,8 @@ contains
     point = 0
     if (moving%by_event) then
       point = turn_point(moving, strobe)
-    else if (allocated(moving%jointed)) then
-      point = jointed_point(moving%jointed, strobe%jointed)
+    else if (allocated(moving%multibody)) then
+      point = multibody_point(moving%multibody, strobe%multibody)
     else
       associate (n => coordinates_of_body(moving))
         point(:n) = body_point(moving, strobe%state)
@@ -227,8 +228,8 @@ contains
     scales = 1
     if (moving%by_event) then
       scales = scales_of_turn(moving, half_range)
-    else if (allocated(moving%jointed)) then
-      scales = scales_of_jointed(moving%jointed, half_range)
+    else if (allocated(moving%multibody)) then
+      scales = scales_of_multibody(moving%multibody, half_range)
     else
       scales(:coordinates_of_body(moving)) = scales_of_body(moving, half_range)
     end if
@@ -248,9 +249,9 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    if (allocated(moving%jointed)) then
-      call advance_jointed(moving%jointed, strobe%jointed, time_end, tally, reason, log)
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      call advance_multibody(moving%multibody, strobe%multibody, time_end, tally, reason, log)
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     else
       call advance(moving, strobe%state, time_end, tally, reason, log)
     end if
@@ -263,9 +264,9 @@ contains
     real(wp), intent(in) :: speed, time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
-    if (allocated(moving%jointed)) then
-      call advance_jointed(moving%jointed, strobe%jointed, time_end, tally, reason, one_event=.true.)
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      call advance_multibody(moving%multibody, strobe%multibody, time_end, tally, reason, one_event=.true.)
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     else
       call advance(moving, strobe%state, time_end, tally, reason, slip_speed=speed)
     end if
@@ -283,9 +284,9 @@ contains
       return
     end if
     strobe%lasted = moving%machine%period
-    if (allocated(moving%jointed)) then
-      call advance_jointed_period(moving%jointed, strobe%jointed, tally, reason, log)
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      call advance_multibody_period(moving%multibody, strobe%multibody, tally, reason, log)
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     else
       call advance_period(moving, strobe%state, tally, reason, log)
       call take_turns(moving%machine%turn, strobe%state, tally)
@@ -298,9 +299,9 @@ contains
     class(strobe_t), intent(inout) :: strobe
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
-    if (allocated(moving%jointed)) then
-      call advance_jointed_to_turn(moving%jointed, strobe%jointed, strobe%lasted, tally, reason)
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      call advance_multibody_to_turn(moving%multibody, strobe%multibody, strobe%lasted, tally, reason)
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     else
       call advance_body_to_turn(moving, strobe%state, strobe%lasted, tally, reason)
     end if
@@ -310,7 +311,7 @@ contains
   pure type(strobe_t) function copy_of(strobe) result(copy)
     class(strobe_t), intent(in) :: strobe
     copy%state = strobe%state
-    copy%jointed = strobe%jointed
+    copy%multibody = strobe%multibody
     copy%lasted = strobe%lasted
   end function copy_of
 
@@ -320,8 +321,8 @@ contains
     class(strobe_t), intent(in) :: strobe
     real(wp) :: point(most_coordinates)
     point = 0
-    if (allocated(moving%jointed)) then
-      point = jointed_turn_point(moving%jointed, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      point = multibody_turn_point(moving%multibody, strobe%multibody)
     else
       point(1) = body_turn_point(moving, strobe%state)
     end if
@@ -341,15 +342,15 @@ contains
     class(strobe_t), intent(in) :: strobe
     real(wp) :: driver(2)
     driver = 0
-    if (has_driver(moving)) driver = driver_of(moving%jointed%machine, strobe%jointed)
+    if (has_driver(moving)) driver = driver_of(moving%multibody%machine, strobe%multibody)
   end function driver_now
 
   !> Energy of the machine [J].
   pure real(wp) function energy_now(moving, strobe) result(energy)
     type(motion_t), intent(in) :: moving
     class(strobe_t), intent(in) :: strobe
-    if (allocated(moving%jointed)) then
-      energy = energy_of_jointed(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      energy = energy_of_multibody(moving%multibody%machine, strobe%multibody)
     else
       energy = energy_of_body(moving%machine, strobe%state)
     end if
@@ -363,8 +364,8 @@ contains
     type(log_t), intent(inout) :: log
     log%book%at_end = energy_now(moving, strobe)
     if (.not. sampled) return
-    if (allocated(moving%jointed)) then
-      call log_sample(moving%jointed%machine, strobe%jointed, log)
+    if (allocated(moving%multibody)) then
+      call log_sample(moving%multibody%machine, strobe%multibody, log)
     else
       call record_with_book(moving%machine, strobe%state, log)
     end if

@@ -3,9 +3,9 @@
 
 !> Bodies that touch in a row at the start, where the order of their impacts matters.
 module touching_row
-  use jointed, only: joint_contact, jointed_t, together_newton
-  use jointed_section, only: start_of_jointed
-  use jointed_state, only: jointed_state_t
+  use multibody, only: joint_contact, multibody_t, together_newton
+  use multibody_section, only: start_of_multibody
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use motion, only: motion_t
   implicit none
@@ -21,13 +21,13 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     character(len=:), allocatable :: names
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     integer :: i, j
     names = ''
-    if (.not. allocated(moving%jointed)) return
-    associate (machine => moving%jointed%machine)
+    if (.not. allocated(moving%multibody)) return
+    associate (machine => moving%multibody%machine)
       if (machine%together /= together_newton) return
-      state = start_of_jointed(moving%jointed, start(1), start(2), start(3))
+      state = start_of_multibody(moving%multibody, start(1), start(2), start(3))
       do j = 1, size(machine%joints)
         if (.not. rebounds(machine, j) .or. (state%phase(j) == 0 .and. state%left(j) == 0)) cycle
         if (.not. any([(rebounds(machine, i) .and. i /= j .and. yields_with(machine, j, i), i=1, size(machine%joints))])) cycle
@@ -39,7 +39,7 @@ contains
 
   !> Whether joint `j` is a rigid contact with a rebound.
   pure logical function rebounds(machine, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     rebounds = .false.
     if (machine%joints(j)%kind == joint_contact) rebounds = machine%joints(j)%contact%restitution > 0
@@ -47,7 +47,7 @@ contains
 
   !> Whether an impulse of joint `i` changes the speed of joint `j`.
   pure logical function yields_with(machine, j, i)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, i
     real(wp) :: kick(machine%n)
     kick = matmul(machine%mobility, machine%joints(j)%row)

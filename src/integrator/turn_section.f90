@@ -7,9 +7,10 @@
 !>   s = x at a maximum, s = +-(turn/2 + |v|/w) at the half turn, upwards or downwards,
 !> which is continuous where the maximum comes to the half turn.
 module turn_section
-  use jointed_motion, only: advance_to_turn, jointed_motion_t
-  use jointed_section, only: coordinates_of_jointed, fits_section, jointed_at, jointed_point, scales_of_jointed, watched_speed
-  use jointed_state, only: jointed_state_t
+  use multibody_motion, only: advance_to_turn, multibody_motion_t
+  use multibody_section, only: coordinates_of_multibody, fits_section, multibody_at, multibody_point, scales_of_multibody, &
+    watched_speed
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use motion, only: advance, motion_t, start_state
   use motion_state, only: append_word, mode_slip_minus, move_turn, state_t, tally_t, word_period
@@ -18,8 +19,9 @@ module turn_section
   implicit none
   private
 
-  public :: has_no_clock, is_undriven, coordinates_of_turn, body_at_turn, body_turn_point, jointed_at_turn, jointed_turn_point, &
-    scales_of_turn, advance_body_to_turn, advance_jointed_to_turn
+  public :: has_no_clock, is_undriven, coordinates_of_turn, body_at_turn, body_turn_point, multibody_at_turn, &
+    multibody_turn_point, &
+    scales_of_turn, advance_body_to_turn, advance_multibody_to_turn
 
   !> Longest return to the section, in periods of the slowest mode: a belt may carry a body for long.
   integer, parameter, public :: longest_return = 256
@@ -29,7 +31,7 @@ contains
   !> Whether nothing depends on the time: what does not move at one instant never will.
   pure logical function is_undriven(moving)
     type(motion_t), intent(in) :: moving
-    if (allocated(moving%jointed)) then
+    if (allocated(moving%multibody)) then
       is_undriven = has_no_clock(moving)
     else
       associate (drive => moving%machine%drive)
@@ -42,8 +44,8 @@ contains
   !> Whether no drive gives a time: several bodies without one, or an angle under forces that turn it.
   pure logical function has_no_clock(moving)
     type(motion_t), intent(in) :: moving
-    if (allocated(moving%jointed)) then
-      has_no_clock = moving%jointed%section > 0 .and. fits_section(moving%jointed)
+    if (allocated(moving%multibody)) then
+      has_no_clock = moving%multibody%section > 0 .and. fits_section(moving%multibody)
     else
       associate (machine => moving%machine)
         has_no_clock = machine%turn > 0 .and. .not. machine%drive%ratio > 0 .and. .not. machine%drive%interval > 0 .and. &
@@ -56,7 +58,7 @@ contains
   pure integer function coordinates_of_turn(moving) result(n)
     type(motion_t), intent(in) :: moving
     n = 1
-    if (allocated(moving%jointed)) n = coordinates_of_jointed(moving%jointed) - 1
+    if (allocated(moving%multibody)) n = coordinates_of_multibody(moving%multibody) - 1
   end function coordinates_of_turn
 
   !> A body with the coordinate `s` on the section.
@@ -114,36 +116,36 @@ contains
   end subroutine advance_body_to_turn
 
   !> A structure with the coordinates `point` on the section.
-  pure type(jointed_state_t) function jointed_at_turn(moving, point) result(state)
-    type(jointed_motion_t), intent(in) :: moving
+  pure type(multibody_state_t) function multibody_at_turn(moving, point) result(state)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     integer :: at
     at = watched_speed(moving)
-    state = jointed_at(moving, [point(:at - 1), 0.0_wp, point(at:coordinates_of_jointed(moving) - 1)])
+    state = multibody_at(moving, [point(:at - 1), 0.0_wp, point(at:coordinates_of_multibody(moving) - 1)])
     state%phase(moving%section) = -1
     state%left(moving%section) = 1
-  end function jointed_at_turn
+  end function multibody_at_turn
 
   !> Coordinates of a structure on the section, zeros after the last.
-  pure function jointed_turn_point(moving, state) result(point)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+  pure function multibody_turn_point(moving, state) result(point)
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: point(most_coordinates)
-    point = jointed_point(moving, state)
+    point = multibody_point(moving, state)
     associate (at => watched_speed(moving))
       point(at:) = [point(at + 1:), 0.0_wp]
     end associate
-  end function jointed_turn_point
+  end function multibody_turn_point
 
   !> Moves a structure to the section, see `advance_to_turn`.
-  pure subroutine advance_jointed_to_turn(moving, state, lasted, tally, reason)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+  pure subroutine advance_multibody_to_turn(moving, state, lasted, tally, reason)
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(out) :: lasted
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     call advance_to_turn(moving, longest_return*moving%machine%period, state, lasted, tally, reason)
-  end subroutine advance_jointed_to_turn
+  end subroutine advance_multibody_to_turn
 
   !> Sizes of the coordinates in a motion over `half_range` of the position.
   pure function scales_of_turn(moving, half_range) result(scales)
@@ -151,12 +153,12 @@ contains
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates)
     scales = 1
-    if (.not. allocated(moving%jointed)) then
+    if (.not. allocated(moving%multibody)) then
       scales(1) = half_range
       return
     end if
-    scales = scales_of_jointed(moving%jointed, half_range)
-    associate (at => watched_speed(moving%jointed))
+    scales = scales_of_multibody(moving%multibody, half_range)
+    associate (at => watched_speed(moving%multibody))
       scales(at:) = [scales(at + 1:), 1.0_wp]
     end associate
   end function scales_of_turn

@@ -3,7 +3,7 @@
 
 !> The lanes of a machine, of one body or of several with joints: what can be in them, what comes out of them.
 module fleet
-  use jointed_log, only: watched_state
+  use multibody_log, only: watched_state
   use kinds, only: wp
   use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_batch_t, lane_flow_t, regions_t
@@ -37,7 +37,7 @@ contains
     type(lane_flow_t), intent(out) :: flow
     flow%width = moving%options%lane_width
     if (flow%width <= 0) return
-    if (allocated(moving%jointed)) call prepare_structure_lanes(moving%jointed, flow)
+    if (allocated(moving%multibody)) call prepare_structure_lanes(moving%multibody, flow)
     if (is_one_body(moving)) call prepare_lanes(moving, flow)
   end subroutine prepare_flow
 
@@ -45,7 +45,7 @@ contains
   pure subroutine open_fleet(moving, fleet)
     type(motion_t), intent(in) :: moving
     type(fleet_t), intent(out) :: fleet
-    if (allocated(moving%jointed)) allocate (fleet%structures)
+    if (allocated(moving%multibody)) allocate (fleet%structures)
   end subroutine open_fleet
 
   !> The lanes can be captured by attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What
@@ -58,13 +58,13 @@ contains
     integer :: n
     logical :: fits
     n = 2
-    if (allocated(moving%jointed)) n = 2*moving%jointed%machine%n
+    if (allocated(moving%multibody)) n = 2*moving%multibody%machine%n
     fits = size(point) == n .and. coordinates_of(moving) == n
     if (.not. fits) then
       fleet%regions%complete = 0
       if (allocated(fleet%structures)) fleet%structures%complete = 0
-    else if (allocated(moving%jointed)) then
-      call add_structure_region(moving%jointed, fleet%structures, attractor, point, scale, metric, reach)
+    else if (allocated(moving%multibody)) then
+      call add_structure_region(moving%multibody, fleet%structures, attractor, point, scale, metric, reach)
     else
       call add_region(fleet%regions, attractor, point, scale, metric(:3), reach)
     end if
@@ -75,8 +75,8 @@ contains
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(in) :: flow
     class(strobe_t), intent(in) :: strobe
-    if (allocated(moving%jointed)) then
-      flies = structure_flies(flow, moving%jointed, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      flies = structure_flies(flow, moving%multibody, strobe%multibody)
     else
       flies = (strobe%state%mode == mode_slip_plus .or. strobe%state%mode == mode_slip_minus) .and. &
         abs(strobe%state%v) >= flow%slowest
@@ -93,8 +93,8 @@ contains
     logical, intent(in) :: new
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
-    if (allocated(moving%jointed)) then
-      call occupy_structure_lane(moving%jointed, lane, strobe%jointed, batch, structures)
+    if (allocated(moving%multibody)) then
+      call occupy_structure_lane(moving%multibody, lane, strobe%multibody, batch, structures)
     else
       call occupy_lane(flow, lane, strobe%state, new, batch)
     end if
@@ -109,9 +109,9 @@ contains
     type(structure_batch_t), allocatable, intent(inout) :: structures
     class(strobe_t), intent(inout) :: strobe
     type(tally_t), intent(inout) :: tally
-    if (allocated(moving%jointed)) then
-      call structure_lane_state(moving%jointed, structures, lane, strobe%jointed)
-      strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+    if (allocated(moving%multibody)) then
+      call structure_lane_state(moving%multibody, structures, lane, strobe%multibody)
+      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
       call take_structure_counts(structures, lane, tally)
     else
       call lane_state(batch, lane, strobe%state)

@@ -118,7 +118,7 @@ module lane_types
     real(wp) :: slowest = 0
     !> Lanes take a trajectory back before its next stop: with a Stribeck layer, and structures.
     logical :: resumes = .false.
-    !> A jointed structure.
+    !> A multibody structure.
     type(structure_machine_t), allocatable :: structure
   end type lane_flow_t
 

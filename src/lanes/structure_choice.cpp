@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Which kernel for jointed structures this processor gets. All give the same bits.
+// Which kernel for multibody structures this processor gets. All give the same bits.
 #include "lane_types.hpp"
 #include "lane_untrapped.hpp"
 #include "structure_types.hpp"

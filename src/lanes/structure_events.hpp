@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// What lanes of jointed structures do between flights: impacts, sticking and sliding, the flights that
+// What lanes of multibody structures do between flights: impacts, sticking and sliding, the flights that
 // follow, stops. What several joints would have to decide together is left to the scalar code.
 #ifndef SEPARATRIX_STRUCTURE_EVENTS_HPP
 #define SEPARATRIX_STRUCTURE_EVENTS_HPP
@@ -74,7 +74,7 @@ inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh
 }
 
 // Does the chatter of a gap that opens at speed u, with its acceleration and the rate of that, end so soon
-// that the scalar code may complete it? As in `jointed_transition.f90`, with room for rounding.
+// that the scalar code may complete it? As in `multibody_transition.f90`, with room for rounding.
 inline mask chatters_out(const structure_machine &m, const structure_joint &joint, vec u, vec a, vec rate) {
   if (joint.restitution >= 1)
     return mask{};

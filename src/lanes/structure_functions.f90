@@ -5,7 +5,7 @@
 module structure_functions
   use eigen, only: modulus
   use flight_path, only: begin_change, path_t
-  use jointed, only: joint_friction, joint_soft, joint_t, jointed_t
+  use multibody, only: joint_friction, joint_soft, joint_t, multibody_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use path_rows, only: force_powers, place_powers
@@ -32,7 +32,7 @@ contains
   !> The functions of all joints in a mode, of which the exponents are known, and what the directions of joints, stops and drifts
   !> add to them and to the coordinates.
   pure subroutine set_functions(machine, flow, mode)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(structure_mode_t), intent(inout) :: mode
     type(function_t) :: list(size(machine%joints) + count(never_pulls(machine%joints)))
@@ -47,7 +47,7 @@ contains
 
   !> One function of each joint, and after them the forces of soft contacts that never pull where they are not pressed.
   pure function functions_of(machine, flow) result(list)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t) :: list(size(machine%joints) + count(never_pulls(machine%joints)))
     integer :: j, pushes
@@ -76,7 +76,7 @@ contains
   end function push_of
 
   pure logical function is_pressed(machine, flow, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     integer, intent(in) :: j
     is_pressed = machine%joints(j)%kind == joint_soft .and. btest(flow%key, j - 1)
@@ -84,7 +84,7 @@ contains
 
   !> Exponentials and harmonics in function number `at`.
   pure subroutine set_swings(machine, flow, look, at, mode)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t), intent(in) :: look
     integer, intent(in) :: at
@@ -117,7 +117,7 @@ contains
   !> Where the load and the surfaces would take the structure, by powers of time, and what each joint adds to that: friction in
   !> its direction, the place where it is held, or that of the stop that is pressed.
   pure subroutine set_statics(machine, flow, list, mode)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t), intent(in) :: list(:)
     type(structure_mode_t), intent(inout) :: mode
@@ -158,7 +158,7 @@ contains
 
   !> What a place and a pace along each direction without a spring add to the functions.
   pure subroutine set_drifts(machine, flow, list, mode)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t), intent(in) :: list(:)
     type(structure_mode_t), intent(inout) :: mode
@@ -181,7 +181,7 @@ contains
 
   !> Powers of time in the functions (rows) along a path, with the given part of their coordinates or without.
   pure subroutine set_levels(machine, flow, list, path, with_offset, level)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t), intent(in) :: list(:)
     type(path_t), intent(in) :: path

@@ -1,12 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Exact flight for a batch of jointed structures at once, in vectors (the kernel is C++: `structure_kernel.hpp`). What module
+!> Exact flight for a batch of multibody structures at once, in vectors (the kernel is C++: `structure_kernel.hpp`). What module
 !> `lanes` says of one body holds here.
 module structure_lanes
-  use jointed, only: joint_contact, joint_friction, joint_soft, jointed_t
-  use jointed_motion, only: jointed_motion_t
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use multibody, only: joint_contact, joint_friction, joint_soft, multibody_t
+  use multibody_motion, only: multibody_motion_t
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use lane_types, only: lane_batch_t, lane_flow_t, lane_fresh
   use motion_state, only: tally_t
@@ -50,8 +50,8 @@ contains
   !> Whether a lane can take a structure: all rigid contacts are open, and its mode is one that lanes know.
   pure logical function structure_flies(flow, moving, state) result(flies)
     type(lane_flow_t), intent(in) :: flow
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     integer :: j, key, bit
     flies = state%q(1) - state%q(1) == 0
     key = 0
@@ -75,7 +75,7 @@ contains
   !> of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`. The section's
   !> coordinates lie along directions of its own, at right angles; places share a scale, and so do speeds.
   pure subroutine add_structure_region(moving, batch, attractor, point, scale, metric, reach)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     type(structure_batch_t), intent(inout) :: batch
     integer, intent(in) :: attractor
     real(wp), intent(in) :: point(:), scale(:), metric(:), reach
@@ -106,9 +106,9 @@ contains
 
   !> Puts a structure into a lane, which will fly it to the section.
   pure subroutine occupy_structure_lane(moving, lane, state, control, batch)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     integer, intent(in) :: lane
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     type(lane_batch_t), intent(inout) :: control
     type(structure_batch_t), intent(inout) :: batch
     integer :: j
@@ -133,8 +133,8 @@ contains
   !> The function that is zero as joint `j` has just changed its phase, with the sign of the side of its limit. Slides and pressed
   !> contacts set off from their lower limits; a contact that never pulls begins with a push.
   pure integer function left_limit(moving, state, j) result(left)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: j
     real(wp) :: place, speed, stop
     real(wp), parameter :: far_from_nothing = 1e-6_wp
@@ -155,7 +155,7 @@ contains
 
   !> Number of the function that is the force of soft contact `j` where it is not pressed, -1 without one.
   pure integer function push_of(machine, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     push_of = -1
     if (never_pulls(machine%joints(j))) push_of = size(machine%joints) + count(never_pulls(machine%joints(:j)))
@@ -163,10 +163,10 @@ contains
 
   !> The structure in a lane: where it stopped, or at the start of the flight that is left to the event loop.
   pure subroutine structure_lane_state(moving, batch, lane, state)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     type(structure_batch_t), intent(in) :: batch
     integer, intent(in) :: lane
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     integer :: j, left
     associate (n => moving%machine%n)
       state%q(:n) = batch%q(lane, :n)

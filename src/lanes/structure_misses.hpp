@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// By how much lanes of jointed structures miss their stops: the gaps where they stop closing.
+// By how much lanes of multibody structures miss their stops: the gaps where they stop closing.
 #ifndef SEPARATRIX_STRUCTURE_MISSES_HPP
 #define SEPARATRIX_STRUCTURE_MISSES_HPP
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// What the modes of jointed structures make of the lanes that are in them: coordinates and speeds,
+// What the modes of multibody structures make of the lanes that are in them: coordinates and speeds,
 // coefficients and limits of their functions, lengths of their panels.
 #ifndef SEPARATRIX_STRUCTURE_MODES_HPP
 #define SEPARATRIX_STRUCTURE_MODES_HPP

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// The motion of jointed structures between events, in lanes: sums of complex exponentials and harmonics; see
+// The motion of multibody structures between events, in lanes: sums of complex exponentials and harmonics; see
 // `structure_mode`.
 #ifndef SEPARATRIX_STRUCTURE_MOTION_HPP
 #define SEPARATRIX_STRUCTURE_MOTION_HPP

@@ -1,18 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure made ready to fly in lanes: linear, of few coordinates, with a clock, dry friction and contacts, rigid or
+!> A multibody structure made ready to fly in lanes: linear, of few coordinates, with a clock, dry friction and contacts, rigid or
 !> linear.
 module structure_preparation
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine
   use friction_law, only: falls
   use guard_search, only: most_radians
-  use jointed, only: joint_contact, joint_friction, joint_soft, joint_t, jointed_t
-  use jointed_flows, only: jointed_motion_t
+  use multibody, only: joint_contact, joint_friction, joint_soft, joint_t, multibody_t
+  use multibody_flows, only: multibody_motion_t
   use kinds, only: wp
   use lane_curve, only: restitution_curve_of
-  use jointed_state, only: acts_as_spring
+  use multibody_state, only: acts_as_spring
   use lane_types, only: lane_flow_t
   use mode_flow, only: mode_flow_t
   use motion_state, only: flight_adaptive
@@ -33,14 +33,14 @@ module structure_preparation
   !> The place of a stop that is not there [m].
   real(wp), parameter :: no_stop = 1e300_wp
   !> Longest end of a chatter that is completed, and shortest flight that ends a burst of impacts, in periods; as in
-  !> `jointed_transition` and `jointed_motion`.
+  !> `multibody_transition` and `multibody_motion`.
   real(wp), parameter :: longest_chatter = 1e-2_wp, burst_gap = 1e-6_wp
 
 contains
 
   !> `flow%available` if the structure can fly in lanes.
   pure subroutine prepare_structure_lanes(moving, flow)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
     integer, allocatable :: switches(:)
     integer :: j, key
@@ -79,7 +79,7 @@ contains
   !> Panels over which quintics err by no more than about 2 % of what a function swings: as the fastest exponent of a mode [rad/s]
   !> asks for, and longer; where misses are noted, such that the rate of a gap turns once within.
   pure subroutine set_panels(moving, mode)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     type(structure_mode_t), intent(inout) :: mode
     real(wp) :: fastest, sine, cosine, shrink
     integer :: l, k, terms
@@ -108,7 +108,7 @@ contains
 
   !> Whether the structure is one that the kernel has room and laws for.
   pure logical function fits_lanes(moving) result(fits)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     integer :: j
     associate (machine => moving%machine)
       fits = machine%driven .and. machine%frequency > 0 .and. machine%linear .and. machine%n <= lane_coordinates .and. &
@@ -145,7 +145,7 @@ contains
   end function has_plain_level
 
   pure subroutine set_joint(machine, j, into)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     type(structure_joint_t), intent(inout) :: into
     real(wp) :: kick(machine%n)
@@ -191,7 +191,7 @@ contains
 
   !> The mode in which the joints whose bits are set in `key` stick or are pressed.
   pure subroutine set_mode(moving, switches, key, mode)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     integer, intent(in) :: switches(:), key
     type(structure_mode_t), intent(inout) :: mode
     integer :: i, k, bits, terms
@@ -236,7 +236,7 @@ contains
 
   !> From the state to the amplitudes and what is along the directions without a spring, and back.
   pure subroutine set_amplitudes(machine, flow, mode)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(structure_mode_t), intent(inout) :: mode
     real(wp) :: project(size(flow%basis, 2), machine%n)

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What the kernel for jointed structures shares with its callers, member by member as `structure_types.hpp` has it, beside the
+!> What the kernel for multibody structures shares with its callers, member by member as `structure_types.hpp` has it, beside the
 !> `lane_batch_t` that controls the lanes.
 module structure_types
   use lane_curve, only: restitution_curve_t

@@ -1,15 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Builds a jointed structure from bodies, springs, joints and drives, by name. `finish` eliminates the bodies whose
+!> Builds a multibody structure from bodies, springs, joints and drives, by name. `finish` eliminates the bodies whose
 !> motion is given, merges parallel friction, and checks the whole. Messages of errors begin with the key.
 module assembly
   use constants, only: two_pi
   use eigen, only: symmetric_eigen, undamped_modes
   use errors, only: error_t, fail
-  use jointed, only: is_stop, joint_elastic, joint_friction, joint_t, jointed_t, most_degrees, &
+  use multibody, only: is_stop, joint_elastic, joint_friction, joint_t, multibody_t, most_degrees, &
     most_joints, name_length, wave_t
-  use jointed_state, only: is_curved
+  use multibody_state, only: is_curved
   use kinds, only: wp
   use matrices, only: solve
   use shared_friction, only: merge_friction
@@ -28,7 +28,7 @@ contains
 
   !> A body of `mass` [kg] under a constant force `load` [N].
   pure subroutine add_body(machine, name, mass, load)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: name
     real(wp), intent(in) :: mass, load
     character(len=name_length), allocatable :: names(:)
@@ -60,7 +60,7 @@ contains
 
   !> Room for `harmonics` harmonics of the forces.
   pure subroutine widen_force(machine, harmonics)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     integer, intent(in) :: harmonics
     complex(wp), allocatable :: larger(:, :)
     integer :: rows, columns
@@ -73,7 +73,7 @@ contains
 
   !> Number of a body, 0 if there is none of that name.
   pure integer function index_of(machine, name) result(at)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     character(len=*), intent(in) :: name
     do at = machine%n, 1, -1
       if (machine%names(at) == name) return
@@ -83,7 +83,7 @@ contains
 
   !> The row of q_second - q_first, the ground being 0; `found` is false if there is no such body.
   pure subroutine row_between(machine, first, second, row, found)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), allocatable, intent(out) :: row(:)
     logical, intent(out) :: found
@@ -98,7 +98,7 @@ contains
 
   !> A linear spring [N/m] and damper [N s/m] along a row; no force where the row is `length` [m].
   pure subroutine add_link(machine, row, stiffness, damping, length)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     real(wp), intent(in) :: row(:), stiffness, damping, length
     integer :: k
     do k = 1, machine%n
@@ -110,7 +110,7 @@ contains
   end subroutine add_link
 
   pure subroutine add_joint(machine, joint)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(joint_t), intent(in) :: joint
     type(joint_t), allocatable :: joints(:)
     integer :: i
@@ -124,7 +124,7 @@ contains
 
   !> A force along a row: its mean, and Re harmonic(m) exp(i m Omega t) [N].
   pure subroutine add_force(machine, row, mean, harmonic)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     real(wp), intent(in) :: row(:), mean
     complex(wp), intent(in) :: harmonic(:)
     integer :: m
@@ -137,7 +137,7 @@ contains
 
   !> Gives the motion of a body [m]; `finish` takes it out of the coordinates.
   pure subroutine give_motion(machine, name, wave)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: name
     type(wave_t), intent(in) :: wave
     type(wave_t), allocatable :: given(:)
@@ -181,7 +181,7 @@ contains
   !> Completes a machine: what is given leaves the coordinates, friction on the same row becomes one joint, sizes of
   !> rounding are set. Without a `frequency` the period is that of the slowest mode, one second without any.
   pure subroutine finish(machine, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: squares(:), shapes(:, :)
     integer :: i, k
@@ -229,7 +229,7 @@ contains
   !> Takes a body whose motion is given out of the coordinates: its springs and dampers become forces, its joints get an
   !> offset.
   pure subroutine take_out(machine, name, wave, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: name
     type(wave_t), intent(in) :: wave
     type(error_t), allocatable, intent(out) :: error
@@ -290,7 +290,7 @@ contains
 
   !> What a machine must be. The mass matrix is positive definite, every joint has a row of its own kind.
   pure subroutine check(machine, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: values(machine%n), vectors(machine%n, machine%n)
     integer :: i
@@ -320,7 +320,7 @@ contains
   !> What is viscous of friction belongs to the structure, the velocity of the surface being a force on it: where friction
   !> sticks it has no part.
   pure subroutine take_viscous(machine, j)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     integer, intent(in) :: j
     type(joint_t) :: joint
     integer :: m
@@ -342,7 +342,7 @@ contains
 
   !> Sizes of forces, speeds and lengths for rounding; `inertia` is the force that surfaces which move give bodies [N].
   pure subroutine set_sizes(machine, inertia)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     real(wp), intent(in) :: inertia
     real(wp) :: accelerations, largest
     integer :: i

@@ -1,12 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Controllers and impulses of a jointed structure.
+!> Controllers and impulses of a multibody structure.
 module control
   use assembly, only: add_body, add_force
   use errors, only: error_t, fail
-  use jointed, only: controller_t, impulse_t, integral_of, jointed_t, wave_value
-  use jointed_state, only: jointed_state_t, running_control
+  use multibody, only: controller_t, impulse_t, integral_of, multibody_t, wave_value
+  use multibody_state, only: multibody_state_t, running_control
   use kinds, only: wp
   use status, only: exit_bad_case
   implicit none
@@ -20,7 +20,7 @@ contains
   !> body whose motion is given. A continuous one acts as spring, damper and force; its integral y is one more coordinate,
   !> `name`, of unit mass, under y'' = e'.
   pure subroutine add_controller(machine, controller, name, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(controller_t), intent(in) :: controller
     character(len=*), intent(in) :: name
     type(error_t), allocatable, intent(out) :: error
@@ -78,7 +78,7 @@ contains
 
   !> Adds an impulse behind those before it in time.
   pure subroutine add_impulse(machine, impulse)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(impulse_t), intent(in) :: impulse
     type(impulse_t), allocatable :: more(:)
     integer :: before, i
@@ -94,8 +94,8 @@ contains
 
   !> What a controller sees, reference less place, and its rate [m, m/s].
   pure subroutine error_of(machine, state, turning, error, rate)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: error, rate
     associate (controller => machine%controller, n => machine%n)
@@ -107,8 +107,8 @@ contains
 
   !> Force of a controller on the coordinates but for the harmonics of its reference, which are among those of the machine [N].
   pure function active_force(machine, state) result(force)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: force(machine%n), running, rate
     associate (controller => machine%controller, n => machine%n)
       call running_control(controller, state, running, rate)
@@ -119,9 +119,9 @@ contains
   end function active_force
 
   !> The state of the bodies alone: the integral of a controller has no energy.
-  pure type(jointed_state_t) function bodies_of(machine, state) result(bodies)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+  pure type(multibody_state_t) function bodies_of(machine, state) result(bodies)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     bodies = state
     if (integral_of(machine) == 0) return
     bodies%q(integral_of(machine)) = 0

@@ -5,7 +5,7 @@
 !> for one of each coordinate.
 module places
   use errors, only: error_t, fail
-  use jointed, only: jointed_t, most_degrees
+  use multibody, only: multibody_t, most_degrees
   use kinds, only: real64, wp
   use law_table, only: law_choice_t, list_of, part_kind, part_law, path_of, value_of
   use status, only: exit_bad_case
@@ -36,7 +36,7 @@ contains
   !> place has one given motion at most, and not the watched one.
   pure subroutine name_coordinates(choices, machine, rows, coordinate, error)
     type(law_choice_t), intent(in) :: choices(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     real(wp), intent(inout) :: rows(:, :)
     integer, allocatable, intent(out) :: coordinate(:)
     type(error_t), allocatable, intent(out) :: error
@@ -116,7 +116,7 @@ contains
   !> The structures, and the rows (columns here) of all places: bodies, then points.
   pure subroutine add_structures(choices, machine, rows, error)
     type(law_choice_t), intent(in) :: choices(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     real(wp), allocatable, intent(out) :: rows(:, :)
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: first(:), last(:)
@@ -167,7 +167,7 @@ contains
   pure subroutine read_structure(choice, name, machine, error)
     type(law_choice_t), intent(in) :: choice
     character(len=*), intent(in) :: name
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :), start(:, :), frequency(:), ratios(:)
     integer :: k, n

@@ -4,7 +4,7 @@
 !> Friction joints that are not to be told apart.
 module shared_friction
   use friction_law, only: falls, friction_t, same_shape
-  use jointed, only: joint_friction, joint_t, jointed_t
+  use multibody, only: joint_friction, joint_t, multibody_t
   use kinds, only: wp
   implicit none
   private
@@ -16,7 +16,7 @@ contains
   !> Rigid friction on the same row against the same surface becomes one joint: what each holds is not to be told apart. `first` and
   !> `second` are joints whose laws do not add up to one, 0 without any.
   pure subroutine merge_friction(machine, first, second)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     integer, intent(out) :: first, second
     type(joint_t), allocatable :: joints(:)
     logical :: kept(size(machine%joints))

@@ -6,7 +6,7 @@
 module structure_block
   use assembly, only: add_body
   use eigen, only: symmetric_eigen, undamped_modes
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: wp
   use text, only: to_text
   implicit none
@@ -21,7 +21,7 @@ contains
 
   !> Adds the coordinates NAME.1, NAME.2, ... with their matrices; `start`: their values and rates (rows) at the start.
   pure subroutine add_structure(machine, name, mass, damping, stiffness, start)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: name
     real(wp), intent(in) :: mass(:, :), damping(:, :), stiffness(:, :), start(:, :)
     integer :: i, first, last
@@ -76,7 +76,7 @@ contains
   !> Makes the displacement row(:, k) of a place a coordinate, in the place of the one that has the largest part in it among
   !> those not yet `taken`; `at` is its number, 0 if the place moves with those that are taken. All rows follow.
   pure subroutine make_coordinate(machine, rows, k, name, taken, at)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     real(wp), intent(inout) :: rows(:, :)
     integer, intent(in) :: k
     character(len=*), intent(in) :: name

@@ -6,10 +6,10 @@
 !> A slice is one combination of the parameters: one machine, one catalogue of attractors.
 module grid
   use axis, only: axis_t, name_length
-  use build_jointed, only: is_jointed, jointed_of
+  use build_multibody, only: is_multibody, multibody_of
   use build_motion, only: machine_of, period_of
   use errors, only: error_t
-  use jointed, only: jointed_t
+  use multibody, only: multibody_t
   use kinds, only: int64, wp
   use law_table, only: change_parameter, is_start_parameter, law_choice_t
   use motion, only: motion_t
@@ -112,7 +112,7 @@ contains
     extra = size(grid%start_axis) - 3
     allocate (grid%others(0), grid%direction(0, extra))
     if (extra == 0) return
-    if (.not. is_jointed(grid%laws)) return
+    if (.not. is_multibody(grid%laws)) return
     laws = grid%laws
     do k = 4, 3 + extra
       call change_parameter(laws, grid%start_names(k), 0.0_wp, known)
@@ -142,9 +142,9 @@ contains
   pure function starts_of(laws) result(starts)
     type(law_choice_t), intent(in) :: laws(:)
     real(wp), allocatable :: starts(:)
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     type(error_t), allocatable :: error
-    call jointed_of(laws, machine, error)
+    call multibody_of(laws, machine, error)
     allocate (starts(0))
     if (.not. allocated(error)) starts = reshape(machine%start, [2*machine%n])
   end function starts_of

@@ -9,8 +9,8 @@
 module blow
   use boxed_forces, only: solve_boxed
   use contact_law, only: restitution_at
-  use jointed, only: joint_contact, jointed_t, most_joints, together_sequence
-  use jointed_state, only: joint_motion, jointed_state_t, rounding_of_speed
+  use multibody, only: joint_contact, multibody_t, most_joints, together_sequence
+  use multibody_state, only: joint_motion, multibody_state_t, rounding_of_speed
   use kinds, only: wp
   implicit none
   private
@@ -28,8 +28,8 @@ contains
   !> `plastic` takes every restitution as zero. `speed_before` are the opening speeds of the contacts, `lost` the kinetic
   !> energy lost [J].
   pure subroutine strike(machine, state, turning, side, plastic, speed_before, lost, ok)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: side(:)
     logical, intent(in) :: plastic
@@ -75,11 +75,11 @@ contains
   !> Takes from the speeds what the rounding of the impulses has left of those of contacts in `list` that have none. Impulses that
   !> go through a row leave bodies at rest with no speed that would tell what rounding is.
   pure subroutine still(machine, turning, list, impulse, state)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: list(:)
     real(wp), intent(in) :: impulse(:)
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), dimension(size(list)) :: left, r, y, none
     real(wp) :: g(size(list), size(list)), swing(machine%n), kick(machine%n, size(list)), s, u
     logical :: moves(size(list)), blurred, ok

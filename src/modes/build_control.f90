@@ -5,7 +5,7 @@
 module build_control
   use control, only: add_controller, add_impulse
   use errors, only: error_t, fail
-  use jointed, only: controller_t, impulse_t, jointed_t
+  use multibody, only: controller_t, impulse_t, multibody_t
   use kinds, only: wp
   use law_table, only: law_choice_t, path_of, value_of
   use places, only: place_of
@@ -24,7 +24,7 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     real(wp), intent(in) :: rows(:, :)
     integer, intent(in) :: given(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(controller_t) :: controller
     integer :: i
@@ -51,7 +51,7 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     real(wp), intent(in) :: rows(:, :)
     integer, intent(in) :: given(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(impulse_t) :: impulse
     integer :: i, k

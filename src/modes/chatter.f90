@@ -5,9 +5,9 @@
 module chatter
   use contact_law, only: restitution_at
   use eigen, only: modulus
-  use jointed, only: harmonics_in, joint_friction, joint_t, jointed_t, most_joints, offset_of
-  use jointed_flows, only: jointed_motion_t
-  use jointed_state, only: joint_motion, jointed_state_t
+  use multibody, only: harmonics_in, joint_friction, joint_t, multibody_t, most_joints, offset_of
+  use multibody_flows, only: multibody_motion_t
+  use multibody_state, only: joint_motion, multibody_state_t
   use kinds, only: wp
   use mode_choice, only: accelerations_of
   implicit none
@@ -21,12 +21,12 @@ contains
   !> `along` the contact turns with every bounce, and no other comes to rest. Bounces up with the acceleration a and down with
   !> b <= a take u/a + u/sqrt(a b), and the speed shrinks by e sqrt(b/a).
   pure subroutine look_ahead(moving, state, turning, j, side, at_rest, along, ends)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: j, side
     logical, intent(out) :: at_rest(:), along(:), ends
-    type(jointed_state_t) :: back
+    type(multibody_state_t) :: back
     real(wp), dimension(moving%machine%n) :: a, jerk, a_back
     real(wp) :: s, u, given, opening, closing, change, last, speed, e, shrink
     integer :: i
@@ -67,11 +67,11 @@ contains
   !> How long a chatter that was completed in the impact of contact `j` on `side`, from the state `before` it, would still have
   !> lasted [s]; see `look_ahead`.
   pure real(wp) function rest_of_chatter(moving, before, turning, j, side) result(rest)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: before
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: before
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: j, side
-    type(jointed_state_t) :: out
+    type(multibody_state_t) :: out
     real(wp) :: a(moving%machine%n), s, u, given, opening, closing, e
     logical :: along(most_joints)
     associate (machine => moving%machine)
@@ -90,10 +90,10 @@ contains
 
   !> The state in which the friction `along` contact `j` slides the other way.
   pure subroutine turn_back(machine, state, j, back, along)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: j
-    type(jointed_state_t), intent(out) :: back
+    type(multibody_state_t), intent(out) :: back
     logical, intent(out) :: along(:)
     integer :: i
     back = state

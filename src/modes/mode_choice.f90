@@ -7,8 +7,8 @@
 !> Ties are settled by the same problem for the next derivative, twice; what is still tied sticks, or stays closed, unless its guard
 !> has just fallen.
 module mode_choice
-  use jointed, only: joint_contact, jointed_t, most_joints
-  use jointed_state, only: free_force, is_held, joint_force, joint_motion, jointed_state_t
+  use multibody, only: joint_contact, multibody_t, most_joints
+  use multibody_state, only: free_force, is_held, joint_force, joint_motion, multibody_state_t
   use kinds, only: wp
   use mode_question, only: ask, drift_of, is_tied, keep_loaded, narrow, question_t, second_rate, set_mobility, settle_ties, &
     sizes, solve
@@ -28,8 +28,8 @@ contains
   !> a stop, with no speed). Those of the others stay. `ok` is false if no choice is found. The force of those `at_level` has just
   !> come to its limit: one near it is taken as there, whatever the rounding of the flight was.
   pure subroutine choose_mode(machine, state, turning, at_rest, touching, ok, at_level)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:)
@@ -63,22 +63,22 @@ contains
 
   !> Whether the force of friction falls when it starts to slide.
   pure logical function drops(machine, j)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     drops = machine%joints(j)%friction%break_away > level_of_sliding(machine, j)*(1 + rounding)
   end function drops
 
   !> Friction at the start of a slide [N].
   pure real(wp) function level_of_sliding(machine, j) result(level)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     call joint_force(machine%joints(j), 1, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, level)
     level = -level
   end function level_of_sliding
 
   pure subroutine set_phases(machine, state, at_rest, touching, verdict, released)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(inout) :: state
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:), verdict(:), released(:)
     integer :: j
@@ -93,8 +93,8 @@ contains
 
   !> A released joint that the forces drive against its own direction is held again, once.
   pure subroutine restick(machine, state, turning, released, put_back, again)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(inout) :: released(:)
     logical, intent(inout) :: put_back(:)
@@ -115,8 +115,8 @@ contains
 
   !> Accelerations with the phases as they are, and their rates.
   pure subroutine accelerations_of(machine, state, turning, a, jerk)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: a(:)
     real(wp), intent(out), optional :: jerk(:)
@@ -139,9 +139,9 @@ contains
   !> Adds to forces (or their rates) those of the constraints, so that derivative number `order` of their joint coordinates
   !> is zero.
   pure subroutine hold_against(machine, question, state, turning, order, force)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(in) :: question
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
     real(wp), intent(inout) :: force(:)
@@ -156,7 +156,7 @@ contains
 
   !> Adds the forces `r` of the joints in question [N], or their rates, to those on the coordinates.
   pure subroutine add_forces(machine, question, r, force)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(in) :: question
     real(wp), intent(in) :: r(:)
     real(wp), intent(inout) :: force(:)
@@ -169,15 +169,15 @@ contains
   !> One convex problem and its ties. `verdict` of friction: 0 sticks, +1, -1 starts to slide; of contacts: 0 stays closed, 1
   !> opens.
   pure subroutine answer(machine, state, turning, at_rest, touching, near, before, verdict, ok)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: at_rest(:), near(:)
     integer, intent(in) :: touching(:), before(:)
     integer, intent(out) :: verdict(:)
     logical, intent(out) :: ok
     type(question_t) :: question
-    type(jointed_state_t) :: trial
+    type(multibody_state_t) :: trial
     real(wp), dimension(machine%n) :: force, rate, a, jerk, next
     real(wp), dimension(most_joints) :: r, y, drift, size_of_y, blur
     integer :: side(most_joints)
@@ -229,7 +229,7 @@ contains
   !> Asks for the forces of all joints at rest and of all contacts that touch, which are held in `phase`; `side` is where the
   !> search for the answer begins: friction that slid before is first tried at the limit that it came from.
   pure subroutine ask_all(machine, at_rest, touching, before, question, phase, side)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:), before(:)
     type(question_t), intent(inout) :: question
@@ -256,7 +256,7 @@ contains
   end subroutine ask_all
 
   pure subroutine classify(machine, question, side, verdict)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(in) :: question
     integer, intent(in) :: side(:)
     integer, intent(inout) :: verdict(:)
@@ -273,8 +273,8 @@ contains
   !> Moves the state onto what the phases hold: no sliding speed, gap and its rate zero; least in the metric of the masses. With
   !> `speeds` false only the gaps.
   pure subroutine project(machine, state, turning, speeds)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in), optional :: speeds
     type(question_t) :: question

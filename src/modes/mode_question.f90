@@ -5,8 +5,8 @@
 !> acceleration along its joint unless it is at a limit. Derivatives of it settle ties.
 module mode_question
   use boxed_forces, only: depends_on, solve_boxed
-  use jointed, only: joint_contact, joint_friction, joint_spring, jointed_t, most_joints
-  use jointed_state, only: is_held, joint_force, joint_motion, jointed_state_t, running_control, spring_force, strength_now
+  use multibody, only: joint_contact, joint_friction, joint_spring, multibody_t, most_joints
+  use multibody_state, only: is_held, joint_force, joint_motion, multibody_state_t, running_control, spring_force, strength_now
   use kinds, only: wp
   implicit none
   private
@@ -38,7 +38,7 @@ contains
 
   !> W' M^-1 W.
   pure subroutine set_mobility(machine, question)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(inout) :: question
     integer :: i, k
     do i = 1, question%count
@@ -52,9 +52,9 @@ contains
   !> Derivative number `order` of the joint coordinates in question without the forces sought: that of the free structure
   !> under `force` (or its rates), and that of the surfaces.
   pure subroutine drift_of(machine, question, state, turning, order, force, drift)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(in) :: question
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: force(:)
@@ -71,9 +71,9 @@ contains
 
   !> Derivative number `order` >= 2 of the given part of a joint coordinate.
   pure real(wp) function surface(machine, j, state, turning, order)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, order
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer :: m
     surface = 0
@@ -88,9 +88,9 @@ contains
 
   !> Sizes of what the accelerations in question, or their rates (derivative number `order`), are sums of, for their rounding.
   pure function sizes(machine, question, state, turning, order, force) result(size_of_y)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(in) :: question
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: force(:)
@@ -136,8 +136,8 @@ contains
 
   !> What the modes of a motion may bring to one place, whatever of them is there now [J].
   pure real(wp) function energy_of_swing(machine, state) result(energy)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     associate (q => abs(state%q(:machine%n)), v => abs(state%v(:machine%n)))
       energy = 0.5_wp*sum(v*matmul(abs(machine%mass), v)) + 0.5_wp*sum(q*matmul(abs(machine%stiffness), q))
     end associate
@@ -154,7 +154,7 @@ contains
 
   !> Bound on derivative number `order` of the given part of a joint coordinate.
   pure real(wp) function swing_of(machine, j, order) result(swing)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, order
     integer :: m
     swing = 0
@@ -168,8 +168,8 @@ contains
 
   !> Second rates of the forces, the laws taken as linear.
   pure subroutine second_rate(machine, state, turning, a, jerk, rate)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(in) :: a(:), jerk(:)
     real(wp), intent(out) :: rate(:)
@@ -237,7 +237,7 @@ contains
 
   !> What no derivative decides sticks, or stays closed; a contact whose force a guard has seen end (`ends`) opens.
   pure subroutine settle_ties(machine, question, r, y, ends, tolerance, side)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(question_t), intent(in) :: question
     real(wp), intent(in) :: r(:), y(:), tolerance(:)
     logical, intent(in) :: ends(:)

@@ -1,11 +1,11 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Positions and velocities on which the motion of a jointed structure depends: a structure that nothing ties to the ground may be
+!> Positions and velocities on which the motion of a multibody structure depends: a structure that nothing ties to the ground may be
 !> anywhere, and looks the same from a frame that moves along.
 module section_directions
   use eigen, only: symmetric_eigen
-  use jointed, only: integral_of, is_stop, joint_friction, joint_section, jointed_t, most_degrees
+  use multibody, only: integral_of, is_stop, joint_friction, joint_section, multibody_t, most_degrees
   use kinds, only: wp
   implicit none
   private
@@ -21,7 +21,7 @@ contains
   !> fewer count between the stops, those that count only for the stops come first. What is tied to what tells them, not how
   !> strongly: machines of one build have the same.
   pure subroutine directions_of(machine, directions, count_directions)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
     real(wp) :: between(most_degrees, most_degrees)
@@ -55,7 +55,7 @@ contains
 
   !> The same, with the stops or without.
   pure subroutine directions_with(machine, stops, directions, count_directions)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     logical, intent(in) :: stops
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
@@ -76,7 +76,7 @@ contains
   !> Directions of the velocities on which anything depends, likewise: all of them, unless the whole may move along at any speed. A
   !> motion without a clock is looked at where a body turns: there its own velocity counts.
   pure subroutine speeds_of(machine, directions, count_directions)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     real(wp), intent(out) :: directions(most_degrees, most_degrees)
     integer, intent(out) :: count_directions
     real(wp) :: depends(machine%n, machine%n)

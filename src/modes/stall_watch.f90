@@ -1,10 +1,10 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Events of a jointed structure without progress in time: whether modes repeat, and how often they had to be held.
+!> Events of a multibody structure without progress in time: whether modes repeat, and how often they had to be held.
 module stall_watch
-  use jointed, only: jointed_t, most_degrees, most_joints
-  use jointed_state, only: jointed_state_t
+  use multibody, only: multibody_t, most_degrees, most_joints
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   implicit none
   private
@@ -31,9 +31,9 @@ contains
   !> follow each other, without progress.
   pure subroutine note_flight(watch, machine, before, state, held)
     type(stall_watch_t), intent(inout) :: watch
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     real(wp), intent(in) :: before
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     logical, intent(out) :: held
     real(wp) :: rounding
     integer :: i
@@ -57,7 +57,7 @@ contains
   !> Notes that the phases are held at `time` [s].
   pure subroutine note_hold(watch, machine, time)
     type(stall_watch_t), intent(inout) :: watch
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     real(wp), intent(in) :: time
     watch%stalls = 0
     watch%holds = watch%holds + 1

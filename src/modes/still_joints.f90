@@ -4,8 +4,8 @@
 !> Which friction joints do not move. Where joints share a force, as in a ring of friction, one can be at its limit, with the
 !> phase of a slide, while the others keep it where it is.
 module still_joints
-  use jointed, only: joint_elastic, joint_friction, jointed_t, most_joints
-  use jointed_state, only: is_held, joint_motion, jointed_state_t
+  use multibody, only: joint_elastic, joint_friction, multibody_t, most_joints
+  use multibody_state, only: is_held, joint_motion, multibody_state_t
   use kinds, only: wp
   implicit none
   private
@@ -19,8 +19,8 @@ contains
 
   !> Whether each joint is friction that does not slide: it sticks, or it has no speed and those that are held leave it none.
   pure function stand_still(machine, state, turning) result(still)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     logical :: still(size(machine%joints))
     real(wp) :: basis(machine%n, most_joints), rest(machine%n), s, u

@@ -1,15 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What happens to a jointed structure at times of its own: the samples of a controller, impulses on bodies.
+!> What happens to a multibody structure at times of its own: the samples of a controller, impulses on bodies.
 module timed_actions
   use blow, only: strike
   use control, only: error_of
-  use jointed, only: joint_contact, joint_friction, joint_section, jointed_t, most_joints
-  use jointed_flows, only: jointed_motion_t
-  use jointed_log, only: book_change, energy_of_jointed, record_change
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
-  use jointed_transition, only: judge_friction, settle
+  use multibody, only: joint_contact, joint_friction, joint_section, multibody_t, most_joints
+  use multibody_flows, only: multibody_motion_t
+  use multibody_log, only: book_change, energy_of_multibody, record_change
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
+  use multibody_transition, only: judge_friction, settle
   use kinds, only: wp
   use motion_state, only: event_blow, log_t, put_column
   implicit none
@@ -21,15 +21,15 @@ contains
 
   !> Whether there is any such thing.
   pure logical function acts_on_time(machine)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     acts_on_time = allocated(machine%impulses)
     if (allocated(machine%controller)) acts_on_time = acts_on_time .or. machine%controller%sample_time > 0
   end function acts_on_time
 
   !> Time of the next [s after the section], huge if there is none.
   pure real(wp) function next_action(machine, state) result(next)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     next = huge(next)
     if (allocated(machine%controller)) then
       if (machine%controller%sample_time > 0) next = state%samples*machine%controller%sample_time - state%clock
@@ -38,8 +38,8 @@ contains
   end function next_action
 
   pure real(wp) function next_impulse(machine, state) result(next)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     next = huge(next)
     if (.not. allocated(machine%impulses)) return
     if (state%struck < size(machine%impulses)) next = machine%impulses(state%struck + 1)%time - state%clock
@@ -47,8 +47,8 @@ contains
 
   !> What is due now. `ok` is false if no mode is found that follows.
   pure subroutine act(moving, state, ok, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     logical, intent(out) :: ok
     type(log_t), intent(inout), optional :: log
     complex(wp) :: turning(moving%harmonics)
@@ -62,8 +62,8 @@ contains
 
   !> A sampled controller looks at the error, and holds its force until the next sample.
   pure subroutine take_sample(moving, state, turning, ok)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(out) :: ok
     real(wp) :: error, rate
@@ -82,8 +82,8 @@ contains
 
   !> Joints that stick, and contacts that are closed.
   pure subroutine held_joints(machine, state, at_rest, touching)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     logical, intent(out) :: at_rest(most_joints)
     integer, intent(out) :: touching(most_joints)
     integer :: j
@@ -97,12 +97,12 @@ contains
 
   !> The next impulse, which finite friction has no part in. Closed contacts that it presses are struck.
   pure subroutine give_impulse(moving, state, turning, ok, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(out) :: ok
     type(log_t), intent(inout), optional :: log
-    type(jointed_state_t) :: before, pushed
+    type(multibody_state_t) :: before, pushed
     integer :: touching(most_joints), j
     logical :: at_rest(most_joints), strikes
     real(wp) :: speed(most_joints), lost, s, u
@@ -126,7 +126,7 @@ contains
       call judge_friction(machine, before, turning, .true., state, at_rest)
       if (ok) call settle(moving, state, turning, at_rest, touching, ok)
       if (.not. present(log) .or. .not. ok) return
-      log%book%work = log%book%work + energy_of_jointed(machine, pushed) - energy_of_jointed(machine, before)
+      log%book%work = log%book%work + energy_of_multibody(machine, pushed) - energy_of_multibody(machine, before)
       call book_change(machine, pushed, state, log)
       call record_change(machine, event_blow, before, state, log)
       ! In the place of a joint stands the number after the last.

@@ -3,8 +3,8 @@
 
 !> Which contacts touch, as far as rounding lets it be known.
 module touching_contacts
-  use jointed, only: joint_contact, jointed_t, most_joints
-  use jointed_state, only: joint_motion, jointed_state_t
+  use multibody, only: joint_contact, multibody_t, most_joints
+  use multibody_state, only: joint_motion, multibody_state_t
   use kinds, only: wp
   use mode_choice, only: project
   implicit none
@@ -21,8 +21,8 @@ contains
   !> rounding of places on their way through zero is that of their swing, and a slow impact, of those that are `hit`, has no sharper
   !> time.
   pure subroutine add_tied(machine, state, turning, hit, touching)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: hit(:)
     integer, intent(inout) :: touching(:)
@@ -56,8 +56,8 @@ contains
 
   !> Contacts that are all but closed take part in the end of a chatter of several.
   pure subroutine add_near(machine, state, turning, touching)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(inout) :: touching(:)
     real(wp) :: s, u
@@ -75,8 +75,8 @@ contains
   !> Takes gaps of contacts that touch, `slow`, from the places where bodies on their way through zero have no digits of them: the
   !> rounding of their swing decides nothing.
   pure subroutine close_gaps(machine, state, turning, slow)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: slow(:)
     real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
@@ -101,8 +101,8 @@ contains
 
   !> How far places go [m].
   pure real(wp) function swing_of(machine, state) result(swing)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     swing = maxval(abs(state%q(:machine%n))) + maxval(abs(state%v(:machine%n)))*machine%period
   end function swing_of
 

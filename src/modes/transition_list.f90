@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The transitions of a motion of a jointed structure as they happen, for what varies it: the whole state on both sides.
+!> The transitions of a motion of a multibody structure as they happen, for what varies it: the whole state on both sides.
 module transition_list
-  use jointed_state, only: jointed_state_t
+  use multibody_state, only: multibody_state_t
   implicit none
   private
 
@@ -12,7 +12,7 @@ module transition_list
   !> One transition: the joint whose guard fell, and which. `certain` is false where several fell together, or where a tie was held
   !> for an instant: the motions beside may go other ways.
   type, public :: transition_t
-    type(jointed_state_t) :: before, after
+    type(multibody_state_t) :: before, after
     integer :: joint = 0, meaning = 0
     logical :: certain = .true.
   end type transition_t

@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What a transition of a jointed structure is told as: its events, and what it does to the energy.
+!> What a transition of a multibody structure is told as: its events, and what it does to the energy.
 module transition_log
   use chatter, only: rest_of_chatter
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
-  use jointed, only: joint_contact, joint_friction, joint_soft, jointed_t
-  use jointed_flows, only: jointed_motion_t
-  use jointed_log, only: book_change, log_event
-  use jointed_state, only: jointed_state_t, turning_at
+  use multibody, only: joint_contact, joint_friction, joint_soft, multibody_t
+  use multibody_flows, only: multibody_motion_t
+  use multibody_log, only: book_change, log_event
+  use multibody_state, only: multibody_state_t, turning_at
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
@@ -24,12 +24,12 @@ contains
 
   !> Events and losses of a transition. Friction sticks or is released as it stops to move or begins to, whatever its force.
   pure subroutine log_transition(moving, before, after, list, fallen, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: before, after
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:)
     type(log_t), intent(inout) :: log
-    type(jointed_state_t) :: struck
+    type(multibody_state_t) :: struck
     complex(wp) :: turning(moving%harmonics)
     logical, dimension(size(moving%machine%joints)) :: told, stood, stands
     real(wp) :: rest
@@ -84,8 +84,8 @@ contains
 
   !> Friction that holds from here on, or no longer, where that is not `told` yet; of two bodies it goes with what did it.
   pure subroutine log_friction(machine, before, after, stood, stands, told, log)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: before, after
     logical, intent(in) :: stood(:), stands(:), told(:)
     type(log_t), intent(inout) :: log
     integer :: j
@@ -98,8 +98,8 @@ contains
 
   !> What the sample of a controller or an impulse does to joints: friction holds or lets go, contacts open.
   pure subroutine log_action(moving, before, after, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
     complex(wp) :: turning(moving%harmonics)
     logical :: told(size(moving%machine%joints))

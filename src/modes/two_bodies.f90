@@ -4,8 +4,8 @@
 !> What a structure is called where one body drives the watched one through friction and stops: its mode, and how the driving
 !> body moves.
 module two_bodies
-  use jointed, only: harmonics_in, is_stop, joint_contact, joint_friction, jointed_t, wave_value
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use multibody, only: harmonics_in, is_stop, joint_contact, joint_friction, multibody_t, wave_value
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: harmonics_of
   use motion_state, only: mode_held, mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, sticks_in
@@ -18,8 +18,8 @@ contains
 
   !> Position and velocity of the driving body.
   pure function driver_now(machine, state) result(motion)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: motion(2)
     complex(wp) :: turning(harmonics_in(machine%driver%motion))
     associate (driver => machine%driver)
@@ -35,14 +35,14 @@ contains
 
   !> Number of the joint that is the stops, 0 without any.
   pure integer function contact_at(machine) result(at)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     at = findloc(is_stop(machine%joints%kind), .true., 1)
   end function contact_at
 
   !> Whether the watched body is between its stops, if these are rigid, but for rounding.
   pure logical function keeps_within(machine, state)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp) :: turning(harmonics_of(machine))
     real(wp) :: s, u, near
     integer :: j
@@ -61,8 +61,8 @@ contains
   !> The mode of both bodies: they slip by the sign of v1 - v2, stick, the watched one leans on its stop on the ground while the
   !> other slides on, or both are held there.
   pure integer function mode_of_two(machine, state) result(mode)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: driver(2)
     integer :: friction, contact, sense, side
     friction = findloc(machine%joints%kind, joint_friction, 1)
@@ -95,8 +95,8 @@ contains
 
   !> Whether the one body slides over the other.
   pure logical function slides_on(machine, state)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     slides_on = .not. sticks_in(mode_of_two(machine, state), .true.)
   end function slides_on
 

@@ -4,7 +4,7 @@
 !> The course of a drive in time.
 module waves
   use elementary, only: sine_cosine
-  use jointed, only: wave_t
+  use multibody, only: wave_t
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
   implicit none

@@ -5,13 +5,13 @@
 module machine_family
   use body_events, only: events_of_body
   use body_family, only: body_neighbourhood, body_of_family, family_t, fly_periods, map_of_body => map_with_variation
-  use build_jointed, only: is_jointed
+  use build_multibody, only: is_multibody
   use circle, only: point_near
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
-  use jointed_log, only: watched_state
-  use jointed_motion, only: start_jointed
-  use jointed_state, only: jointed_state_t
+  use multibody_log, only: watched_state
+  use multibody_motion, only: start_multibody
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use law_table, only: law_choice_t
   use motion, only: advance_period, motion_t, start_state
@@ -32,7 +32,7 @@ module machine_family
   !> A motion that goes from section to section.
   type, public :: walk_t
     type(state_t) :: body
-    type(jointed_state_t) :: jointed
+    type(multibody_state_t) :: multibody
   end type walk_t
 
 contains
@@ -40,7 +40,7 @@ contains
   !> Whether a machine has several bodies.
   pure logical function has_several(laws)
     type(law_choice_t), intent(in) :: laws(:)
-    has_several = is_jointed(laws) .or. is_pair(laws)
+    has_several = is_multibody(laws) .or. is_pair(laws)
   end function has_several
 
   !> The machine with the parameter at `value`. Code 65 if it cannot be built or its variations are not known.
@@ -82,7 +82,7 @@ contains
     type(event_t), allocatable, intent(out) :: events(:)
     logical, intent(out) :: ok
     type(state_t) :: before, state
-    type(jointed_state_t) :: jointed
+    type(multibody_state_t) :: multibody
     type(tally_t) :: tally
     type(log_t) :: log
     real(wp) :: lasted
@@ -102,16 +102,16 @@ contains
       point = [state%x, state%v]
       call events_of_body(machine, before, log, state, .true., events, mode)
     type is (structure_t)
-      jointed = state_at_start(machine, start)
-      ok = .not. any(jointed%q /= jointed%q)
+      multibody = state_at_start(machine, start)
+      ok = .not. any(multibody%q /= multibody%q)
       if (.not. ok) return
       allocate (events(8))
       count_events = 0
       lasted = 0
-      call advance_section(machine, jointed, lasted, events, count_events, tally, reason, certain)
+      call advance_section(machine, multibody, lasted, events, count_events, tally, reason, certain)
       ok = reason == 0
       events = events(:count_events)
-      if (ok) point = coordinates_of(machine, jointed)
+      if (ok) point = coordinates_of(machine, multibody)
     end select
   end subroutine fly_to_section
 
@@ -125,8 +125,8 @@ contains
     ok = .true.
     select type (machine)
     type is (structure_t)
-      call start_of_structure(machine, point, strobe%jointed, ok)
-      if (ok) strobe%state = watched_state(moving%jointed%machine, strobe%jointed)
+      call start_of_structure(machine, point, strobe%multibody, ok)
+      if (ok) strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
     class default
       strobe = start_strobe(moving, [point, 0.0_wp])
     end select
@@ -143,7 +143,7 @@ contains
     type is (one_body_t)
       walk%body = start_state(machine%moving, point(1), point(2), 0.0_wp)
     type is (structure_t)
-      call start_of_structure(machine, point, walk%jointed, ok)
+      call start_of_structure(machine, point, walk%multibody, ok)
     end select
   end subroutine begin_walk
 
@@ -163,8 +163,8 @@ contains
       call advance_period(machine%moving, walk%body, tally, reason)
       point = [walk%body%x, walk%body%v]
     type is (structure_t)
-      call advance_to_section(machine, walk%jointed, lasted, tally, reason)
-      point = coordinates_of(machine, walk%jointed)
+      call advance_to_section(machine, walk%multibody, lasted, tally, reason)
+      point = coordinates_of(machine, walk%multibody)
     end select
     ok = reason == 0
   end subroutine walk_on
@@ -254,7 +254,7 @@ contains
     real(wp), intent(in) :: watched(:, :)
     real(wp), intent(in), optional :: spread(:)
     real(wp) :: points(machine%n, size(watched, 2))
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp) :: share
     integer :: i, k
     logical :: ok
@@ -272,7 +272,7 @@ contains
           if (present(spread)) points(:, i) = spread(i)*points(:, i)
           if (modulo(i, 2) == 1) then
             associate (start => moving%machine%start, shape => moving%machine%start_shape)
-              call start_jointed(moving, start(1, :) + shape(:, 1)*(watched(1, i) - start(1, w)), &
+              call start_multibody(moving, start(1, :) + shape(:, 1)*(watched(1, i) - start(1, w)), &
                                  start(2, :) + shape(:, 2)*(watched(2, i) - start(2, w)), 0.0_wp, state, ok)
             end associate
             if (ok) points(:, i) = coordinates_of(machine, state)

@@ -44,7 +44,7 @@ contains
     character(len=:), allocatable :: why
     why = ''
     associate (machine => moving%machine, law => moving%machine%friction)
-      if (allocated(moving%jointed)) then
+      if (allocated(moving%multibody)) then
         why = 'body.law: of several bodies only the variations of structures are known'
       else if (machine%drive%interval > 0) then
         why = 'drive.law: the variations of a body under a measured force are not known'

@@ -51,10 +51,10 @@ contains
     class(hybrid_t), allocatable :: machine
     type(structure_t) :: structure
     if (moving%by_event) return
-    if (.not. allocated(moving%jointed)) then
+    if (.not. allocated(moving%multibody)) then
       if (len(why_not_varied(moving)) == 0) allocate (machine, source=one_body_of(moving, sizes(1)))
-    else if (len(why_structure_not_varied(moving%jointed)) == 0) then
-      structure = structure_of(moving%jointed, sizes)
+    else if (len(why_structure_not_varied(moving%multibody)) == 0) then
+      structure = structure_of(moving%multibody, sizes)
       ! The sections are times here, of a machine without a clock too.
       structure%has_clock = .true.
       structure%frame%moving%section = 0

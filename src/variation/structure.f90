@@ -1,15 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure as a hybrid machine. Its state has the positions and the velocities on which anything depends (see
+!> A multibody structure as a hybrid machine. Its state has the positions and the velocities on which anything depends (see
 !> `section_directions`), and the stretches of the springs of elastic friction, which are constant while those slide.
 module structure
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
   use hybrid_machine, only: event_t, hybrid_t
-  use jointed, only: joint_contact, joint_elastic, joint_section, jointed_t, most_joints
-  use jointed_flows, only: jointed_motion_t
-  use jointed_section, only: lay_out
-  use jointed_state, only: free_force, joint_motion, jointed_state_t, turning_at
+  use multibody, only: joint_contact, joint_elastic, joint_section, multibody_t, most_joints
+  use multibody_flows, only: multibody_motion_t
+  use multibody_section, only: lay_out
+  use multibody_state, only: free_force, joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
@@ -39,7 +39,7 @@ contains
 
   !> The hybrid machine of a structure; `sizes` are those of a place [m] and of a speed [m/s].
   pure function structure_of(moving, sizes) result(structure)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: sizes(2)
     type(structure_t) :: structure
     real(wp) :: q(moving%machine%n), v(moving%machine%n)
@@ -77,13 +77,13 @@ contains
 
   !> Number of joints without the section.
   pure integer function count_joints(machine) result(joints)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     joints = count(machine%joints%kind /= joint_section)
   end function count_joints
 
   !> The number of a mode by the phases of its joints.
   pure integer function mode_number(machine, phase) result(mode)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: phase(:)
     integer :: j
     mode = 0
@@ -94,7 +94,7 @@ contains
 
   !> The phases of the joints in a mode.
   pure function phases_in(machine, mode) result(phase)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: mode
     integer :: phase(most_joints), rest, j
     phase = 0
@@ -106,11 +106,11 @@ contains
   end function phases_in
 
   !> The state of the event loop at `t` [s].
-  pure type(jointed_state_t) function state_in(self, mode, t, y) result(state)
+  pure type(multibody_state_t) function state_in(self, mode, t, y) result(state)
     class(structure_t), intent(in) :: self
     integer, intent(in) :: mode
     real(wp), intent(in) :: t, y(:)
-    type(jointed_state_t) :: like
+    type(multibody_state_t) :: like
     like%phase = phases_in(self%frame%moving%machine, mode)
     call put_state(self%frame, like, t, y, state)
   end function state_in
@@ -118,7 +118,7 @@ contains
   !> The coordinates of a state of the event loop.
   pure function coordinates_of(self, state) result(y)
     class(structure_t), intent(in) :: self
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: y(self%n), s, u
     complex(wp) :: turning(self%frame%moving%harmonics)
     integer :: j, k
@@ -137,7 +137,7 @@ contains
 
   !> Stretch of the spring of elastic friction that slides [m].
   pure real(wp) function sliding_stretch(machine, j, phase)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, phase
     sliding_stretch = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
   end function sliding_stretch
@@ -234,7 +234,7 @@ contains
     integer, intent(in) :: mode
     real(wp), intent(in) :: t, y(:)
     real(wp) :: slope(size(y))
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     type(mode_flow_t) :: spare
     integer :: at
     state = state_in(self, mode, t, y)
@@ -252,7 +252,7 @@ contains
     type(event_t), intent(in) :: event
     real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: value, by_state(:), by_time
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     type(mode_flow_t) :: spare
     integer :: at
     state = state_in(self, event%before, t, y)
@@ -270,7 +270,7 @@ contains
     class(structure_t), intent(in) :: self
     type(mode_flow_t), intent(in) :: flow
     type(event_t), intent(in) :: event
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(in) :: t
     real(wp), intent(out) :: value, by_state(:), by_time
     type(joint_guard_t) :: list(most_guards)
@@ -308,7 +308,7 @@ contains
   pure subroutine add_force(self, flow, state, turning, held, share, value, by_state, by_time)
     class(structure_t), intent(in) :: self
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: held
     real(wp), intent(in) :: share

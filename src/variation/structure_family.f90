@@ -10,11 +10,11 @@ module structure_family
   use guarded_march, only: most_equations
   use guards, only: meets_lower, meets_upper
   use hybrid_machine, only: event_t, most_states
-  use jointed, only: integral_of, is_stop, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, jointed_t, &
+  use multibody, only: integral_of, is_stop, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, multibody_t, &
     most_joints
-  use jointed_motion, only: jointed_motion_t
-  use jointed_section, only: start_of_jointed
-  use jointed_state, only: jointed_state_t
+  use multibody_motion, only: multibody_motion_t
+  use multibody_section, only: start_of_multibody
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
   use machine_facts, only: has_driver
@@ -35,7 +35,7 @@ contains
 
   !> Why the variations of a structure are not known; '' if they are.
   pure function why_not_varied(moving) result(why)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     character(len=:), allocatable :: why
     type(structure_t) :: trial
     integer :: j
@@ -75,24 +75,24 @@ contains
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
     call machine_of(laws, family%options, moving, error)
     if (allocated(error)) return
-    if (has_driver(moving)) call refuse_two_bodies(moving%jointed%machine, error)
+    if (has_driver(moving)) call refuse_two_bodies(moving%multibody%machine, error)
     if (allocated(error)) return
-    why = why_not_varied(moving%jointed)
+    why = why_not_varied(moving%multibody)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, 'body: the variations of this machine are not known: '//why)
       return
     end if
-    associate (scales => moving%jointed%machine)
+    associate (scales => moving%multibody%machine)
       sizes(1) = merge(scales%length_scale, 1.0_wp, scales%length_scale > 0)
       sizes(2) = sizes(1)*scales%frequency
     end associate
     if (family%sizes(1) > 0) sizes = family%sizes
-    structure = structure_of(moving%jointed, sizes)
+    structure = structure_of(moving%multibody, sizes)
   end subroutine structure_of_family
 
   !> What two bodies have in their own tables and no variations; code 65.
   pure subroutine refuse_two_bodies(machine, error)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(error_t), allocatable, intent(out) :: error
     if (allocated(machine%controller)) then
       call fail(error, exit_bad_case, 'drive.law: found a controller, allowed force, sine: variations of two bodies have no '// &
@@ -106,10 +106,10 @@ contains
   end subroutine refuse_two_bodies
 
   !> The state at a start as `start_strobe` has it.
-  pure type(jointed_state_t) function state_at_start(structure, start) result(state)
+  pure type(multibody_state_t) function state_at_start(structure, start) result(state)
     type(structure_t), intent(in) :: structure
     real(wp), intent(in) :: start(:)
-    state = start_of_jointed(structure%frame%moving, start(1), start(2), start(3), start(4:))
+    state = start_of_multibody(structure%frame%moving, start(1), start(2), start(3), start(4:))
   end function state_at_start
 
   !> The structure and its neighbours in the parameter.

@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Flights of a jointed structure in one mode over a given time, with their derivatives by the start: in closed form where the mode
-!> is linear, else by steps of the equations together with their variations. Coordinates are those of module `structure`.
+!> Flights of a multibody structure in one mode over a given time, with their derivatives by the start: in closed form where the
+!> mode is linear, else by steps of the equations together with their variations. Coordinates are those of module `structure`.
 module structure_flight
   use flight_path, only: begin_change, begin_path, path_at, path_t
   use guarded_march, only: begin_march, guard_t, march_failed, march_t, march_time_over, most_equations, system_t, take_step
-  use jointed, only: joint_contact, joint_elastic, jointed_t
-  use jointed_flows, only: jointed_motion_t, ready, with_matrix
-  use jointed_state, only: free_force, is_held, is_marched, joint_force, joint_motion, jointed_state_t, key_of, &
+  use multibody, only: joint_contact, joint_elastic, multibody_t
+  use multibody_flows, only: multibody_motion_t, ready, with_matrix
+  use multibody_state, only: free_force, is_held, is_marched, joint_force, joint_motion, multibody_state_t, key_of, &
     spring_force, strength_now, turning_at
   use kinds, only: wp
   use mode_flow, only: build_flow, mode_flow_t
@@ -24,7 +24,7 @@ module structure_flight
 
   !> A mode, what its coordinates are, and what may change in it.
   type, public :: frame_t
-    type(jointed_motion_t) :: moving
+    type(multibody_motion_t) :: moving
     !> Directions of the positions and of the velocities (columns), joints with a stretch, numbers of positions and velocities.
     real(wp), allocatable :: directions(:, :), velocities(:, :)
     integer, allocatable :: elastic(:)
@@ -35,7 +35,7 @@ module structure_flight
   type, extends(system_t) :: varied_t
     type(frame_t) :: frame
     type(mode_flow_t) :: flow
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp), allocatable :: start(:)
     !> +1, or -1 backwards.
     integer :: way = 1
@@ -47,7 +47,7 @@ contains
 
   !> The number of the flow that is ready for the mode with these phases, or 0 and the flow itself, made for it.
   pure subroutine flow_of(moving, phase, at, spare)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     integer, intent(in) :: phase(:)
     integer, intent(out) :: at
     type(mode_flow_t), intent(out) :: spare
@@ -61,7 +61,7 @@ contains
   pure subroutine fly_mode(frame, sizes, state, y0, t1, y1, flight)
     type(frame_t), intent(in) :: frame
     real(wp), intent(in) :: sizes(:), y0(:), t1
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
     type(mode_flow_t) :: spare
@@ -79,7 +79,7 @@ contains
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
     real(wp), intent(in) :: sizes(:), y0(:), t1
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
     if (frame%moving%options%flight == flight_adaptive .or. is_marched(frame%moving%machine, state%phase)) then
@@ -93,7 +93,7 @@ contains
   pure subroutine fly_closed(frame, flow, state, y0, t1, y1, flight)
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(in) :: y0(:), t1
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
@@ -149,7 +149,7 @@ contains
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
     real(wp), intent(in) :: sizes(:), y0(:), t1
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
     type(varied_t) :: system
@@ -196,7 +196,7 @@ contains
     class(varied_t), intent(in) :: self
     real(wp), intent(in) :: time, y(:)
     real(wp) :: slope(size(y))
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp) :: by_state(size(self%start), size(self%start)), now(size(self%start))
     integer :: n, k
     n = size(self%start)
@@ -213,9 +213,9 @@ contains
   !> A new state gets the coordinates `y` at a time, in the mode of `mode`.
   pure subroutine put_state(frame, mode, time, y, state)
     type(frame_t), intent(in) :: frame
-    type(jointed_state_t), intent(in) :: mode
+    type(multibody_state_t), intent(in) :: mode
     real(wp), intent(in) :: time, y(:)
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     complex(wp) :: turning(frame%moving%harmonics)
     real(wp) :: s, u
     integer :: k
@@ -237,7 +237,7 @@ contains
   pure function rates(frame, flow, state) result(slope)
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: slope(frame%places + frame%speeds + size(frame%elastic)), s, u
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: k
@@ -258,7 +258,7 @@ contains
   pure subroutine rate_slopes(frame, flow, state, by_state)
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: by_state(:, :)
     real(wp), dimension(frame%moving%machine%n, size(by_state, 2)) :: force, a
     real(wp) :: by_time(frame%moving%machine%n)
@@ -287,9 +287,9 @@ contains
 
   !> Accelerations of all coordinates in a mode [m/s^2].
   pure function accelerations(machine, flow, state, turning) result(a)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp) :: a(machine%n), force(machine%n), free(machine%n), s, u, given
     integer :: i, j
@@ -306,7 +306,7 @@ contains
   !> Derivatives of the forces on the coordinates, those of constraints excepted, by the state and by the time.
   pure subroutine force_slopes(frame, state, turning, by_state, by_time)
     type(frame_t), intent(in) :: frame
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: by_state(:, :), by_time(:)
     real(wp) :: s, u, given, r, by_place, by_speed, surface, rate, strength, growth
@@ -351,7 +351,7 @@ contains
 
   !> Third derivative of the given part of a joint coordinate [m/s^3].
   pure real(wp) function surface_jerk(machine, j, turning) result(jerk)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     complex(wp), intent(in) :: turning(:)
     integer :: m

@@ -1,12 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What impacts and constraints do to the state of a jointed structure, with derivatives.
+!> What impacts and constraints do to the state of a multibody structure, with derivatives.
 module structure_impact
   use blow, only: speeds_after
   use contact_law, only: contact_t, restitution_at
-  use jointed, only: joint_contact, jointed_t, most_joints, together_sequence
-  use jointed_state, only: is_held, joint_motion, jointed_state_t
+  use multibody, only: joint_contact, multibody_t, most_joints, together_sequence
+  use multibody_state, only: is_held, joint_motion, multibody_state_t
   use kinds, only: wp
   use matrices, only: solve
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -23,7 +23,7 @@ contains
   !> Joints that are held in these phases and do not depend on each other, of contacts only if asked, and where a unit of each moves
   !> the structure, least in the metric of the masses.
   pure subroutine carried_by(machine, phase, contacts_only, held, carried)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: phase(:)
     logical, intent(in) :: contacts_only
     integer, allocatable, intent(out) :: held(:)
@@ -62,8 +62,8 @@ contains
   !> Speeds after an impact of the contacts with `side` +1, -1 (0: not touching), see module `blow`, and their derivatives by the
   !> speeds before and by the time. Not a number where the impact is not smooth.
   pure subroutine strike_with_slopes(machine, state, turning, side, plastic, v, by_speed, by_time)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: side(:)
     logical, intent(in) :: plastic
@@ -103,7 +103,7 @@ contains
   !> Impulses of the contacts in `list` for their opening speeds `gamma` [m/s], and the derivatives of these, not a number where an
   !> impulse is not smooth. One alone goes on smoothly where the contact opens already, beyond a graze: it pulls there.
   pure subroutine find_impulses(machine, list, side, plastic, gamma, impulse, slopes)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: list(:), side(:)
     logical, intent(in) :: plastic
     real(wp), intent(in) :: gamma(:)
@@ -157,7 +157,7 @@ contains
 
   !> The impulse of one contact alone, -(1 + e) gamma/g, and how it changes with its opening speed.
   pure subroutine lone_impulse(machine, j, gamma, plastic, impulse, slope)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     real(wp), intent(in) :: gamma
     logical, intent(in) :: plastic

@@ -6,8 +6,8 @@
 module structure_rest
   use guards, only: guards_of, joint_guard_t, most_guards
   use hybrid_machine, only: event_t
-  use jointed, only: is_stop, joint_elastic, joint_friction, most_joints
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use multibody, only: is_stop, joint_elastic, joint_friction, most_joints
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use structure, only: count_joints, mode_number, state_in, structure_t
@@ -73,7 +73,7 @@ contains
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:)
     real(wp), intent(out) :: slope(:), by_state(:, :)
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     type(mode_flow_t) :: spare
     integer :: at
     state = state_in(structure, mode, 0.0_wp, y)
@@ -104,7 +104,7 @@ contains
     real(wp), intent(in) :: y(:)
     real(wp), allocatable :: margins(:)
     type(joint_guard_t) :: list(most_guards)
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     type(mode_flow_t) :: spare
     type(event_t) :: event
     real(wp) :: by_state(size(y)), by_time

@@ -6,9 +6,9 @@
 module structure_walk
   use guards, only: leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
   use hybrid_machine, only: event_t
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, most_joints
-  use jointed_motion, only: advance_jointed_period, advance_to_turn, start_jointed
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_soft, most_joints
+  use multibody_motion, only: advance_multibody_period, advance_to_turn, start_multibody
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point, &
@@ -31,9 +31,9 @@ contains
   pure subroutine start_of_structure(structure, point, state, ok)
     type(structure_t), intent(in) :: structure
     real(wp), intent(in) :: point(:)
-    type(jointed_state_t), intent(out) :: state
+    type(multibody_state_t), intent(out) :: state
     logical, intent(out) :: ok
-    type(jointed_state_t) :: raw
+    type(multibody_state_t) :: raw
     real(wp) :: y(structure%n), by_state(structure%n, structure%n), by_time(structure%n), s, u, length, speed
     complex(wp) :: turning(structure%frame%moving%harmonics)
     integer :: j, k
@@ -66,7 +66,7 @@ contains
       if (.not. ok) return
       call settle(structure, mode_number(machine, raw%phase), 0.0_wp, y, by_state, by_time)
       raw = state_in(structure, mode_number(machine, raw%phase), 0.0_wp, y)
-      call start_jointed(moving, raw%q(:machine%n), raw%v(:machine%n), 0.0_wp, state, ok)
+      call start_multibody(moving, raw%q(:machine%n), raw%v(:machine%n), 0.0_wp, state, ok)
       do k = 1, size(structure%frame%elastic)
         j = structure%frame%elastic(k)
         state%slider(j) = raw%slider(j)
@@ -122,14 +122,14 @@ contains
   !> Flies a structure on over one section, in which time `lasted` [s] passes; `reason` is not 0 if the motion had to be given up.
   pure subroutine advance_to_section(structure, state, lasted, tally, reason, transitions)
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(out) :: lasted
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(transitions_t), intent(inout), optional :: transitions
     associate (moving => structure%frame%moving)
       if (structure%has_clock) then
-        call advance_jointed_period(moving, state, tally, reason, transitions=transitions)
+        call advance_multibody_period(moving, state, tally, reason, transitions=transitions)
         lasted = moving%machine%period
       else
         call advance_to_turn(moving, longest_return*moving%machine%period, state, lasted, tally, reason, transitions)
@@ -142,7 +142,7 @@ contains
   !> smooth.
   pure subroutine advance_section(structure, state, offset, events, count_events, tally, reason, certain)
     type(structure_t), intent(in) :: structure
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(inout) :: offset
     type(event_t), allocatable, intent(inout) :: events(:)
     integer, intent(inout) :: count_events
@@ -181,7 +181,7 @@ contains
     type(tally_t), intent(out) :: tally
     logical, intent(out) :: ok
     logical, intent(out), optional :: certain
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     type(state_t) :: watched
     real(wp) :: offset
     integer :: i, count_events, reason

@@ -271,7 +271,7 @@ def test_what_has_no_planes_of_starts_is_refused(run, source_dir, tmp_path):
     [
         ("damaged", 74, "is damaged"),
         ("missing", 66, "there is no file"),
-        ("other", 65, "found a file of the kind 'boundary', allowed is a map that basin wrote"),
+        ("other", 65, "found a file of the kind 'boundary', allowed a map that basin wrote"),
         ("case", 65, "is a text"),
     ],
 )

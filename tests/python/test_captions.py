@@ -2,16 +2,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Captions: the machine in numbers, in the symbols of the documents, with units."""
 
+import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import separatrix as sx
+import xarray as xr
 from program import CASE
+from separatrix import cli
+from separatrix.figures.caption import raised
+from separatrix.figures.look import Look
+from separatrix.figures.regions import limit_texts
 
 
 def test_captions_hold_every_number_of_the_machine(tmp_path: Path, library: Path) -> None:
     result = sx.basin(sx.Case.from_text(CASE), x0=5, v0=5, progress=False)
-    caption = result.separatrix.plot().separatrix_caption
+    caption = result.separatrix.plot(caption="full").separatrix_caption
     case = result.separatrix.case.resolved
     for family in ("body", "restoring", "friction", "contact", "drive"):
         for value in case[family].values():
@@ -20,8 +27,10 @@ def test_captions_hold_every_number_of_the_machine(tmp_path: Path, library: Path
                     assert f"{number:.6g}" in caption, (family, number)
     assert "N/m" in caption
     assert "duration 50 s" in caption
-    short = result.separatrix.plot(caption="short").separatrix_caption
+    short = result.separatrix.plot().separatrix_caption
     assert "N/m" not in short
+    assert short == result.separatrix.plot(caption="short").separatrix_caption
+    assert cli._parser().parse_args(["basin.h5"]).caption == Look().caption == "short"
     assert result.separatrix.plot(caption="none").separatrix_caption == ""
 
 
@@ -69,3 +78,25 @@ def test_a_caption_describes_a_measured_force_by_its_samples(library: Path) -> N
         caption = result.separatrix.plot(caption="full").separatrix_caption
         assert "measured force drive, interval = 0.1 s" in caption
         assert f"force: 40 values from -2 to 2 {unit}, repeated;" in caption
+        # of an angle: moment of inertia and damping of a rotation
+        rotation = "$J$ = 1 kg m$^{2}$", "$c$ = 0.5 N m s"
+        line = "$m$ = 1 kg;", "$c$ = 0.5 N s/m"
+        assert all(text in caption for text in (rotation if unit == "N m" else line))
+
+
+def test_limits_and_powers_have_units() -> None:
+    ends = {"lower": ("limit", [0.5], {"units": "N"}), "upper": ("limit", [0.6], {"units": "N"})}
+    limits = xr.Dataset({"name": ("limit", ["sticking_to_stuck_up"]), **ends})
+    assert limit_texts(limits) == ["sticking to stuck up 0.5 to 0.6 N"]
+    assert [raised(unit) for unit in ("N/m^1.5", "N/m^n", "s^-2")] == ["N/m$^{1.5}$", "N/m$^{n}$", "s$^{-2}$"]
+
+
+def test_boundaries_are_known_to_lengths_and_speeds(library: Path) -> None:
+    """The error along each axis, in its unit."""
+    result = sx.boundary(sx.basin(sx.Case.from_text(CASE), x0=12, v0=12, progress=False))
+    captions = [result.separatrix.plot(units=units).separatrix_caption for units in ([], ["mm", "cm/s"])]
+    found = [re.search(r"known to (\S+) (\S+) along \$x_0\$, (\S+) (\S+) along", text) for text in captions]
+    assert [one.group(2, 4) for one in found] == [("m", "m/s"), ("mm", "cm/s")]
+    for column, factor in ((1, 1e3), (3, 1e2)):
+        first, second = (float(one.group(column)) for one in found)
+        assert second == pytest.approx(factor * first, rel=0.2)

@@ -158,7 +158,7 @@ def test_auto_takes_a_gpu_for_many_starts_only(
 def test_other_devices_are_refused(separatrix, results):
     ended = run(separatrix, *KINDS["map"], "--device", "tpu", folder=results["map"].parent)
     assert ended.code == 64
-    assert "--device: found 'tpu', allowed is auto, cpu, gpu" in ended.err
+    assert "--device: found 'tpu', allowed auto, cpu, gpu" in ended.err
     ended = run(separatrix, "trajectory", "case.toml", *ON_GPU, folder=results["map"].parent)
     assert ended.code == 64
     assert "--device belongs to the commands basin, sweep, points" in ended.err

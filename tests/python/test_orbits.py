@@ -51,7 +51,7 @@ def test_branches_that_make_no_sense_are_refused(grazing: sx.Case) -> None:
     for wrong, said in (
         (("drive.ration", 1, 2), "^parameter: found 'drive.ration', allowed body.mass"),
         (("body.mass",), "^start and stop are needed"),
-        (("drive.amplitude", 2.0, 1.0), "^start, stop: found 2.0 and 1.0, allowed is a range that rises"),
+        (("drive.amplitude", 2.0, 1.0), "^start, stop: found 2.0 and 1.0, allowed a range that rises"),
         (("contact.restitution", 0.5, 1.5), "^stop: found 1.5, allowed"),
     ):
         with pytest.raises(sx.CaseError, match=said):

@@ -401,7 +401,7 @@ def test_what_is_refused(separatrix, matrices, tmp_path):
 
     refused("there is no file", code=66)
     beam.write_bytes(b"no structure at all\n")
-    refused("is a text, allowed is an HDF5 file")
+    refused("is a text, allowed an HDF5 file")
     store(mass=np.eye(2), stiffness=np.eye(2), point__tip=[1.0, 0])
     whole = beam.read_bytes()
     for cut in (300, len(whole) // 2):

@@ -2,13 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The viewer's requests and answers, without a browser (docs/viewer.md)."""
 
+import re
 import tomllib
 from pathlib import Path
 
 import h5py
+import matplotlib
 import numpy as np
 import pytest
+import separatrix as sx
+from matplotlib.colors import to_hex, to_rgb
 from program import CASE, succeed
+from separatrix import palette, style
+from separatrix.classes import classes
 from separatrix.errors import SeparatrixError
 from separatrix.simulate import LABEL_VARIABLES, StoppedError
 from separatrix.view.files import ResultFile
@@ -64,6 +70,43 @@ def test_describes_files(desk: Desk) -> None:
     assert sum(one["count"] for one in first["catalogue"]) == first["points"] == 19 * 31
     assert first["parameters"]["drive.ratio"][0] == 1.2
     assert set(REQUESTS) >= {"describe", "tile", "points", "motion", "keep"}
+
+
+def test_colours_are_those_of_the_figures(desk: Desk, results: dict[str, Path], source_dir: Path) -> None:
+    """Of every attractor and regime in the legends; scripts have no colours of classes of their own."""
+    described, _ = ask(desk, "describe")
+    sent = described["palette"]
+    for kind, file in zip(("map", "stack"), described["files"], strict=False):
+        with sx.open_result(results[kind]) as result:
+            counts = dict(
+                zip(
+                    *(part.tolist() for part in np.unique(result["attractor"], return_counts=True)),
+                    strict=True,
+                )
+            )
+            for one in classes(result, "attractor", counts):
+                expected = sent["nothing"] if one.codes == (0,) else file["colours"][str(one.codes[0])]
+                assert to_hex(one.colour) == to_hex(expected)
+            for one in classes(result, "regime", dict.fromkeys(range(8), 1)):
+                assert to_hex(sent["regimes"][one.codes[0]]) == to_hex(one.colour)
+    assert (sent["up"], sent["down"]) == (style.RUN_UP, style.RUN_DOWN)
+    static = source_dir / "postprocess" / "separatrix" / "view" / "static"
+    scale = re.findall(r"#[0-9a-f]{6}", (static / "palette.js").read_text().lower())
+    for place, colour in zip(np.linspace(0, 1, len(scale)), scale, strict=True):
+        assert to_rgb(colour) == pytest.approx(matplotlib.colormaps[style.SCALAR_MAP](place)[:3], abs=0.02)
+    fixed = {colour.lower() for colour in (*palette.ATTRACTORS, *palette.OKABE_ITO, *palette.TOL_MUTED)}
+    for script in static.glob("*.js"):
+        assert not fixed - {"#000000"} & set(re.findall(r"#[0-9a-f]{6}", script.read_text().lower())), (
+            script.name
+        )
+
+
+def test_many_attractors_have_the_colours_of_their_legend() -> None:
+    """Up to ten by number, of more the ten with the largest basins; the others are told apart by the page."""
+    assert palette.of_attractors({1: 5, 3: 1}, 3) == {1: palette.ATTRACTORS[0], 3: palette.ATTRACTORS[2]}
+    assert palette.of_attractors({1: 5, 9: 1}, 9) == {1: palette.TOL_MUTED[0], 9: palette.TOL_MUTED[8]}
+    many = palette.of_attractors({number: number for number in range(1, 13)}, 12)
+    assert many == {12 - place: palette.TOL_MUTED[place] for place in range(10)}
 
 
 @pytest.mark.parametrize("variable", range(len(LABEL_VARIABLES)))

@@ -1,11 +1,11 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Jointed structures that lanes fly.
+!> Multibody structures that lanes fly.
 module lane_structures
   use contact_law, only: contact_kelvin_voigt, contact_linear, contact_power, contact_t, contact_viscoelastic
-  use jointed, only: joint_contact, joint_soft, joint_t, jointed_t
-  use jointed_machines, only: barrier, body, fit, push, ready, rub, spring
+  use multibody, only: joint_contact, joint_soft, joint_t, multibody_t
+  use multibody_machines, only: barrier, body, fit, push, ready, rub, spring
   use kinds, only: wp
   use lane_types, only: widest_lanes
   use machines, only: uniform
@@ -39,7 +39,7 @@ contains
     integer, intent(in) :: i
     logical, intent(in) :: restituting
     type(motion_t) :: moving
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     character(len=2) :: name
     character(len=2), parameter :: last(0:2) = ['b2', 'b4', 'b8']
     real(wp) :: static
@@ -73,7 +73,7 @@ contains
   function pressing_structure(i) result(moving)
     integer, intent(in) :: i
     type(motion_t) :: moving
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     type(joint_t) :: stop
     character(len=2) :: name
     integer :: n, k
@@ -126,7 +126,7 @@ contains
   function drifting_structure(i) result(moving)
     integer, intent(in) :: i
     type(motion_t) :: moving
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     character(len=2) :: name
     integer :: n, k
     n = 2**(1 + modulo(i, 2))
@@ -152,7 +152,7 @@ contains
     real(wp), intent(in) :: restitution
     real(wp), intent(in), optional :: load, amplitude
     type(motion_t) :: moving
-    type(jointed_t) :: machine
+    type(multibody_t) :: machine
     character(len=2) :: name, before
     real(wp) :: mean, cosine
     integer :: k
@@ -177,12 +177,12 @@ contains
 
   !> The machine ready to move, in the widest lanes.
   function made_ready(machine) result(moving)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(motion_t) :: moving
     moving%options%lane_width = widest_lanes()
-    allocate (moving%jointed)
-    moving%jointed = ready(machine)
-    moving%machine%period = moving%jointed%machine%period
+    allocate (moving%multibody)
+    moving%multibody = ready(machine)
+    moving%machine%period = moving%multibody%machine%period
   end function made_ready
 
 end module lane_structures

@@ -6,10 +6,10 @@
 module pairs
   use build_motion, only: machine_of
   use errors, only: error_t
-  use jointed, only: joint_soft
-  use jointed_log, only: watched_state
-  use jointed_motion, only: start_jointed
-  use jointed_state, only: joint_motion, turning_at
+  use multibody, only: joint_soft
+  use multibody_log, only: watched_state
+  use multibody_motion, only: start_multibody
+  use multibody_state, only: joint_motion, turning_at
   use kinds, only: int64, wp
   use machines, only: laws_from
   use motion, only: motion_t
@@ -49,13 +49,13 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, driver(2), angle
     type(pair_state_t) :: state
-    real(wp) :: start(2, moving%jointed%machine%n)
+    real(wp) :: start(2, moving%multibody%machine%n)
     logical :: ok
-    associate (machine => moving%jointed%machine)
+    associate (machine => moving%multibody%machine)
       start = 0
       if (machine%driver%at > 0) start(:, machine%driver%at) = driver
       start(:, machine%watched) = [x, v]
-      call start_jointed(moving%jointed, start(1, :), start(2, :), angle, state%jointed, ok)
+      call start_multibody(moving%multibody, start(1, :), start(2, :), angle, state%multibody, ok)
     end associate
     if (.not. ok) error stop 'pairs: no mode to start in'
     call look(moving, state)
@@ -72,12 +72,12 @@ contains
     real(wp) :: left
     left = duration
     reason = 0
-    do while (left >= moving%machine%period - state%jointed%time)
-      left = left - (moving%machine%period - state%jointed%time)
+    do while (left >= moving%machine%period - state%multibody%time)
+      left = left - (moving%machine%period - state%multibody%time)
       call advance_pair_period(moving, state, tally, reason, log)
       if (reason /= 0) return
     end do
-    if (left > 0) call advance_pair(moving, state, state%jointed%time + left, tally, reason, log)
+    if (left > 0) call advance_pair(moving, state, state%multibody%time + left, tally, reason, log)
   end subroutine move_pair
 
   !> To a time within the period.
@@ -112,10 +112,10 @@ contains
   subroutine look(moving, state)
     type(motion_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
-    complex(wp) :: turning(moving%jointed%harmonics)
+    complex(wp) :: turning(moving%multibody%harmonics)
     real(wp) :: s, u
     integer :: stop
-    associate (machine => moving%jointed%machine, now => state%jointed)
+    associate (machine => moving%multibody%machine, now => state%multibody)
       state%state = watched_state(machine, now)
       state%y = [driver_now(moving, state), state%state%x, state%state%v]
       state%mode = state%state%mode

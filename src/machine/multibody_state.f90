@@ -1,12 +1,12 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> State of a jointed structure and of each of its joints, and the forces of the joints that the state tells.
-module jointed_state
+!> State of a multibody structure and of each of its joints, and the forces of the joints that the state tells.
+module multibody_state
   use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
   use friction_law, only: falls, sliding_friction, sliding_slope
-  use jointed, only: controller_t, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+  use multibody, only: controller_t, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, multibody_t, &
     most_degrees, most_joints, wave_value
   use kinds, only: wp
   implicit none
@@ -18,7 +18,7 @@ module jointed_state
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not
   !> looked for (0), the watched coordinate moves towards it (+1) or away (-1).
-  type, public :: jointed_state_t
+  type, public :: multibody_state_t
     real(wp) :: q(most_degrees) = 0, v(most_degrees) = 0
     !> Since the section [s].
     real(wp) :: time = 0
@@ -37,7 +37,7 @@ module jointed_state
     integer :: struck = 0, samples = 0
     !> The motion without a clock has just reached the section.
     logical :: at_section = .false.
-  end type jointed_state_t
+  end type multibody_state_t
 
 contains
 
@@ -56,7 +56,7 @@ contains
 
   !> Coordinate, speed and the given part of the acceleration of a joint.
   pure subroutine joint_motion(machine, j, q, v, time, turning, s, u, given)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     real(wp), intent(in) :: q(:), v(:), time
     complex(wp), intent(in) :: turning(:)
@@ -72,9 +72,9 @@ contains
 
   !> Rounding of the speed of a joint [m/s].
   pure real(wp) function rounding_of_speed(machine, j, state) result(negligible)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     associate (joint => machine%joints(j), n => machine%n)
       negligible = 64*epsilon(1.0_wp)*(sum(abs(joint%row*state%v(:n))) + abs(joint%offset%rate))
     end associate
@@ -112,7 +112,7 @@ contains
 
   !> Whether a mode has a joint whose force is not linear.
   pure logical function is_marched(machine, phase)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: phase(:)
     integer :: j
     is_marched = .false.
@@ -124,7 +124,7 @@ contains
 
   !> One bit for each joint that is a constraint or a spring.
   pure integer function key_of(machine, phase)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: phase(:)
     integer :: j
     key_of = 0
@@ -258,8 +258,8 @@ contains
   !> All forces on the coordinates but those of constraints [N]; with `rate` their rates of change for the accelerations
   !> `a` [N/s].
   pure subroutine free_force(machine, state, turning, force, a, rate)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: force(:)
     real(wp), intent(in), optional :: a(:)
@@ -297,7 +297,7 @@ contains
   !> What a controller holds, and what is in its force because its reference runs on; and the rate [N, N/s].
   pure subroutine running_control(controller, state, force, rate)
     type(controller_t), intent(in) :: controller
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: force, rate
     force = state%control
     rate = 0
@@ -306,4 +306,4 @@ contains
     force = force + rate*(state%clock + state%time)
   end subroutine running_control
 
-end module jointed_state
+end module multibody_state

@@ -1,11 +1,11 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure: a linear structure of n coordinates,
+!> A multibody structure: a linear structure of n coordinates,
 !>   M q'' + C q' + K q = load + Re sum_m force_m exp(i m Omega t) + sum over joints of w r,
 !> whose joints act along rows w: the joint coordinate is s = w'q + offset(t), the force of the joint is r.
 !> Friction slides at u = s'; a contact bounds s from above, below or both.
-module jointed
+module multibody
   use contact_law, only: contact_t
   use friction_law, only: friction_t
   use kinds, only: wp
@@ -90,7 +90,7 @@ module jointed
     real(wp), allocatable :: push(:)
   end type driver_t
 
-  type, public :: jointed_t
+  type, public :: multibody_t
     !> Number of coordinates.
     integer :: n = 0
     real(wp), allocatable :: mass(:, :), damping(:, :), stiffness(:, :), load(:)
@@ -129,7 +129,7 @@ module jointed
     real(wp) :: force_scale = 0, negligible_speed = 0, length_scale = 0
     !> The motion is linear in every mode.
     logical :: linear = .true.
-  end type jointed_t
+  end type multibody_t
 
 contains
 
@@ -171,7 +171,7 @@ contains
 
   !> Number of the coordinate that is the integral of what a controller sees, 0 without one.
   pure integer function integral_of(machine) result(at)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     at = 0
     if (allocated(machine%controller)) at = machine%controller%integral_at
   end function integral_of
@@ -185,4 +185,4 @@ contains
     if (m <= size(joint%offset%harmonic)) amplitude = joint%offset%harmonic(m)
   end function offset_of
 
-end module jointed
+end module multibody

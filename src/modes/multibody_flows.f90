@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
-module jointed_flows
-  use jointed, only: is_stop, joint_contact, joint_section, joint_t, jointed_t, most_degrees
+!> A multibody structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
+module multibody_flows
+  use multibody, only: is_stop, joint_contact, joint_section, joint_t, multibody_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: flight_adaptive, options_t
@@ -11,12 +11,12 @@ module jointed_flows
   implicit none
   private
 
-  public :: prepare_jointed, ready, with_matrix, without_contacts
+  public :: prepare_multibody, ready, with_matrix, without_contacts
 
   !> Machines with no more joints have the flows of all their modes ready.
   integer, parameter :: few_joints = 4
-  type, public :: jointed_motion_t
-    type(jointed_t) :: machine
+  type, public :: multibody_motion_t
+    type(multibody_t) :: machine
     type(options_t) :: options
     type(mode_flow_t), allocatable :: flows(:)
     !> Directions (columns) of the positions that are coordinates on the section.
@@ -31,15 +31,15 @@ module jointed_flows
     integer :: section = 0
     !> Share by which the acceleration of a gap may change until its chatter has died away; 0: no chatter is completed.
     real(wp) :: chatter_share = 1e-5_wp
-  end type jointed_motion_t
+  end type multibody_motion_t
 
 contains
 
   !> Prepares a machine.
-  pure subroutine prepare_jointed(machine, options, moving)
-    type(jointed_t), intent(in) :: machine
+  pure subroutine prepare_multibody(machine, options, moving)
+    type(multibody_t), intent(in) :: machine
     type(options_t), intent(in) :: options
-    type(jointed_motion_t), intent(out) :: moving
+    type(multibody_motion_t), intent(out) :: moving
     real(wp) :: directions(most_degrees, most_degrees)
     integer :: key, joints, i, places
     moving%machine = machine
@@ -71,11 +71,11 @@ contains
         call build_flow(moving%machine, ibset(0, i - 1), with_matrix(moving), moving%flows(i + 1))
       end do
     end if
-  end subroutine prepare_jointed
+  end subroutine prepare_multibody
 
   !> The same machine without stops.
-  pure type(jointed_t) function without_contacts(machine) result(free)
-    type(jointed_t), intent(in) :: machine
+  pure type(multibody_t) function without_contacts(machine) result(free)
+    type(multibody_t), intent(in) :: machine
     integer :: j
     free = machine
     free%joints = machine%joints(pack([(j, j=1, size(machine%joints))], .not. is_stop(machine%joints%kind)))
@@ -84,7 +84,7 @@ contains
   !> The section of a machine without a clock: the maxima of the watched coordinate; its minima where a rigid stop cuts the
   !> maxima off, for there the speed jumps.
   pure type(joint_t) function section_of(machine) result(section)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer :: j
     logical :: upper, lower
     upper = .false.
@@ -104,13 +104,13 @@ contains
 
   !> Whether a flight may be marched: it needs the rows of the exponential series.
   pure logical function with_matrix(moving)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     with_matrix = moving%options%flight == flight_adaptive .or. .not. moving%machine%linear
   end function with_matrix
 
   !> Number of the flow that is ready for a mode, 0 if there is none.
   pure integer function ready(moving, key)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     integer, intent(in) :: key
     ready = 0
     if (key + 1 <= size(moving%flows)) then
@@ -119,4 +119,4 @@ contains
     if (ready == 0) ready = findloc(moving%flows%key, key, 1)
   end function ready
 
-end module jointed_flows
+end module multibody_flows

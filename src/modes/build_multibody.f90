@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> From the parts of a case to a jointed structure.
-module build_jointed
+!> From the parts of a case to a multibody structure.
+module build_multibody
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
   use build_control, only: add_controllers, add_impulses
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, jointed_t, &
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, multibody_t, &
     together_newton, together_sequence, wave_t
   use kinds, only: real64, wp
   use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
@@ -21,24 +21,24 @@ module build_jointed
   implicit none
   private
 
-  public :: is_jointed, jointed_of
+  public :: is_multibody, multibody_of
 
 contains
 
-  !> Whether the laws describe a jointed structure.
-  pure logical function is_jointed(choices)
+  !> Whether the laws describe a multibody structure.
+  pure logical function is_multibody(choices)
     type(law_choice_t), intent(in) :: choices(:)
     integer :: i
-    is_jointed = .false.
+    is_multibody = .false.
     do i = 1, size(choices)
-      if (choices(i)%family == 'body') is_jointed = choices(i)%name == 'structure'
+      if (choices(i)%family == 'body') is_multibody = choices(i)%name == 'structure'
     end do
-  end function is_jointed
+  end function is_multibody
 
   !> The machine of the parts. Messages begin with the key.
-  pure subroutine jointed_of(choices, machine, error)
+  pure subroutine multibody_of(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
-    type(jointed_t), intent(out) :: machine
+    type(multibody_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(wave_t) :: wave
     real(wp), allocatable :: rows(:, :)
@@ -78,7 +78,7 @@ contains
       if (.not. allocated(error)) call finish(machine, error)
       if (.not. allocated(error)) call add_impulses(choices, rows, given, machine, error)
     end associate
-  end subroutine jointed_of
+  end subroutine multibody_of
 
   !> Laws of machines of one or two bodies, and effects, have no place here.
   pure subroutine refuse_others(choices, error)
@@ -103,7 +103,7 @@ contains
 
   pure subroutine add_bodies(choices, machine)
     type(law_choice_t), intent(in) :: choices(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     integer :: i
     do i = 1, size(choices)
       if (index(choices(i)%name, 'body:') /= 1) cycle
@@ -119,7 +119,7 @@ contains
   !> The frequency of the drives: one for all.
   pure subroutine set_frequency(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     integer :: i
     real(wp) :: frequency
@@ -150,7 +150,7 @@ contains
 
   !> A spring: its linear part belongs to the structure, the rest is a joint; so is what its modulation adds.
   pure subroutine add_spring(machine, choice, row, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
     real(wp), intent(in) :: row(:)
     type(error_t), allocatable, intent(out) :: error
@@ -190,7 +190,7 @@ contains
   end subroutine add_spring
 
   pure subroutine add_friction(machine, choice, row, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
     real(wp), intent(in) :: row(:)
     type(error_t), allocatable, intent(out) :: error
@@ -215,7 +215,7 @@ contains
   end subroutine add_friction
 
   pure subroutine add_contact(machine, choice, row, given, error)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
     real(wp), intent(in) :: row(:)
     integer, intent(in) :: given(:)
@@ -283,4 +283,4 @@ contains
     felt_mass = 1/max(sum(row(free)*push), tiny(felt_mass))
   end function felt_mass
 
-end module build_jointed
+end module build_multibody

@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Jointed structures for the tests, written down part by part.
-module jointed_machines
+!> Multibody structures for the tests, written down part by part.
+module multibody_machines
   use assembly, only: add_body, add_force, add_joint, add_link, finish, move_surface, row_between
   use contact_law, only: contact_kelvin_voigt
   use errors, only: error_t
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, jointed_t, wave_t
-  use jointed_motion, only: advance_jointed, jointed_motion_t, prepare_jointed, start_jointed
-  use jointed_state, only: jointed_state_t
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, multibody_t, wave_t
+  use multibody_motion, only: advance_multibody, multibody_motion_t, prepare_multibody, start_multibody
+  use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use motion_state, only: flight_adaptive, flight_auto, options_t, tally_t
   implicit none
@@ -20,7 +20,7 @@ contains
 
   !> A body of a mass [kg] under a constant force [N].
   subroutine body(machine, name, mass, load)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: name
     real(wp), intent(in) :: mass
     real(wp), intent(in), optional :: load
@@ -32,7 +32,7 @@ contains
 
   !> A spring and damper between two bodies.
   subroutine spring(machine, first, second, stiffness, damping, length)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), intent(in) :: stiffness
     real(wp), intent(in), optional :: damping, length
@@ -45,7 +45,7 @@ contains
   end subroutine spring
 
   function row(machine, first, second)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), allocatable :: row(:)
     logical :: found
@@ -55,7 +55,7 @@ contains
 
   !> Rigid stops of second - first.
   subroutine barrier(machine, first, second, restitution, upper, lower)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), intent(in) :: restitution
     real(wp), intent(in), optional :: upper, lower
@@ -70,7 +70,7 @@ contains
 
   !> A stop with a spring and a damper.
   subroutine soft_barrier(machine, first, second, stiffness, damping, upper, tension)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), intent(in) :: stiffness, damping, upper
     logical, intent(in) :: tension
@@ -88,7 +88,7 @@ contains
 
   !> Friction of second over first, whose surface moves at `belt` [m/s].
   subroutine rub(machine, first, second, kinetic, static, belt, fading)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), intent(in) :: kinetic, static
     real(wp), intent(in), optional :: belt, fading
@@ -106,7 +106,7 @@ contains
 
   !> Spring and slider in series.
   subroutine elastic_rub(machine, first, second, stiffness, level)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: first, second
     real(wp), intent(in) :: stiffness, level
     type(joint_t) :: joint
@@ -120,7 +120,7 @@ contains
 
   !> Any joint between two bodies.
   subroutine fit(machine, first, second, joint)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: first, second
     type(joint_t), intent(in) :: joint
     type(joint_t) :: fitted
@@ -131,7 +131,7 @@ contains
 
   !> A force: mean, and cosine and sine of the drive.
   subroutine push(machine, name, mean, cosine, sine)
-    type(jointed_t), intent(inout) :: machine
+    type(multibody_t), intent(inout) :: machine
     character(len=*), intent(in) :: name
     real(wp), intent(in) :: mean, cosine, sine
     call add_force(machine, row(machine, 'ground', name), mean, [cmplx(cosine, -sine, wp)])
@@ -139,10 +139,10 @@ contains
 
   !> The machine ready to move, `adaptive` by marching alone.
   function ready(machine, adaptive) result(moving)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     logical, intent(in), optional :: adaptive
-    type(jointed_motion_t) :: moving
-    type(jointed_t) :: whole
+    type(multibody_motion_t) :: moving
+    type(multibody_t) :: whole
     type(options_t) :: options
     type(error_t), allocatable :: error
     whole = machine
@@ -150,27 +150,27 @@ contains
     if (allocated(error)) error stop 'a machine of a test is refused'
     options%step_budget = 10000000
     if (present(adaptive)) options%flight = merge(flight_adaptive, flight_auto, adaptive)
-    call prepare_jointed(whole, options, moving)
+    call prepare_multibody(whole, options, moving)
   end function ready
 
   !> A state; the drive begins at its phase 0.
   function set_off(moving, q, v) result(state)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: q(:), v(:)
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     logical :: ok
-    call start_jointed(moving, q, v, 0.0_wp, state, ok)
+    call start_multibody(moving, q, v, 0.0_wp, state, ok)
     if (.not. ok) error stop 'a state of a test has no mode'
   end function set_off
 
   !> Moves on for `duration` [s], as a drive of any period would.
   subroutine go_on(moving, state, duration, tally, reason)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: duration
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
-    call advance_jointed(moving, state, state%time + duration, tally, reason)
+    call advance_multibody(moving, state, state%time + duration, tally, reason)
   end subroutine go_on
 
-end module jointed_machines
+end module multibody_machines

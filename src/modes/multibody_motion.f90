@@ -1,16 +1,16 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The event loop of a jointed structure: fly to the first guard, make the transition, until a time.
-module jointed_motion
+!> The event loop of a multibody structure: fly to the first guard, make the transition, until a time.
+module multibody_motion
   use constants, only: two_pi
   use control, only: error_of
   use guards, only: joint_guard_t, most_guards, turns_round
-  use jointed, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
-  use jointed_flight, only: fly
-  use jointed_flows, only: jointed_motion_t, prepare_jointed, ready, with_matrix
-  use jointed_state, only: joint_motion, jointed_state_t, key_of, rounding_of_speed, turning_at
-  use jointed_transition, only: settle, transition
+  use multibody, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
+  use multibody_flight, only: fly
+  use multibody_flows, only: multibody_motion_t, prepare_multibody, ready, with_matrix
+  use multibody_state, only: joint_motion, multibody_state_t, key_of, rounding_of_speed, turning_at
+  use multibody_transition, only: settle, transition
   use kinds, only: int64, wp
   use linear_flight, only: watch_t
   use mode_flow, only: build_flow, mode_flow_t
@@ -25,7 +25,7 @@ module jointed_motion
   implicit none
   private
 
-  public :: jointed_motion_t, prepare_jointed, start_jointed, advance_jointed, advance_jointed_period, advance_to_turn
+  public :: multibody_motion_t, prepare_multibody, start_multibody, advance_multibody, advance_multibody_period, advance_to_turn
 
   !> An impact within this share of a period after the last belongs to a burst.
   real(wp), parameter :: burst_gap = 1e-6_wp
@@ -35,10 +35,10 @@ module jointed_motion
 contains
 
   !> State with the coordinates `q` and speeds `v` and the drive at `angle` [rad]. A contact beyond its stop starts at it.
-  pure subroutine start_jointed(moving, q, v, angle, state, ok)
-    type(jointed_motion_t), intent(in) :: moving
+  pure subroutine start_multibody(moving, q, v, angle, state, ok)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: q(:), v(:), angle
-    type(jointed_state_t), intent(out) :: state
+    type(multibody_state_t), intent(out) :: state
     logical, intent(out) :: ok
     complex(wp) :: turning(moving%harmonics)
     integer :: touching(most_joints), j
@@ -81,21 +81,21 @@ contains
       if (integral_of(machine) > 0) call error_of(machine, state, turning, state%v(integral_of(machine)), u)
       call settle(moving, state, turning, at_rest, touching, ok)
     end associate
-  end subroutine start_jointed
+  end subroutine start_multibody
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
   !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains,
   !> and goes on with a burst; what stalls is counted from the call.
-  pure subroutine advance_jointed(moving, state, time_end, tally, reason, log, transitions, one_event)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+  pure subroutine advance_multibody(moving, state, time_end, tally, reason, log, transitions, one_event)
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
     type(transitions_t), intent(inout), optional :: transitions
     logical, intent(in), optional :: one_event
-    type(jointed_state_t) :: start
+    type(multibody_state_t) :: start
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
@@ -158,14 +158,14 @@ contains
       tally%v_max = watch%top_speed
       tally%grazing_margin = min(tally%grazing_margin, watch%margin)
     end associate
-  end subroutine advance_jointed
+  end subroutine advance_multibody
 
   !> One flight in the mode `key`, by the flow that is ready for it or else by `spare`, which is made for it.
   pure subroutine fly_in_mode(moving, key, spare, state, until, list, fallen, watch, steps, reason, log)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     integer, intent(in) :: key
     type(mode_flow_t), intent(inout) :: spare
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(joint_guard_t), intent(inout) :: list(most_guards)
     logical, intent(out) :: fallen(most_guards)
@@ -187,11 +187,11 @@ contains
 
   !> What comes at its time: the sample of a controller, or an impulse.
   pure subroutine act_and_log(moving, state, reason, log)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
-    type(jointed_state_t) :: start
+    type(multibody_state_t) :: start
     logical :: ok
     start = state
     call act(moving, state, ok, log)
@@ -201,15 +201,15 @@ contains
 
   !> The transition at guards that have `fallen`; phases are `held` for an instant where the motion has stalled.
   pure subroutine change_mode(moving, state, list, fallen, held, tally, reason, log, transitions)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:), held
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
     type(transitions_t), intent(inout), optional :: transitions
-    type(jointed_state_t) :: start
+    type(multibody_state_t) :: start
     logical :: ok
     start = state
     call transition(moving, state, list, fallen, held, tally, ok)
@@ -220,8 +220,8 @@ contains
 
   !> Budgets and the domain. Numbers that end in a flight on which what is watched was outside ended there.
   pure subroutine check_limits(moving, state, watch, tally, reason)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     type(watch_t), intent(in) :: watch
     type(tally_t), intent(in) :: tally
     integer, intent(inout) :: reason
@@ -234,7 +234,7 @@ contains
 
   !> Notes a transition; what was `held` for an instant, or several at once, is not certain.
   pure subroutine keep(before, after, list, fallen, held, transitions)
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_state_t), intent(in) :: before, after
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:), held
     type(transitions_t), intent(inout) :: transitions
@@ -246,9 +246,9 @@ contains
 
   !> The watched coordinate has `turned` round, or an impact may have turned it: the section is behind it then, not reached.
   pure subroutine follow_section(moving, turned, state)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     logical, intent(in) :: turned
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp) :: u
     associate (phase => state%phase(moving%section))
       if (phase == 0) return
@@ -267,15 +267,15 @@ contains
   end subroutine follow_section
 
   !> Moves to the next section and starts the clock anew.
-  pure subroutine advance_jointed_period(moving, state, tally, reason, log, transitions)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+  pure subroutine advance_multibody_period(moving, state, tally, reason, log, transitions)
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
     type(transitions_t), intent(inout), optional :: transitions
     integer :: j
-    call advance_jointed(moving, state, moving%machine%period, tally, reason, log, transitions)
+    call advance_multibody(moving, state, moving%machine%period, tally, reason, log, transitions)
     if (reason /= 0) return
     state%time = 0
     state%clock = state%clock + moving%machine%period
@@ -294,14 +294,14 @@ contains
       end associate
     end if
     call append_word(tally, word_period)
-  end subroutine advance_jointed_period
+  end subroutine advance_multibody_period
 
   !> Moves a machine without a clock to its next section, within `longest` [s], and starts the clock anew; `lasted` [s] is the time
   !> that it took. `reason` is `reason_time_over` where it does not come to the section.
   pure subroutine advance_to_turn(moving, longest, state, lasted, tally, reason, transitions)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: longest
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(out) :: lasted
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
@@ -316,7 +316,7 @@ contains
         state%left(moving%section) = 0
       end if
     end associate
-    call advance_jointed(moving, state, start + longest, tally, reason, transitions=transitions)
+    call advance_multibody(moving, state, start + longest, tally, reason, transitions=transitions)
     if (reason == 0 .and. .not. state%at_section) reason = reason_time_over
     lasted = state%time - start
     do j = 1, size(moving%machine%joints)
@@ -331,8 +331,8 @@ contains
 
   !> Whether anything moves in a flight, or the one of two bodies slides over the other.
   pure logical function moves(moving, state, key)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: key
     integer :: at
     if (allocated(moving%machine%driver)) then
@@ -345,4 +345,4 @@ contains
     if (.not. moves) moves = any(abs(state%v) > moving%machine%negligible_speed)
   end function moves
 
-end module jointed_motion
+end module multibody_motion

@@ -1,13 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What is written down of the motion of a jointed structure when asked: samples, events, and where the energy went.
-module jointed_log
+!> What is written down of the motion of a multibody structure when asked: samples, events, and where the energy went.
+module multibody_log
   use control, only: active_force, bodies_of
   use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
-  use jointed, only: joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, jointed_t, most_joints, wave_value
-  use jointed_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, jointed_state_t, strength_now, turning_at
+  use multibody, only: joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, multibody_t, most_joints, wave_value
+  use multibody_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, multibody_state_t, strength_now, &
+    turning_at
   use kinds, only: wp
   use matrices, only: solve
   use mode_flow, only: harmonics_of, mode_flow_t
@@ -16,7 +17,7 @@ module jointed_log
   use two_bodies, only: contact_at, driver_now, mode_of_two
   implicit none
   private
-  public :: energy_of_jointed, watched_state, log_flight, log_event, log_sample, record_change, book_change
+  public :: energy_of_multibody, watched_state, log_flight, log_event, log_sample, record_change, book_change
 
   !> Gauss-Legendre nodes on (0, 1) and weights.
   real(wp), parameter :: node(4) = [0.069431844202973712388026755553595_wp, 0.33000947820757186759866712044838_wp, &
@@ -30,11 +31,11 @@ contains
 
   !> Energy of the bodies, the springs and the springs of the joints [J]; a constant force has that of its weight. Of two bodies
   !> (`driver_t`) what presses a stop and the drive have none.
-  pure real(wp) function energy_of_jointed(machine, state) result(energy)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+  pure real(wp) function energy_of_multibody(machine, state) result(energy)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     complex(wp) :: turning(harmonics_of(machine))
-    type(jointed_state_t) :: bodies
+    type(multibody_state_t) :: bodies
     real(wp) :: s, u
     integer :: j
     turning = turning_at(machine%frequency, state%time, size(turning))
@@ -56,19 +57,19 @@ contains
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       energy = energy + joint_energy(machine%joints(j), state%phase(j), state%slider(j), s)
     end do
-  end function energy_of_jointed
+  end function energy_of_multibody
 
   !> Whether the matrices of a machine have a controller in them.
   pure logical function has_continuous_control(machine)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     has_continuous_control = .false.
     if (allocated(machine%controller)) has_continuous_control = .not. machine%controller%sample_time > 0
   end function has_continuous_control
 
   !> The watched coordinate as that of one body.
   pure type(state_t) function watched_state(machine, state) result(body)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     integer :: j
     body%x = state%q(machine%watched)
     body%v = state%v(machine%watched)
@@ -85,13 +86,13 @@ contains
 
   !> Samples and energy of a flight from the state `start`, `duration` [s] long.
   pure subroutine log_flight(machine, flow, path, start, duration, log)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
-    type(jointed_state_t), intent(in) :: start
+    type(multibody_state_t), intent(in) :: start
     real(wp), intent(in) :: duration
     type(log_t), intent(inout) :: log
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp) :: before, next
     if (allocated(machine%driver)) call note_peaks(machine, flow, path, start, duration, log)
     state = start
@@ -110,10 +111,10 @@ contains
 
   !> Largest force and penetration of a soft stop along a flight.
   pure subroutine note_peaks(machine, flow, path, start, duration, log)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
-    type(jointed_state_t), intent(in) :: start
+    type(multibody_state_t), intent(in) :: start
     real(wp), intent(in) :: duration
     type(log_t), intent(inout) :: log
     !> Looks in a panel; what is left of a panel at every step of a golden section, and the steps.
@@ -162,7 +163,7 @@ contains
       real(wp), intent(in) :: t
       real(wp) :: pressed(2), s, u
       complex(wp) :: turning(harmonics_of(machine))
-      type(jointed_state_t) :: state
+      type(multibody_state_t) :: state
       state = start
       call path_at(machine, flow, path, t, state%q, state%v)
       turning = turning_at(machine%frequency, path%start + t, size(turning))
@@ -175,10 +176,10 @@ contains
 
   !> Writes a state down as a sample.
   pure subroutine log_sample(machine, state, log)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
     type(log_t), intent(inout) :: log
-    log%book%at_end = energy_of_jointed(machine, state)
+    log%book%at_end = energy_of_multibody(machine, state)
     if (allocated(machine%driver)) then
       call record_sample(log, watched_state(machine, state), driver_now(machine, state), log%book)
     else
@@ -189,14 +190,14 @@ contains
 
   !> Adds up the powers from `first` to `last` [s after the start of the path], by panels for what is still fast there.
   pure subroutine book_flight(machine, flow, path, start, first, last, log)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
-    type(jointed_state_t), intent(in) :: start
+    type(multibody_state_t), intent(in) :: start
     real(wp), intent(in) :: first, last
     type(log_t), intent(inout) :: log
     real(wp) :: length, friction, damping, contact, work, from, until, t
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     integer :: panels, i, k
     state = start
     from = first
@@ -222,7 +223,7 @@ contains
 
   !> An interval from `first` [s after the start of the path] to `last` at most, `until` the fastest part has decayed; its panels.
   pure subroutine next_stretch(machine, flow, path, first, last, until, panels)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     real(wp), intent(in) :: first, last
@@ -249,13 +250,13 @@ contains
 
   !> Powers lost to friction, dampers and contacts, and put in by forces and moving surfaces [W].
   pure subroutine powers(machine, flow, state, friction, damping, contact, work)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: friction, damping, contact, work
     complex(wp) :: turning(harmonics_of(machine))
     real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate, strength
-    type(jointed_state_t) :: bodies
+    type(multibody_state_t) :: bodies
     integer :: i, j, m
     turning = turning_at(machine%frequency, state%time, size(turning))
     bodies = bodies_of(machine, state)
@@ -318,11 +319,11 @@ contains
 
   !> What a transition took from the energy: of contacts, but for sliders that let go. A stop that moves does work.
   pure subroutine book_change(machine, before, after, log)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
     real(wp) :: lost, work
-    lost = energy_of_jointed(machine, before) - energy_of_jointed(machine, after)
+    lost = energy_of_multibody(machine, before) - energy_of_multibody(machine, after)
     if (any(machine%joints%kind == joint_elastic .and. before%phase(:size(machine%joints)) /= after%phase(:size(machine%joints)))) &
       then
       log%book%friction = log%book%friction + lost
@@ -336,8 +337,8 @@ contains
   !> Work that stops which move have done in an impact [J]: the impulses of all contacts at their stops give the change of the
   !> speeds.
   pure real(wp) function work_of_stops(machine, before, after) result(work)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: before, after
     complex(wp) :: turning(harmonics_of(machine))
     real(wp), dimension(machine%n, most_joints) :: row, kick
     real(wp), dimension(most_joints) :: rate, impulse
@@ -369,9 +370,9 @@ contains
   !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own; its time is that of
   !> the state before it, or `at` [s].
   pure subroutine log_event(machine, kind, j, before, after, log, at)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: kind, j
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
     real(wp), intent(in), optional :: at
     complex(wp) :: turning(harmonics_of(machine))
@@ -387,9 +388,9 @@ contains
 
   !> Writes an event down as the watched body sees it, and of two where the driving one is.
   pure subroutine record_change(machine, kind, before, after, log)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: kind
-    type(jointed_state_t), intent(in) :: before, after
+    type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
     if (allocated(machine%driver)) then
       call record_event(log, kind, watched_state(machine, before), after%v(machine%watched), driver_now(machine, before))
@@ -398,4 +399,4 @@ contains
     end if
   end subroutine record_change
 
-end module jointed_log
+end module multibody_log

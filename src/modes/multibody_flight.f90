@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> One flight of a jointed structure, by the flow that its mode has: in closed form, or marched where the force of a joint
+!> One flight of a multibody structure, by the flow that its mode has: in closed form, or marched where the force of a joint
 !> is not linear.
-module jointed_flight
+module multibody_flight
   use flight_path, only: path_t
   use guards, only: joint_guard_t, most_guards
-  use jointed, only: jointed_t
-  use jointed_log, only: log_flight
-  use jointed_state, only: is_marched, jointed_state_t
+  use multibody, only: multibody_t
+  use multibody_log, only: log_flight
+  use multibody_state, only: is_marched, multibody_state_t
   use kinds, only: int64, wp
   use linear_flight, only: fly_linear, watch_t
   use marched_flight, only: begin_flight, marched_flight_t, step_flight
@@ -26,10 +26,10 @@ contains
   !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `fallen` those that fell together at
   !> the end, none if the time is over. `steps` counts, and bounds, the work; `reason` says why a flight was given up, 0.
   pure subroutine fly(machine, flow, options, state, until, list, count_guards, fallen, watch, steps, reason, log)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(options_t), intent(in) :: options
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards, reason
@@ -37,7 +37,7 @@ contains
     type(watch_t), intent(inout) :: watch
     integer(int64), intent(inout) :: steps
     type(log_t), intent(inout), optional :: log
-    type(jointed_state_t) :: start
+    type(multibody_state_t) :: start
     type(path_t) :: path
     type(pace_t) :: pace
     logical :: ended, failed, hopeless
@@ -78,4 +78,4 @@ contains
     watch%evaluations = 0
   end subroutine fly
 
-end module jointed_flight
+end module multibody_flight

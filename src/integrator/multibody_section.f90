@@ -1,13 +1,13 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A jointed structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
+!> A multibody structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
 !> the springs of elastic friction.
-module jointed_section
-  use jointed, only: is_stop, joint_contact, joint_elastic
-  use jointed_flows, only: without_contacts
-  use jointed_motion, only: advance_jointed_period, jointed_motion_t, prepare_jointed, start_jointed
-  use jointed_state, only: joint_motion, jointed_state_t, turning_at
+module multibody_section
+  use multibody, only: is_stop, joint_contact, joint_elastic
+  use multibody_flows, only: without_contacts
+  use multibody_motion, only: advance_multibody_period, multibody_motion_t, prepare_multibody, start_multibody
+  use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use motion_state, only: tally_t
   use section_size, only: most_coordinates
@@ -16,8 +16,9 @@ module jointed_section
   implicit none
   private
 
-  public :: coordinates_of_jointed, fits_section, start_of_jointed, lay_out, jointed_at, jointed_point, scales_of_jointed, &
-    watched_speed, free_jointed, keeps_clear
+  public :: coordinates_of_multibody, fits_section, start_of_multibody, lay_out, multibody_at, multibody_point, &
+    scales_of_multibody, &
+    watched_speed, free_multibody, keeps_clear
 
   !> Sums of the elements of orthonormal directions that are rounding.
   real(wp), parameter :: nothing = 1e-9_wp
@@ -25,43 +26,43 @@ module jointed_section
 contains
 
   !> Number of coordinates on the section.
-  pure integer function coordinates_of_jointed(moving) result(n)
-    type(jointed_motion_t), intent(in) :: moving
+  pure integer function coordinates_of_multibody(moving) result(n)
+    type(multibody_motion_t), intent(in) :: moving
     n = size(moving%directions, 2) + size(moving%speeds, 2) + count(moving%machine%joints%kind == joint_elastic)
-  end function coordinates_of_jointed
+  end function coordinates_of_multibody
 
   !> Number of the coordinate that is the velocity of the watched place, in a motion without a clock.
   pure integer function watched_speed(moving) result(at)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     at = size(moving%directions, 2) + moving%machine%watched
   end function watched_speed
 
   !> Whether there is room for the coordinates, and they tell what follows: nothing acts at times of its own.
   pure logical function fits_section(moving)
-    type(jointed_motion_t), intent(in) :: moving
-    fits_section = coordinates_of_jointed(moving) <= most_coordinates .and. .not. acts_on_time(moving%machine)
+    type(multibody_motion_t), intent(in) :: moving
+    fits_section = coordinates_of_multibody(moving) <= most_coordinates .and. .not. acts_on_time(moving%machine)
   end function fits_section
 
   !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
-  pure subroutine free_jointed(moving, free, places)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_motion_t), intent(out) :: free
+  pure subroutine free_multibody(moving, free, places)
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(out) :: free
     integer, intent(out) :: places
     places = 0
     if (.not. moving%machine%driven .or. .not. any(is_stop(moving%machine%joints%kind))) return
-    call prepare_jointed(without_contacts(moving%machine), moving%options, free)
+    call prepare_multibody(without_contacts(moving%machine), moving%options, free)
     if (size(free%speeds, 2) == size(moving%speeds, 2)) places = size(moving%directions, 2) - size(free%directions, 2)
-  end subroutine free_jointed
+  end subroutine free_multibody
 
   !> Whether a structure on the section comes no nearer to a stop in the next `periods` than displacements of all places by
   !> `distance` [m] would close.
   pure logical function keeps_clear(moving, state, periods, distance)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: periods
     real(wp), intent(in) :: distance
-    type(jointed_motion_t) :: narrower
-    type(jointed_state_t) :: later
+    type(multibody_motion_t) :: narrower
+    type(multibody_state_t) :: later
     type(tally_t) :: tally
     complex(wp) :: turning(moving%harmonics)
     real(wp) :: s, u, nearer
@@ -81,7 +82,7 @@ contains
     end do
     later = state
     do i = 1, periods
-      call advance_jointed_period(narrower, later, tally, reason)
+      call advance_multibody_period(narrower, later, tally, reason)
       if (reason /= 0 .or. tally%impacts > 0) return
     end do
     keeps_clear = .true.
@@ -91,11 +92,11 @@ contains
   !> drive at `angle` [rad].
   !> `others`, if it is not empty, has place and velocity of every coordinate in the place of what the machine says.
   !> One that no mode fits, or that lies beyond a stop, is not a number.
-  pure function start_of_jointed(moving, x, v, angle, others) result(state)
-    type(jointed_motion_t), intent(in) :: moving
+  pure function start_of_multibody(moving, x, v, angle, others) result(state)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, angle
     real(wp), intent(in), optional :: others(:)
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp) :: start(2, moving%machine%n)
     logical :: ok
     associate (machine => moving%machine)
@@ -106,14 +107,14 @@ contains
       start(1, :) = start(1, :) + machine%start_shape(:, 1)*(x - start(1, machine%watched))
       start(2, :) = start(2, :) + machine%start_shape(:, 2)*(v - start(2, machine%watched))
     end associate
-    call start_jointed(moving, start(1, :), start(2, :), angle, state, ok)
+    call start_multibody(moving, start(1, :), start(2, :), angle, state, ok)
     if (ok) ok = is_allowed(moving, start(1, :), state%time)
     if (.not. ok) state%q = ieee_value(1.0_wp, ieee_quiet_nan)
-  end function start_of_jointed
+  end function start_of_multibody
 
   !> Whether no rigid stop is violated by the positions `q` at `time`.
   pure logical function is_allowed(moving, q, time)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: q(:), time
     complex(wp) :: turning(moving%harmonics)
     real(wp) :: s, u, near
@@ -133,7 +134,7 @@ contains
   !> Places and velocities of all coordinates for those of the section, `point`; what these leave open is zero: of two bodies that
   !> nothing ties to the ground place and velocity of the driving one.
   pure subroutine lay_out(moving, point, q, v)
-    type(jointed_motion_t), intent(in) :: moving
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     real(wp), intent(out) :: q(:), v(:)
     integer :: places, speeds
@@ -149,16 +150,16 @@ contains
   end subroutine lay_out
 
   !> The state on the section with the coordinates `point`, see `lay_out`.
-  pure function jointed_at(moving, point) result(state)
-    type(jointed_motion_t), intent(in) :: moving
+  pure function multibody_at(moving, point) result(state)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
-    type(jointed_state_t) :: state
+    type(multibody_state_t) :: state
     real(wp) :: q(moving%machine%n), v(moving%machine%n), s, u, limit
     complex(wp) :: turning(moving%harmonics)
     integer :: j, k
     logical :: ok
     call lay_out(moving, point, q, v)
-    call start_jointed(moving, q, v, 0.0_wp, state, ok)
+    call start_multibody(moving, q, v, 0.0_wp, state, ok)
     turning = turning_at(moving%machine%frequency, 0.0_wp, moving%harmonics)
     k = size(moving%directions, 2) + size(moving%speeds, 2)
     do j = 1, size(moving%machine%joints)
@@ -173,12 +174,12 @@ contains
       end associate
     end do
     if (.not. ok) state%q = ieee_value(1.0_wp, ieee_quiet_nan)
-  end function jointed_at
+  end function multibody_at
 
   !> Coordinates of a state on the section, zeros after the last.
-  pure function jointed_point(moving, state) result(point)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: state
+  pure function multibody_point(moving, state) result(point)
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: state
     real(wp) :: point(most_coordinates), q(moving%machine%n), s, u
     complex(wp) :: turning(moving%harmonics)
     integer :: n, places, speeds, j, k
@@ -202,11 +203,11 @@ contains
         if (state%phase(j) /= 0) point(k) = state%phase(j)*joint%friction%kinetic/joint%stiffness
       end associate
     end do
-  end function jointed_point
+  end function multibody_point
 
   !> Sizes of the coordinates in a motion over `half_range` [m]. What may drift has those of what stops and forces allow.
-  pure function scales_of_jointed(moving, half_range) result(scales)
-    type(jointed_motion_t), intent(in) :: moving
+  pure function scales_of_multibody(moving, half_range) result(scales)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates), length
     integer :: places, speeds
@@ -216,6 +217,6 @@ contains
     if (speeds < moving%machine%n) length = min(length, moving%machine%length_scale)
     scales = length
     scales(places + 1:places + speeds) = length*moving%machine%frequency
-  end function scales_of_jointed
+  end function scales_of_multibody
 
-end module jointed_section
+end module multibody_section

@@ -1,15 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What follows a fallen guard of a jointed structure: impacts, sticking and sliding, the completion of chatter.
-module jointed_transition
+!> What follows a fallen guard of a multibody structure: impacts, sticking and sliding, the completion of chatter.
+module multibody_transition
   use blow, only: strike
   use chatter, only: look_ahead
   use guards, only: force_ends, force_returns, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, &
     slides_down, slides_up
-  use jointed, only: joint_contact, joint_elastic, joint_friction, joint_soft, jointed_t, most_joints
-  use jointed_flows, only: jointed_motion_t
-  use jointed_state, only: joint_motion, jointed_state_t, rounding_of_speed, turning_at
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_soft, multibody_t, most_joints
+  use multibody_flows, only: multibody_motion_t
+  use multibody_state, only: joint_motion, multibody_state_t, rounding_of_speed, turning_at
   use kinds, only: int64, wp
   use mode_choice, only: accelerations_of, choose_mode, project
   use motion_state, only: append_word, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_stick, word_upper
@@ -28,8 +28,8 @@ contains
   !> Rigid contacts in `touching` that do not open stay closed if the forces say so; joints at rest stick or slide. `at_level`: a
   !> guard says that their force has come to its limit.
   pure subroutine settle(moving, state, turning, at_rest, touching, ok, at_level)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:)
@@ -58,14 +58,14 @@ contains
 
   !> What the guards that have fallen bring about. `stalled`: what cannot be decided is held for an instant.
   pure subroutine transition(moving, state, list, fallen, stalled, tally, ok)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:), stalled
     type(tally_t), intent(inout) :: tally
     logical, intent(out) :: ok
     complex(wp) :: turning(moving%harmonics)
-    type(jointed_state_t) :: start
+    type(multibody_state_t) :: start
     integer :: touching(most_joints), hit(most_joints), j
     logical :: at_rest(most_joints), at_level(most_joints), plastic
     real(wp) :: speed(most_joints), lost
@@ -110,10 +110,10 @@ contains
 
   !> Counts an impact in the burst that it belongs to; a long one that dies away is `plastic`: without loss it may go on for ever.
   pure subroutine judge_burst(machine, hit, turning, state, plastic)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: hit(:)
     complex(wp), intent(in) :: turning(:)
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     logical, intent(out) :: plastic
     real(wp) :: fastest, s, u
     integer :: j
@@ -132,8 +132,8 @@ contains
   !> Counts friction that has come to stick; of two bodies also where they have come to rest against a stop, the end of a chatter
   !> being in the word already.
   pure subroutine count_sticks(machine, before, state, chattered, tally)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: before, state
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: before, state
     logical, intent(in) :: chattered
     type(tally_t), intent(inout) :: tally
     integer :: j
@@ -153,11 +153,11 @@ contains
 
   !> What each fallen guard says of its own joint: its phase, or that it is at rest, touches, is hit.
   pure subroutine change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     complex(wp), intent(in) :: turning(:)
     type(joint_guard_t), intent(in) :: list(:)
     logical, intent(in) :: fallen(:)
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     logical, intent(inout) :: at_rest(:)
     integer, intent(inout) :: touching(:), hit(:)
@@ -212,11 +212,11 @@ contains
   !> Which friction joints are at rest, and the directions of the others. One that stuck in the state `before` is at rest unless
   !> an impact has set it in motion: what its speed was then is rounding. What an impact leaves of a speed may be rounding, too.
   pure subroutine judge_friction(machine, before, turning, struck, state, at_rest)
-    type(jointed_t), intent(in) :: machine
-    type(jointed_state_t), intent(in) :: before
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: before
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: struck
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     logical, intent(inout) :: at_rest(:)
     real(wp) :: s, u, last, rounding
     integer :: j
@@ -240,9 +240,9 @@ contains
 
   !> The slider of elastic friction stops: its spring holds what friction was.
   pure subroutine stop_slider(machine, j, state, turning)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp) :: s, u
     call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
@@ -267,13 +267,13 @@ contains
   !> coordinates and for
   !> every restitution (the impulses act along one direction, and the conditions of a closed gap fix them).
   pure subroutine end_chatter(moving, before, touching, hit, turning, state, tally)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(in) :: before
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(in) :: before
     integer, intent(in) :: touching(:), hit(:)
     complex(wp), intent(in) :: turning(:)
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
-    type(jointed_state_t) :: closed
+    type(multibody_state_t) :: closed
     real(wp) :: speed(most_joints), lost
     integer :: j, i
     logical :: at_rest(most_joints), along(most_joints), ok
@@ -301,10 +301,10 @@ contains
 
   !> A soft contact that only just touches, with no speed, is pressed if the forces press it, else open.
   pure subroutine hold_soft(machine, j, turning, state)
-    type(jointed_t), intent(in) :: machine
+    type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     complex(wp), intent(in) :: turning(:)
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_state_t), intent(inout) :: state
     real(wp) :: a(machine%n), kick(machine%n), s, u, given
     integer :: side
     associate (joint => machine%joints(j))
@@ -324,8 +324,8 @@ contains
 
   !> What cannot be told apart by rounding is held, for a billionth of a period.
   pure subroutine hold(moving, state, turning, at_rest, touching)
-    type(jointed_motion_t), intent(in) :: moving
-    type(jointed_state_t), intent(inout) :: state
+    type(multibody_motion_t), intent(in) :: moving
+    type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:)
@@ -342,4 +342,4 @@ contains
     state%time = state%time + 1e-9_wp*moving%machine%period
   end subroutine hold
 
-end module jointed_transition
+end module multibody_transition
