@@ -3,6 +3,7 @@
 """`result.separatrix`: what a result knows beyond its arrays, and its figures."""
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -134,26 +135,28 @@ class Accessor:
 
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
-        "phase", "energy" and "contact", of points "regime", of branches "branches", of boundaries
-        "boundary", of measures along a parameter "erosion", of survival "survival". Notebooks show the
-        figure; `savefig` writes it, `save` in several formats.
+        "phase", "section", "energy", "impacts" and "contact", of points "regime", of branches "branches" and
+        "curves", of boundaries "boundary", of measures along a parameter "erosion", of survival "survival".
+        Notebooks show the figure; `savefig` writes it, `save` in several formats.
+
+        `ax`: axes of matplotlib to draw into; a sequence of them for a figure of several panels. The figure
+        that they belong to is returned. Its style is kept, there is no caption, and a title only if given.
 
         `over`: of boundaries, the map to draw them over.
 
-        `wishes` are the fields of `separatrix.figures.look.Look`: region={"x0": (0, 1)},
+        `wishes` are the fields of `separatrix.figures.look.Look`: ax=axes, region={"x0": (0, 1)},
         slice={"drive.ratio": 1.2}, inset={"x0": (0, 0.1), "v0": (-1, 1)}, axes=("v0", "x0"), units=["mm"],
-        shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="short".
+        shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="full",
+        crank_angle=1.5 and transient=500 of a section.
         """
-        from separatrix import style
         from separatrix.figures import basin, boundary, branches, erosion, points, survival, sweep, trajectory
-        from separatrix.labels import plain
 
         kind = self.kind
-        heading = plain(title or str(self._result.attrs.get("title", "")))
         look = _look(wishes)
+        heading = self._heading(title, look)
         if over is not None and kind != "boundary":
             raise SeparatrixError(f"over: belongs to the figure of boundaries, this is a {kind}", USAGE)
-        with style.context(style_sheet):
+        with _style(look, style_sheet):
             if kind == "basin":
                 made = basin.figures(None, self._result, name, heading, look)
             elif kind == "boundary":
@@ -164,9 +167,7 @@ class Accessor:
                     "measures": erosion, "survival": survival,
                 }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
-        if name is not None and name not in made:
-            raise SeparatrixError(f"no figure '{name}'; there are {', '.join(made)}", USAGE)
-        return made[name] if name else next(iter(made.values()))
+            return made[name or next(iter(made))]
 
     def difference(
         self, other: xr.Dataset, field: str | None = None, *, title: str | None = None, **wishes: object
@@ -175,13 +176,11 @@ class Accessor:
 
         Compared are regime, period and event word. `field` (attractor) and `wishes` as for `plot`.
         """
-        from separatrix import style
         from separatrix.figures.difference import difference
-        from separatrix.labels import plain
 
-        heading = plain(title or str(self._result.attrs.get("title", "")))
-        with style.context():
-            return difference(self._result, other, field, heading, _look(wishes))
+        look = _look(wishes)
+        with _style(look):
+            return difference(self._result, other, field, self._heading(title, look), look)
 
     def save(
         self,
@@ -213,16 +212,32 @@ class Accessor:
     ) -> Path:
         """Write a map moving through one of its parameters, as .gif or, with ffmpeg, as .mp4."""
         from separatrix.figures.animation import animate
-        from separatrix.labels import plain
 
         self._require("basin")
-        heading = plain(title or str(self._result.attrs.get("title", "")))
         look = _look(wishes)
+        heading = self._heading(title, look)
         return animate(self._result, parameter, Path(path), heading, field, look, frames_per_second, dpi)
+
+    def _heading(self, title: str | None, look: "Look") -> str:
+        """Return the title of a figure: that of the result, but not above axes of the user."""
+        from separatrix.labels import plain
+
+        return plain(title or ("" if look.ax else str(self._result.attrs.get("title", ""))))
 
     def _require(self, kind: str) -> None:
         if self.kind != kind:
             raise SeparatrixError(f"this is a {self.kind}, not a {kind}", USAGE)
+
+
+def _style(look: "Look", sheet: str | Path | None = None) -> AbstractContextManager:
+    """Return the context to draw in; axes of the user keep the style of the user."""
+    from separatrix import style
+
+    if not look.ax:
+        return style.context(sheet)
+    if sheet is not None:
+        raise SeparatrixError("style_sheet: the axes given by ax have their style", USAGE)
+    return nullcontext()
 
 
 def _look(wishes: dict[str, object]) -> "Look":

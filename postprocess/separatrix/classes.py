@@ -13,7 +13,6 @@ from separatrix.labels import flag_text, positions_are_angles, unit
 from separatrix.open import decode_word, flag_names, table
 
 CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
-_MOST = len(style.TOL_MUTED)
 # of the largest value, below which another is 0 to rounding
 _NOTHING = 1e-12
 
@@ -46,15 +45,18 @@ def classes(result: xr.Dataset, field: str, counts: dict[int, int]) -> list[Clas
         ]
     nothing = [Class(_text(result, field, 0), style.NOTHING, (0,))] if 0 in present else []
     coded = [code for code in present if code != 0]
-    highest = max(_known_ids(result) + coded, default=0) if field == "attractor" else len(coded)
-    if highest <= _MOST:
-        colours = style.palette(highest)
-        places = [code - 1 for code in coded] if field == "attractor" else range(len(coded))
-        return nothing + [
-            Class(_text(result, field, code), colours[place], (code,))
-            for code, place in zip(coded, places, strict=True)
-        ]
-    return nothing + _most_frequent(result, field, coded, counts)
+    # other classes than attractors are numbered as they occur
+    ids = coded if field == "attractor" else [*range(1, len(coded) + 1)]
+    highest = max(_known_ids(result) + ids if field == "attractor" else ids, default=0)
+    number_of = dict(zip(coded, ids, strict=True))
+    colours = style.of_attractors({number_of[code]: counts[code] for code in coded}, highest)
+    entries = [
+        Class(_text(result, field, code), colours[number_of[code]], (code,))
+        for code in coded
+        if number_of[code] in colours
+    ]
+    rest = tuple(code for code in coded if number_of[code] not in colours)
+    return nothing + entries + ([Class(f"{len(rest)} others", style.OTHER, rest)] if rest else [])
 
 
 def recoloured(entries: list[Class], colours: Sequence[str]) -> list[Class]:
@@ -75,18 +77,6 @@ def class_index(image: np.ndarray, entries: list[Class]) -> np.ndarray:
 def class_counts(entries: list[Class], counts: dict[int, int]) -> np.ndarray:
     """Return how many points belong to each class."""
     return np.array([sum(counts.get(code, 0) for code in entry.codes) for entry in entries], dtype=np.int64)
-
-
-def _most_frequent(result: xr.Dataset, field: str, coded: list[int], counts: dict[int, int]) -> list[Class]:
-    ranked = sorted(coded, key=lambda code: (-counts[code], code))
-    shown, rest = ranked[:_MOST], sorted(ranked[_MOST:])
-    entries = [
-        Class(_text(result, field, code), style.TOL_MUTED[place], (code,)) for place, code in enumerate(shown)
-    ]
-    entries.sort(key=lambda entry: entry.codes)
-    if rest:
-        entries.append(Class(f"{len(rest)} others", style.OTHER, tuple(rest)))
-    return entries
 
 
 def _known_ids(result: xr.Dataset) -> list[int]:

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
@@ -17,6 +15,7 @@ from separatrix.figures import basin, boundary, branches, contact, erosion, poin
 from separatrix.figures.animation import animate
 from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
+from separatrix.figures.page import Figures
 from separatrix.given_up import refuse
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
@@ -108,14 +107,16 @@ def _make(path: Path, options: argparse.Namespace) -> list[Path]:
             return [_animated(path, result, folder / f"{stem}_animation", title, look, options)]
         return [
             written
-            for name, figure in _figures(path, result, options.field, title, look, options.branches).items()
+            for name, figure in dict(
+                _figures(path, result, options.field, title, look, options.branches)
+            ).items()
             for written in save(figure, folder / f"{stem}_{name}", options.formats, options.dpi)
         ]
 
 
 def _figures(
     path: Path, result: object, field: str | None, title: str, look: Look, orbits: Path | None = None
-) -> dict[str, Figure]:
+) -> Figures:
     kind = result.attrs["kind"]
     if kind == "basin":
         return basin.figures(path, result, field, title, look)
@@ -155,6 +156,8 @@ def _look(options: argparse.Namespace) -> Look:
         limits=options.range,
         size=options.size,
         caption=options.caption,
+        crank_angle=options.crank_angle,
+        transient=options.transient,
     )
 
 
@@ -253,6 +256,25 @@ def _add_looks(parser: Parser) -> None:
         "--no-attractors", action="store_true", help="basin files: do not mark the attractors on the section"
     )
     looks.add_argument(
+        "--crank-angle", metavar="RAD", type=float, help="crank angle of a section [that of the start]"
+    )
+    looks.add_argument(
+        "--transient",
+        metavar="PERIODS",
+        type=float,
+        help="drive periods discarded before a section [half of the motion]",
+    )
+    _add_style(looks)
+    looks.add_argument(
+        "--animate", metavar="NAME", help="basin files: a film through the values of this axis instead"
+    )
+    looks.add_argument(
+        "--film", choices=("gif", "mp4"), default="gif", help="form of the film; mp4 needs ffmpeg [gif]"
+    )
+
+
+def _add_style(looks: argparse._ArgumentGroup) -> None:
+    looks.add_argument(
         "--colours", metavar="LIST", type=names, default=[], help="colours of the classes in their order"
     )
     looks.add_argument(
@@ -265,16 +287,10 @@ def _add_looks(parser: Parser) -> None:
     looks.add_argument(
         "--caption",
         choices=CAPTIONS,
-        default="full",
-        help="all that is needed to repeat the run, less, none [full]",
+        default="short",
+        help="full: all that is needed to repeat the run [short]",
     )
     looks.add_argument("--style", metavar="FILE", help="style of matplotlib, by name or file, on top of ours")
-    looks.add_argument(
-        "--animate", metavar="NAME", help="basin files: a film through the values of this axis instead"
-    )
-    looks.add_argument(
-        "--film", choices=("gif", "mp4"), default="gif", help="form of the film; mp4 needs ffmpeg [gif]"
-    )
 
 
 if __name__ == "__main__":

@@ -63,11 +63,15 @@ def axis_label(variable: xr.DataArray) -> str:
     return f"{text} ({unit(variable)})" if unit(variable) else text
 
 
+def symbol(variable: xr.DataArray) -> str:
+    """Return the symbol of a variable, or its name where it has none."""
+    name = str(variable.name)
+    return _SHORT.get(name) or plain(variable.attrs.get("long_name", name.replace("_", " ")))
+
+
 def value_label(variable: xr.DataArray, value: float) -> str:
     """Return 'symbol = value unit' for the title of a panel."""
-    name = str(variable.name)
-    text = _SHORT.get(name) or plain(variable.attrs.get("long_name", name.replace("_", " ")))
-    return f"{text} = {value:.5g} {unit(variable)}".rstrip()
+    return f"{symbol(variable)} = {value:.5g} {unit(variable)}".rstrip()
 
 
 def flag_text(name: str) -> str:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One style for all figures: print widths, fonts, colours that colour-blind readers can tell apart."""
+"""One style for all figures: print widths, fonts, and the colours of `palette`."""
 
 import io
 from contextlib import AbstractContextManager
@@ -12,45 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from separatrix.errors import USAGE, SeparatrixError
+from separatrix.palette import *  # noqa: F403  (style.MOTION, style.palette(3), ...)
 
 SINGLE_COLUMN = 85.0
 DOUBLE_COLUMN = 175.0
 PNG_DPI = 300
-
-# Colours of attractors in their order, mostly Paul Tol's. The first three differ by 20 and more in lightness,
-# so that they can be told apart in grey; all by 20 and more for colour-blind readers (CIE 76).
-ATTRACTORS = (
-    "#004488", "#DDAA33", "#BB5566", "#99DDFF", "#000000", "#44AA99", "#661100", "#EEDD88",
-)  # fmt: skip
-# Okabe and Ito (2008), for lines
-OKABE_ITO = ("#D55E00", "#0072B2", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#F0E442", "#000000")
-# Paul Tol, muted
-TOL_MUTED = (
-    "#CC6677", "#332288", "#DDCC77", "#117733", "#88CCEE",
-    "#882255", "#44AA99", "#999933", "#AA4499", "#661100",
-)  # fmt: skip
-NOTHING = "#DDDDDD"
-OTHER = "#777777"
 SCALAR_MAP = "cividis"
-
-# as in a catalogue, whose first attractor mostly meets no stop
-REGIMES = {
-    "unresolved": NOTHING,
-    "non_impact": ATTRACTORS[0],
-    "impact": ATTRACTORS[1],
-    "sticking": ATTRACTORS[5],
-    "mixed": ATTRACTORS[2],
-    "chattering": ATTRACTORS[6],
-    "at_rest": ATTRACTORS[3],
-    "stuck": ATTRACTORS[7],
-}
-RUN_UP = "#D55E00"
-RUN_DOWN = "#004488"
-BOTH_RUNS = "#333333"
-BARRIER = OKABE_ITO[2]
-BRANCH = "#C4C4C4"
-MOTION = OKABE_ITO[1]
-IMPACT = OKABE_ITO[0]
 
 _RC = {
     "font.family": "sans-serif",
@@ -114,8 +81,3 @@ def new_figure(width: float, height: float) -> Figure:
     figure = PrintFigure(figsize=(width / 25.4, height / 25.4))
     FigureCanvasAgg(figure)
     return figure
-
-
-def palette(number: int) -> tuple[str, ...]:
-    """Return the palette for a number of classes: that of attractors up to 8, Tol muted up to 10."""
-    return ATTRACTORS if number <= len(ATTRACTORS) else TOL_MUTED

@@ -39,6 +39,8 @@ def animate(
     Colours and legend are the same in all frames; shares are those of all. Other parameters are fixed by
     `look.slice`.
     """
+    if look.ax:
+        raise SeparatrixError("ax: not served by films", USAGE)
     if path.suffix not in FORMATS:
         raise SeparatrixError(f"{path}: allowed are {' and '.join(FORMATS)}", USAGE)
     if path.suffix == ".mp4" and ffmpeg() is None:

@@ -5,6 +5,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -24,10 +25,10 @@ from separatrix import style
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes, recoloured
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures import inset, marks, section, shares
-from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, start_pieces, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Figures, Page, label
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
-from separatrix.layout import compose
 from separatrix.open import table
 from separatrix.reduce import Plane, Strip, majority_plane, scalar_plane
 
@@ -48,18 +49,20 @@ class _Panel:
 
 def figures(
     path: str | Path | None, result: xr.Dataset, field: str | None, title: str, look: Look = DEFAULT
-) -> dict[str, Figure]:
+) -> Figures:
     """Return the maps of a basin file by name: attractor and regime, or the one field that is asked for.
 
     Without any label there is no map of the attractors, unless it is asked for; "shares" is their share over
     the parameter of a stack of maps. `path`: the file, which is read by slabs; None: the result is in memory.
     """
+    served = ("region", "slice", "inset", "axes", "units", "shade", "colours", "colour_map", "limits")
+    look.require("map", *served)
     if look.inset and (field == "shares" or "sample" in result["regime"].dims):
         raise SeparatrixError("inset: not served by the figure of shares", USAGE)
     if "sample" in result["regime"].dims and field in (None, "shares"):
-        return {"shares": shares.sampled(result, title, look)}
+        return Figures({"shares": partial(shares.sampled, result, title, look)})
     if field == "shares":
-        return {"shares": shares.diagram(result, title, look)}
+        return Figures({"shares": partial(shares.diagram, result, title, look)})
     names = [field] if field else [*(["attractor"] if _labelled(result) else []), "regime"]
     for name in names:
         if name not in result or result[name].dims != result["regime"].dims:
@@ -68,7 +71,7 @@ def figures(
             )
             where = "" if path is None else f"{path}: "
             raise SeparatrixError(f"{where}no field '{name}'; known fields: {known}, shares", USAGE)
-    return {name: basin_map(path, result, name, title, look) for name in names}
+    return Figures({name: partial(basin_map, path, result, name, title, look) for name in names})
 
 
 def basin_map(
@@ -97,7 +100,8 @@ def basin_map(
     axes, shaded = (down, across), look.shade and field in CLASS_FIELDS and "settle_time" in result
     panels = _read_panels(path, result, field, axes, others, chosen, shaded)
     part = inset.enlarged(whole, axes, len(panels), look) if look.inset else None
-    figure, grid = _grid(len(panels), 62.0 if down else 22.0, look)
+    page = _page(len(panels), 62.0 if down else 22.0, look)
+    grid = page.axes
     # the inset is one more panel, which does not count
     drawn = panels
     if part is not None:
@@ -107,10 +111,10 @@ def basin_map(
     if field in CLASS_FIELDS:
         handles = _draw_classes(grid, result, field, panels, drawn, look, totals)
     else:
-        _draw_scalar(figure, grid, result, field, panels, drawn, look)
+        _draw_scalar(grid, result, field, panels, drawn, look)
     _label(grid[: len(panels)], result, axes)
     if part is not None:
-        inset.frame(figure, *grid, part, axes)
+        inset.frame(*grid, part, axes)
     if look.attractors and field in ("attractor", "regime", "settle_time") and {down, across} == {"x0", "v0"}:
         places = chosen + chosen[: len(grid) - len(panels)]
         marked, lacking = marks.draw(grid, whole, result, across, others, places, look)
@@ -133,8 +137,7 @@ def basin_map(
         ]
         handles += curves(grid, at)
     caption += notes
-    compose(figure, title, shown([*caption, plain(version_text(result))], look), handles)
-    return figure
+    return page.finish(title, [*caption, plain(version_text(result))], handles)
 
 
 def plane_axes(result: xr.Dataset, look: Look = DEFAULT) -> tuple[str | None, str]:
@@ -232,24 +235,15 @@ def _spread(places: list, most: int) -> list:
     return [places[k] for k in np.linspace(0, len(places) - 1, most).round().astype(int)]
 
 
-def _grid(number: int, height: float, look: Look) -> tuple[Figure, list[Axes]]:
-    """Return a figure with axes for so many panels; a single one has the given height in mm, as its inset."""
+def _page(number: int, height: float, look: Look) -> Page:
+    """Return axes for so many panels; a single one has the given height in mm, as its inset."""
     if number == 1 and look.inset:
-        figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, height)))
-        return figure, list(figure.subplots(1, 2))
+        return Page(look, (style.DOUBLE_COLUMN, height), 2, columns=2)
     if number == 1:
-        figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, height)))
-        return figure, [figure.add_subplot()]
+        return Page(look, (style.SINGLE_COLUMN, height))
     columns = min(number, 2 if number in (2, 4) else 3)
-    rows = -(-number // columns)
-    usual = (style.DOUBLE_COLUMN, (_PANEL if columns == 3 else 1.4 * _PANEL) * rows + 8.0)
-    figure = style.new_figure(*(look.size or usual))
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for spare in axes[number:]:
-        spare.remove()
-    for above in axes[max(0, number - columns) : number]:
-        above.xaxis.set_tick_params(labelbottom=True)
-    return figure, list(axes[:number])
+    height = (_PANEL if columns == 3 else 1.4 * _PANEL) * -(-number // columns) + 8.0
+    return Page(look, (style.DOUBLE_COLUMN, height), number, columns, sharex=True, sharey=True)
 
 
 def _draw_classes(
@@ -305,7 +299,6 @@ def _patch(entry: Class, share: str) -> Patch:
 
 
 def _draw_scalar(
-    figure: Figure,
     grid: list[Axes],
     result: xr.Dataset,
     field: str,
@@ -326,12 +319,13 @@ def _draw_scalar(
         image.set_cmap(colour_map)
         image.set_norm(norm)
         ax.set_facecolor(style.NOTHING)
-        ax.set_title(panel.heading if len(panels) > 1 else "")
+        if len(panels) > 1:
+            ax.set_title(panel.heading)
     below = values.size > 0 and values.min() < low
     above = values.size > 0 and values.max() > high
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
     mappable = ScalarMappable(norm, colour_map)
-    figure.colorbar(mappable, ax=grid, label=axis_label(result[field]), extend=extend, pad=0.02)
+    grid[0].figure.colorbar(mappable, ax=grid, label=axis_label(result[field]), extend=extend, pad=0.02)
 
 
 def _colour_map(look: Look) -> str:
@@ -348,20 +342,19 @@ def _draw_image(ax: Axes, panel: _Panel, image: np.ndarray) -> object:
         if edge[0] > edge[-1]:
             edge, image = edge[::-1], np.flip(image, dimension)
         edges.append(edge)
-    return ax.pcolorfast(edges[1], edges[0], image)
+    drawn = ax.pcolorfast(edges[1], edges[0], image)
+    # also in axes of another style: a class between two others is not in the file
+    drawn.set_interpolation("nearest")
+    return drawn
 
 
 def _label(grid: list[Axes], result: xr.Dataset, axes: tuple) -> None:
     down, across = axes
     for ax in grid:
         ax.xaxis.set_major_locator(MaxNLocator(6 if len(grid) == 1 else 5))
-        place = ax.get_subplotspec()
-        if place.is_last_row() or ax.xaxis.get_tick_params().get("labelbottom"):
-            ax.set_xlabel(axis_label(result[across]))
+        label(ax, axis_label(result[across]), axis_label(result[down]) if down else "")
         if down is None:
             ax.set_yticks([])
-        elif place.is_first_col():
-            ax.set_ylabel(axis_label(result[down]))
 
 
 def _count_caption(

@@ -18,29 +18,28 @@ from separatrix.figures.caption import (
     caption_pieces,
     describe_case,
     resolved_case,
-    shown,
     start_pieces,
     version_text,
 )
 from separatrix.figures.look import DEFAULT, Look
-from separatrix.labels import axis_label, count_text, plain
-from separatrix.layout import compose
+from separatrix.figures.page import Figures, Page
+from separatrix.labels import axis_label, count_text, plain, symbol, unit
 from separatrix.open import decode_flags, decode_word, open_result
 
-# Text of the legend, colour and line of each name of a piece.
+# Text of the legend and line of each name of a piece.
 _LINES = {
-    "stable_set": ("boundary: stable set of saddle", "black", "-"),
-    "recurrent": ("boundary: recurrent edge state", style.OKABE_ITO[0], "-"),
-    "graze": ("boundary: edge of a graze", style.OKABE_ITO[1], "--"),
-    "stick": ("boundary: rim of a stick set", style.OKABE_ITO[2], "--"),
-    "chatter": ("boundary: edge of a completed chatter", style.OKABE_ITO[4], "--"),
-    "other_event": ("boundary: edge at another event", style.OKABE_ITO[3], "--"),
-    "not_known": ("boundary: leads to what is not known", "0.25", "-."),
+    "stable_set": ("boundary: stable set of saddle", "-"),
+    "recurrent": ("boundary: recurrent edge state", "-"),
+    "graze": ("boundary: edge of a graze", "--"),
+    "stick": ("boundary: rim of a stick set", "--"),
+    "chatter": ("boundary: edge of a completed chatter", "--"),
+    "other_event": ("boundary: edge at another event", "--"),
+    "not_known": ("boundary: leads to what is not known", "-."),
+    "edge": ("edge of what is not known", ":"),
 }
 _SADDLES = ("black", "#56B4E9", "#F0E442", "#CC79A7", "#009E73", "#D55E00")
 # Lines of the saddles when the colours begin anew.
 _AGAIN = ("-", (0, (3, 1)), (0, (1, 1)))
-_UNKNOWN = ("edge of what is not known", "0.4", ":")
 # Saddles that a caption describes.
 _MOST_LISTED = 4
 _OURS = ("region", "slice", "inset", "axes", "units", "shade", "colours")
@@ -52,7 +51,7 @@ def figures(
     title: str,
     look: Look = DEFAULT,
     over: xr.Dataset | None = None,
-) -> dict[str, Figure]:
+) -> Figures:
     """Return the figure of a file of boundaries by name.
 
     `over`: the map to draw them over; else that which the file names, if it lies beside the file at `path`.
@@ -60,13 +59,20 @@ def figures(
     look.require("file of boundaries", *_OURS)
     if over is not None:
         _check_map(result, over)
-        return {"boundary": _over(None, over, result, title, look)}
+    return Figures({"boundary": lambda: _figure(path, result, title, look, over)})
+
+
+def _figure(
+    path: str | Path | None, result: xr.Dataset, title: str, look: Look, over: xr.Dataset | None
+) -> Figure:
+    if over is not None:
+        return _over(None, over, result, title, look)
     beside = None if path is None else Path(path).parent / str(result.attrs["map"])
     if beside is not None and beside.is_file():
         with open_result(beside) as found:
             if _is_map(result, found):
-                return {"boundary": _over(beside, found, result, title, look)}
-    return {"boundary": _alone(result, title, look)}
+                return _over(beside, found, result, title, look)
+    return _alone(result, title, look)
 
 
 def _is_map(result: xr.Dataset, other: xr.Dataset) -> bool:
@@ -101,7 +107,7 @@ def _over(path: Path | None, found: xr.Dataset, result: xr.Dataset, title: str, 
             ax.set_ylim(limits[1])
         return handles
 
-    return basin.basin_map(path, found, "attractor", title, look, curves=curves, notes=_notes(result))
+    return basin.basin_map(path, found, "attractor", title, look, curves=curves, notes=_notes(result, look))
 
 
 def _alone(result: xr.Dataset, title: str, look: Look) -> Figure:
@@ -112,8 +118,8 @@ def _alone(result: xr.Dataset, title: str, look: Look) -> Figure:
         across, down = (name.replace(".", "_") for name in look.axes)
         if {across, down} != {first, second}:
             raise SeparatrixError(f"axes: the boundaries are those over {first} and {second}")
-    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 62.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.SINGLE_COLUMN, 62.0))
+    (ax,) = page.axes
     handles = draw(ax, result, across, down, look, {})
     ax.set_xlabel(axis_label(_in_units(result[across], look)))
     ax.set_ylabel(axis_label(_in_units(result[down], look)))
@@ -121,24 +127,22 @@ def _alone(result: xr.Dataset, title: str, look: Look) -> Figure:
         (ax.set_xlim if name == across else ax.set_ylim)(low, high)
     caption = [
         *caption_pieces(result, look, [*describe_case(result), *start_pieces(result)]),
-        *_notes(result),
+        *_notes(result, look),
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), handles)
-    return figure
+    return page.finish(title, caption, handles)
 
 
 def _in_units(variable: xr.DataArray, look: Look) -> xr.DataArray:
     return look.selected(variable.to_dataset(name=str(variable.name)))[str(variable.name)]
 
 
-def _notes(result: xr.Dataset) -> list[str]:
+def _notes(result: xr.Dataset, look: Look) -> list[str]:
     """What a caption says of the boundaries."""
-    found = result["across"].values >= 0
-    errors = result["error"].values[found]
-    if errors.size == 0:
+    number = int((result["across"].values >= 0).sum())
+    if number == 0:
         return ["no boundary: all points have the same label"]
-    notes = [f"{count_text(int(found.sum()))} boundary points, half of them known to {np.median(errors):.1g}"]
+    notes = [f"{count_text(number)} boundary points, half of them known to {_errors_text(result, look)}"]
     rows = zip(
         result["saddles_period"].values,
         result["saddles_event_word"].values,
@@ -154,6 +158,18 @@ def _notes(result: xr.Dataset) -> list[str]:
     if "saddles_section" in result and listed:
         notes.append("saddles are not marked: they have more coordinates than the picture")
     return notes + listed[:_MOST_LISTED]
+
+
+def _errors_text(result: xr.Dataset, look: Look) -> str:
+    """Return the median error of the points found along each axis, in the unit of the axis."""
+    texts = []
+    for number, name in enumerate(axes_of(result)):
+        errors = result["error"].values[result["across"].values == number]
+        if errors.size:
+            si = unit(result[name])
+            size = f"{np.median(errors) * look.factor(si):.1g} {look.unit(si)}".rstrip()
+            texts.append(f"{size} along {symbol(result[name])}")
+    return ", ".join(texts)
 
 
 def _multipliers_text(values: np.ndarray) -> str:
@@ -177,7 +193,8 @@ def draw(
         chosen = np.arange(result["points"].values[piece]) + result["first"].values[piece]
         if result["closed"].values[piece]:
             chosen = np.append(chosen, chosen[0])
-        text, colour, line = _LINES[names[piece]] if known[piece] else _UNKNOWN
+        name = names[piece] if known[piece] else "edge"
+        (text, line), colour = _LINES[name], style.BOUNDARIES[name]
         saddle = int(result["piece_saddle"].values[piece])
         if saddle and known[piece]:
             again, number = divmod(saddle - 1, len(_SADDLES))

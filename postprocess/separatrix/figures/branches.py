@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Branches of orbits and equilibria over a parameter: stable full, unstable broken, with bifurcations."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -10,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
-from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Figures, Page
 from separatrix.labels import axis_label, plain, unit
-from separatrix.layout import compose
 from separatrix.open import decode_flags
 
 # Label in the file, marker, and text of the legend.
@@ -41,20 +44,20 @@ _MARKS = {
 _LINES = {"SN": ("C0", "-"), "PD": ("C1", "--"), "GR": ("C2", "-."), "stick_onset": ("C3", ":")}
 
 
-def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure of a file of branches by name."""
     look.require("file of branches", "units")
-    found = {"branches": diagram(result, title, look)}
+    makers = {"branches": partial(diagram, result, title, look)}
     if result.sizes.get("curve_point"):
-        found["curves"] = chart(result, title, look)
-    return found
+        makers["curves"] = partial(chart, result, title, look)
+    return Figures(makers)
 
 
 def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the curves of labelled points over both parameters, with their points of codimension two."""
     result = look.selected(result)
-    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.DOUBLE_COLUMN, 85.0))
+    (ax,) = page.axes
     number, across, up = (result[name].values for name in ("curve", "curve_parameter", "curve_free"))
     labels, second = (decode_flags(result[name]).values for name in ("curve_label", "curve_second"))
     handles = {}
@@ -71,16 +74,20 @@ def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
             [], [], marker="o", color="black", linestyle="none", markersize=4, label="codimension two"
         )
     for name, place in (("parameter", ax.set_xlabel), ("free", ax.set_ylabel)):
-        axis = result[f"curve_{name}"].copy()
-        axis.name = str(result.attrs[name]).replace(".", "_")
-        place(axis_label(axis))
+        _set_label(result[f"curve_{name}"].copy(), str(result.attrs[name]), place)
     caption = [
         *caption_pieces(result, look, describe_case(result)),
         f"{np.unique(number).size} curves of labelled points; there may be others",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), list(handles.values()), columns=4)
-    return figure
+    return page.finish(title, caption, list(handles.values()), columns=4)
+
+
+def _set_label(axis: xr.DataArray, parameter: str, place: Callable[[str], object]) -> None:
+    """Label an axis with the parameter that it is."""
+    axis.name = parameter.replace(".", "_")
+    axis.attrs["long_name"] = parameter.replace(".", " ").replace("_", " ")
+    place(axis_label(axis))
 
 
 # So large a share of orbits that touch both stops have one and the same amplitude: it would show little.
@@ -126,15 +133,14 @@ def _plays(result: xr.Dataset) -> list[np.ndarray]:
 
 def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the amplitude of every orbit, or a point on its section, over the parameter."""
-    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.DOUBLE_COLUMN, 85.0))
+    (ax,) = page.axes
     handles = draw(ax, result, look)
     name = height(result, look)[1]
     result = look.selected(result)
     parameters = ("parameter", "equilibrium_parameter", "rest_parameter")
     across = result[next(name for name in parameters if name in result)].copy()
-    across.name = str(result.attrs["parameter"]).replace(".", "_")
-    ax.set_xlabel(axis_label(across))
+    _set_label(across, str(result.attrs["parameter"]), ax.set_xlabel)
     ax.set_ylabel(name)
     counts = []
     if "branch" in result:
@@ -154,8 +160,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         f"{', '.join(counts)}; there may be others",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), handles, columns=4)
-    return figure
+    return page.finish(title, caption, handles, columns=4)
 
 
 def draw(ax: Axes, result: xr.Dataset, look: Look = DEFAULT) -> list[Line2D]:

@@ -54,6 +54,9 @@ _LAW_NAMES = {
     "coulomb_viscous": "Coulomb-viscous",
     "coulomb_stribeck": "Coulomb-Stribeck",
 }
+_OF_ROTATION = {
+    "kg": "kg m^2", "m": "rad", "m/s": "rad/s", "N": "N m", "N/m": "N m", "N s/m": "N m s",
+}  # fmt: skip
 # values beyond this mean "absent", and are not numbers to print
 _HUGE = 1e300
 # of a list; of more the range is told
@@ -75,7 +78,7 @@ def describe_case(result: xr.Dataset) -> list[str]:
     the ratio of a machine without a drive.
     """
     case = resolved_case(result)
-    axes, units = _axes(result, case), _units(str(result.attrs.get("resolved_case", "")))
+    axes, units = _axes(result, case), _units_of(result, case)
     if "driven_mass" in case.get("body", {}):
         return _two_bodies(case, axes, units)
     if several_bodies(case):
@@ -112,10 +115,7 @@ def shown(pieces: list[str], look: Look) -> list[str]:
 def machine_pieces(result: xr.Dataset) -> list[str]:
     """Return what `describe_case` leaves out of the machine and its run, to six digits and with units."""
     case = resolved_case(result)
-    axes, units = _axes(result, case), _units(str(result.attrs.get("resolved_case", "")))
-    # a measured force is data, not parameters that the library knows the units of
-    turns = case.get("restoring", {}).get("law") == "pendulum"
-    units = {"drive.interval": "s", "drive.force[1]": "N m" if turns else "N"} | units
+    axes, units = _axes(result, case), _units_of(result, case)
     pieces = []
     several = several_bodies(case)
     for family in () if several else ("body", "restoring", "friction", "contact", "drive"):
@@ -163,6 +163,8 @@ def _law_pieces(case: dict, family: str, law: dict, axes: set[str], units: dict[
         if len(numbers) > _MOST_NUMBERS:
             shown = f": {len(numbers)} values from {min(numbers):.6g} to {max(numbers):.6g}"
         name = _FURTHER.get(path, key.replace("_", " "))
+        if path == "body.mass" and case.get("restoring", {}).get("law") == "pendulum":
+            name = "$J$"
         unit = units.get(f"{path}[1]" if isinstance(value, list) else path, "")
         texts.append(f"{name}{shown} {'' if unit == '1' else raised(unit)}".rstrip())
     law_name = str(law.get("law", "")).replace("_", " ")
@@ -177,6 +179,19 @@ def _law_pieces(case: dict, family: str, law: dict, axes: set[str], units: dict[
     return [", ".join([heading, *texts] if heading else texts)] if texts else []
 
 
+def _units_of(result: xr.Dataset, case: dict) -> dict[str, str]:
+    """Units of the parameters of a case; of a pendulum, whose position is an angle, those of a rotation."""
+    units = {
+        # without the library
+        "contact.stiffness": "N/m", "contact.damping": "N s/m", "friction.damping": "N s/m",
+        # a measured force is data, not parameters that the library knows the units of
+        "drive.interval": "s", "drive.force[1]": "N",
+    } | _units(str(result.attrs.get("resolved_case", "")))  # fmt: skip
+    if case.get("restoring", {}).get("law") == "pendulum":
+        units = {path: _OF_ROTATION.get(unit, unit) for path, unit in units.items()}
+    return units
+
+
 @functools.lru_cache(4)
 def _units(resolved: str) -> dict[str, str]:
     """Units of the parameters of a case, as the library knows them; without it, none."""
@@ -188,7 +203,7 @@ def _units(resolved: str) -> dict[str, str]:
 
 def raised(unit: str) -> str:
     """Return a unit with its powers raised."""
-    return re.sub(r"\^(-?[\d.]+)", lambda power: f"$^{{{power[1]}}}$", unit)
+    return re.sub(r"\^(-?[\d.]+|n)", lambda power: f"$^{{{power[1]}}}$", unit)
 
 
 def _two_bodies(case: dict, axes: set[str], units: dict[str, str]) -> list[str]:

@@ -13,10 +13,10 @@ from matplotlib.lines import Line2D
 
 from separatrix import style
 from separatrix.figures import pair
-from separatrix.figures.caption import describe_case, resolved_case, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Page
 from separatrix.labels import plain, unit
-from separatrix.layout import compose
 
 MOST_LOOPS = 8
 _LEAST_SAMPLES = 5
@@ -27,7 +27,7 @@ def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
 
     Of more contacts those with the most different speeds are shown.
     """
-    figure, axes = _panels(result, look)
+    page = _panels(result, look)
     found = contacts(result)
     speed_unit = unit(result["v"])
     speed, shown = look.factor(speed_unit), look.unit(speed_unit)
@@ -37,17 +37,17 @@ def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     handles = []
     for place, index in enumerate(order):
         colour = style.OKABE_ITO[place]
-        _draw(axes, found[index], colour, look.factor(unit(result["x"])), look.factor("s"))
-        label = f"{found[index][1] * speed:.3g} {shown}"
+        _draw(page.axes, found[index], colour, look.factor(unit(result["x"])), look.factor("s"))
+        label = f"impact at {found[index][1] * speed:.3g} {shown}"
         handles.append(Line2D([], [], color=colour, label=label))
-    caption = [f"{len(order)} of {len(found)} contacts, by impact speed", *describe_case(result)]
-    compose(figure, title, [*caption, plain(version_text(result))], handles, columns=max(1, len(handles)))
-    return figure
+    caption = [f"{len(order)} of {len(found)} contacts, by impact speed"]
+    caption += caption_pieces(result, look, describe_case(result))
+    return page.finish(title, [*caption, plain(version_text(result))], handles, columns=4)
 
 
 def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
     """Return the fastest contact of each trajectory over penetration and time, one colour for each."""
-    figure, axes = _panels(results[0], DEFAULT)
+    page = _panels(results[0], DEFAULT)
     handles, captions = [], []
     for place, result in enumerate(results):
         found = contacts(pair.relative_to_stop(result))
@@ -55,28 +55,27 @@ def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
             continue
         colour = style.OKABE_ITO[place % len(style.OKABE_ITO)]
         fastest = max(found, key=lambda item: item[1])
-        _draw(axes, fastest, colour)
+        _draw(page.axes, fastest, colour)
         law = resolved_case(result)["contact"]["law"].replace("_", " ")
         handles.append(Line2D([], [], color=colour, label=f"{law}, {fastest[1]:.3g} {unit(result['v'])}"))
         captions += describe_case(result)
-    compose(figure, title, [*captions, plain(version_text(results[0]))], handles, columns=2)
-    return figure
+    return page.finish(title, [*captions, plain(version_text(results[0]))], handles, columns=2)
 
 
-def _panels(result: xr.Dataset, look: Look) -> tuple[Figure, tuple[Axes, Axes]]:
-    figure = style.new_figure(style.DOUBLE_COLUMN, 68.0)
-    over_depth, over_time = figure.subplots(1, 2)
+def _panels(result: xr.Dataset, look: Look) -> Page:
+    page = Page(look, (style.DOUBLE_COLUMN, 68.0), 2, columns=2)
+    over_depth, over_time = page.axes
     over_depth.set_xlabel(f"penetration ({look.unit(unit(result['x']))})")
     over_time.set_xlabel(f"time since first touch ({look.unit('s')})")
-    for letter, ax in zip("ab", (over_depth, over_time), strict=True):
+    for ax in page.axes:
         ax.set_ylabel(f"force of the barrier ({unit(result['contact_force'])})")
         ax.axhline(0, color="#BBBBBB", linewidth=0.5, zorder=0)
-        ax.set_title(f"{letter})", loc="left")
-    return figure, (over_depth, over_time)
+    page.letter()
+    return page
 
 
 def _draw(
-    axes: tuple[Axes, Axes], contact: tuple, colour: str, of_depth: float = 1.0, of_time: float = 1.0
+    axes: Sequence[Axes], contact: tuple, colour: str, of_depth: float = 1.0, of_time: float = 1.0
 ) -> None:
     """Draw a contact from no force to no force, times these factors: jumps lie between that and its ends."""
     start, _, time, depth, force = contact

@@ -9,8 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.labels import axis_label
-from separatrix.layout import compose
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Page
+from separatrix.labels import axis_label, unit
 
 # variable, label, colour and opacity, from the bottom up
 _PARTS = (
@@ -22,10 +23,10 @@ _PARTS = (
 )
 
 
-def decomposition(result: xr.Dataset, title: str, caption: list[str]) -> Figure:
+def decomposition(result: xr.Dataset, title: str, caption: list[str], look: Look = DEFAULT) -> Figure:
     """Return the energy over time and, stacked on it, what was lost; the top is what was put in."""
-    figure = style.new_figure(style.DOUBLE_COLUMN, 62.0)
-    ax = figure.add_subplot()
+    page = Page(look, (style.DOUBLE_COLUMN, 62.0))
+    (ax,) = page.axes
     time = result["time"].values
     level = np.zeros_like(time)
     handles = []
@@ -41,9 +42,8 @@ def decomposition(result: xr.Dataset, title: str, caption: list[str]) -> Figure:
     handles.append(Line2D([], [], color="black", linewidth=0.8, label="energy at the start and work"))
     ax.set_xlim(time[0], time[-1])
     ax.set_xlabel(axis_label(result["time"]))
-    ax.set_ylabel("energy (J)")
-    # the book of a motion that was given up is not closed
+    ax.set_ylabel(f"energy ({unit(result['energy'])})")
+    # a motion that was given up has none
     missing = result.attrs.get("energy_closing_error")
-    closed = [] if missing is None else [f"missing at the end: {float(missing):.1e} J"]
-    compose(figure, title, [*closed, *caption], handles, columns=min(len(handles), 4))
-    return figure
+    closed = [] if missing is None else [f"error of the energy balance: {abs(float(missing)):.1e} J"]
+    return page.finish(title, [*closed, *caption], handles, columns=min(len(handles), 4))

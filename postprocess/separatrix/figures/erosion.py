@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures over a parameter: the erosion profile, with bands, births and deaths, and the branches above."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -11,10 +13,10 @@ from matplotlib.lines import Line2D
 from separatrix import style
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures import branches as branch_diagram
-from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Figures, Page
 from separatrix.labels import axis_label, plain, unit
-from separatrix.layout import compose
 from separatrix.open import decode_flags
 
 #: Labels of branches at which motions appear, vanish or lose their stability: drawn through all panels.
@@ -39,10 +41,10 @@ _WORDS = {
 
 def figures(
     result: xr.Dataset, title: str, look: Look = DEFAULT, branches: xr.Dataset | None = None
-) -> dict[str, Figure]:
+) -> Figures:
     """Return the figure of a file of measures by name."""
     look.require("file of measures", "region")
-    return {"erosion": diagram(result, title, look, branches)}
+    return Figures({"erosion": lambda: diagram(result, title, look, branches)})
 
 
 def diagram(
@@ -53,9 +55,8 @@ def diagram(
     dim = str(result.attrs["parameter"])
     names = [name for name in _WORDS if name in result]
     panels = len(names) + (branches is not None)
-    width, height = look.size or (style.DOUBLE_COLUMN, 34.0 * panels + 12.0)
-    figure = style.new_figure(width, height)
-    axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True))
+    page = Page(look, (style.DOUBLE_COLUMN, 34.0 * panels + 12.0), panels, sharex=True)
+    axes = page.axes
     handles: list[Line2D] = []
     if branches is not None:
         handles += _branches(axes, branches, dim)
@@ -66,15 +67,15 @@ def diagram(
     handles += _births(axes, result, dim)
     axes[-1].set_xlabel(axis_label(result[dim]))
     values = result[dim].values
-    axes[-1].set_xlim(values.min(), values.max()) if values.size > 1 else None
+    for ax in axes if values.size > 1 else ():
+        ax.set_xlim(values.min(), values.max())
     caption = [
         *caption_pieces(result, look, describe_case(result)),
         f"{values.size} values, {result.attrs['starts_a_value']} starts of the map at each; bands: the "
         f"interval of each measure",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), handles, columns=4)
-    return figure
+    return page.finish(title, caption, handles, columns=4)
 
 
 def _colours(result: xr.Dataset) -> dict[int, str]:
@@ -107,7 +108,7 @@ def _panel(ax: Axes, result: xr.Dataset, name: str, dim: str) -> None:
     ax.set_ylim(min(0.0, low), high)
 
 
-def _births(axes: np.ndarray, result: xr.Dataset, dim: str) -> list[Line2D]:
+def _births(axes: Sequence[Axes], result: xr.Dataset, dim: str) -> list[Line2D]:
     """Marks on the lower edge where an attractor appears or vanishes between two values."""
     exists, across = result["exists"].values, result[dim].values
     colours, drawn = _colours(result), False
@@ -125,7 +126,7 @@ def _births(axes: np.ndarray, result: xr.Dataset, dim: str) -> list[Line2D]:
     return [mark] if drawn else []
 
 
-def _branches(axes: np.ndarray, branches: xr.Dataset, dim: str) -> list[Line2D]:
+def _branches(axes: Sequence[Axes], branches: xr.Dataset, dim: str) -> list[Line2D]:
     """The diagram on top, and lines down from the points at which motions end."""
     over = str(branches.attrs["parameter"]).replace(".", "_")
     if over != dim:

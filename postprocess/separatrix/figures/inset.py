@@ -7,7 +7,6 @@ from dataclasses import replace
 import xarray as xr
 from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
 from separatrix.errors import USAGE, SeparatrixError
@@ -39,7 +38,7 @@ def enlarged(whole: xr.Dataset, axes: tuple[str | None, str], panels: int, look:
     return part
 
 
-def frame(figure: Figure, main: Axes, inset: Axes, part: xr.Dataset, axes: tuple[str, str]) -> None:
+def frame(main: Axes, inset: Axes, part: xr.Dataset, axes: tuple[str, str]) -> None:
     """Outline on the map what the inset shows and join the two; the ticks of the inset stand on the right."""
     (left, right), (low, high) = inset.get_xlim(), inset.get_ylim()
     halo = [patheffects.Stroke(linewidth=1.6, foreground="white"), patheffects.Normal()]
@@ -48,7 +47,7 @@ def frame(figure: Figure, main: Axes, inset: Axes, part: xr.Dataset, axes: tuple
     for height, corner in ((low, 0), (high, 1)):
         line = ConnectionPatch((right, height), (0, corner), main.transData, inset.transAxes, **looks)
         line.set_in_layout(False)
-        figure.add_artist(line)
+        main.figure.add_artist(line)
     inset.yaxis.tick_right()
     inset.yaxis.set_label_position("right")
     inset.set_xlabel(axis_label(part[axes[1]]))

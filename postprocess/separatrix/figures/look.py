@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 
 from separatrix.errors import USAGE, SeparatrixError
@@ -18,6 +19,10 @@ UNITS = {
     "ms": ("s", 1e-3), "us": ("s", 1e-6), "min": ("s", 60.0), "deg": ("rad", np.pi / 180),
 }  # fmt: skip
 CAPTIONS = ("full", "short", "none")
+_SERVED_BY_SOME = (
+    "region", "slice", "inset", "axes", "units", "shade", "colours", "colour_map", "limits", "crank_angle",
+    "transient",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,8 +50,14 @@ class Look:
     limits: tuple[float, float] | None = None
     #: width of the page and height of the axes [mm]
     size: tuple[float, float] | None = None
-    #: "full": all that is needed to repeat the run; "short": what differs; "none"
-    caption: str = "full"
+    #: "short": friction, contact, drive and counts; "full": all that is needed to repeat the run; "none"
+    caption: str = "short"
+    #: crank angle of a section [rad], the nearest sampled one is taken; unless given that of the start
+    crank_angle: float | None = None
+    #: drive periods that are discarded before a section; unless given half of the motion
+    transient: float | None = None
+    #: the axes of matplotlib to draw into, as many as the figure has panels
+    ax: Axes | Sequence[Axes] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn."""
@@ -65,6 +76,12 @@ class Look:
                 raise SeparatrixError(f"colours: found '{colour}', which is no colour", USAGE)
         if self.caption not in CAPTIONS:
             raise SeparatrixError(f"caption: found '{self.caption}', allowed {', '.join(CAPTIONS)}", USAGE)
+        given = () if self.ax is None else np.asarray(self.ax, object).ravel()
+        object.__setattr__(self, "ax", tuple(given))
+        if not all(isinstance(one, Axes) for one in self.ax):
+            raise SeparatrixError(f"ax: found {self.ax[0]!r}, allowed axes of matplotlib", USAGE)
+        if self.ax and self.size is not None:
+            raise SeparatrixError("size: the axes given by ax have one", USAGE)
         if self.size is not None and not all(10 <= length <= 1000 for length in self.size):
             raise SeparatrixError(f"size: found {self.size}, allowed 10 to 1000 mm", USAGE)
 
@@ -75,7 +92,7 @@ class Look:
 
     def require(self, kind: str, *served: str) -> None:
         """Refuse wishes that the figures of a kind do not serve."""
-        for name in ("region", "slice", "inset", "axes", "units", "shade", "colours", "colour_map", "limits"):
+        for name in _SERVED_BY_SOME:
             if getattr(self, name) and name not in served:
                 raise SeparatrixError(
                     f"{name.replace('_', ' ')}: not served by the figures of a {kind}", USAGE
@@ -113,7 +130,7 @@ class Look:
         for name in self.units:
             si, worth = UNITS[name]
             for key, variable in list(result.variables.items()):
-                if variable.attrs.get("units") != si or str(key).startswith(("catalogue_", "limits_")):
+                if variable.attrs.get("units") != si or str(key).startswith("catalogue_"):
                     continue
                 changed = (variable.dims, variable.values / worth, {**variable.attrs, "units": name})
                 result = (

@@ -10,10 +10,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.figures.caption import describe_case, resolved_case, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Page
 from separatrix.given_up import given_up_text, left_text, reason_of
 from separatrix.labels import axis_label, flag_text, plain, unit
-from separatrix.layout import compose
 from separatrix.open import flag_names
 
 DRIVER = "#555555"
@@ -21,13 +22,13 @@ DRIVER = "#555555"
 BANDS = {"stick": "#E3E3E3", "upper_barrier": "#C9E4DA", "lower_barrier": "#E6DCC4", "held": "#D6D3EA"}
 
 
-def history(result: xr.Dataset, title: str) -> Figure:
+def history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return both positions over time, and their difference, with the modes shaded.
 
     Where the stop is fixed to the ground the second panel is the distance from it.
     """
-    figure = style.new_figure(style.DOUBLE_COLUMN, 100.0)
-    both, apart = figure.subplots(2, 1, sharex=True)
+    page = Page(look, (style.DOUBLE_COLUMN, 100.0), 2, sharex=True)
+    both, apart = page.axes
     time, driven, driver = (result[name].values for name in ("time", "x", "driver_x"))
     both.plot(time, driver, color=DRIVER, linewidth=0.8, linestyle=(0, (4, 2)))
     both.plot(time, driven, color=style.MOTION)
@@ -40,19 +41,18 @@ def history(result: xr.Dataset, title: str) -> Figure:
         for place in places:
             ax.axhline(place, color=style.BARRIER, linewidth=1.2, zorder=1)
     apart.set_xlabel(axis_label(result["time"]))
-    both.set_xlim(time[0], time[-1])
     shaded = set()
-    for letter, ax in zip("ab", (both, apart), strict=True):
+    for ax in page.axes:
+        ax.set_xlim(time[0], time[-1])
         shaded |= shade_modes(ax, result)
-        ax.set_title(f"{letter})", loc="left")
+    page.letter()
     handles = [
         Line2D([], [], color=style.MOTION, label="driven body"),
         Line2D([], [], color=DRIVER, linewidth=0.8, linestyle=(0, (4, 2)), label="driving body"),
         *([Line2D([], [], color=style.BARRIER, linewidth=1.2, label="barrier")] if _stops(result) else []),
         *(Patch(color=BANDS[mode], label=flag_text(mode)) for mode in BANDS if mode in shaded),
     ]
-    compose(figure, title, caption(result), handles, columns=min(len(handles), 5))
-    return figure
+    return page.finish(title, caption(result, look), handles, columns=min(len(handles), 5))
 
 
 def shade_modes(ax: Axes, result: xr.Dataset) -> set[str]:
@@ -116,10 +116,10 @@ def relative_to_stop(result: xr.Dataset) -> xr.Dataset:
     return seen
 
 
-def caption(result: xr.Dataset) -> list[str]:
+def caption(result: xr.Dataset, look: Look) -> list[str]:
     """Return the bodies, their regime, and the version of the program."""
     return [
-        *describe_case(result),
+        *caption_pieces(result, look, describe_case(result)),
         _ending(result),
         plain(version_text(result)),
     ]

@@ -9,20 +9,21 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.figures.caption import describe_case, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, version_text
+from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Page
 from separatrix.figures.regions import brackets, limit_texts
-from separatrix.labels import axis_label, flag_text, plain
-from separatrix.layout import compose
+from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.open import flag_names, table
 
 _COLOURS = {0: style.RUN_UP, 1: style.RUN_DOWN}
 _NAMES = {0: "run-up", 1: "run-down"}
 
 
-def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
+def regimes(result: xr.Dataset, name: str, title: str, look: Look = DEFAULT) -> Figure:
     """Return the largest and the stroboscopic velocities of the driven body, with the regimes as bands."""
-    figure = style.new_figure(style.DOUBLE_COLUMN, 105.0)
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    page = Page(look, (style.DOUBLE_COLUMN, 105.0), 2, sharex=True, height_ratios=(3, 2))
+    top, bottom = page.axes
     values = result[name].values
     handles = []
     for place, code in enumerate(result["direction"].values):
@@ -47,15 +48,16 @@ def regimes(result: xr.Dataset, name: str, title: str) -> Figure:
             ax.axvspan(lower, upper, color=style.REGIMES[regime], alpha=0.18, linewidth=0, zorder=0)
     seen = dict.fromkeys(regime for _, _, regime in edges)
     handles += [Patch(color=style.REGIMES[regime], alpha=0.18, label=flag_text(regime)) for regime in seen]
-    top.set_ylabel("largest velocity\nof the driven body (m/s)")
-    bottom.set_ylabel("velocity (m/s)\nonce per drive period")
+    speed = unit(result["v_max"])
+    top.set_ylabel(f"largest velocity\nof the driven body ({speed})")
+    bottom.set_ylabel(f"velocity ({speed})\nonce per drive period")
     bottom.set_xlabel(axis_label(result[name]))
-    top.set_xlim(values.min(), values.max())
-    for letter, ax in zip("ab", (top, bottom), strict=True):
-        ax.set_title(f"{letter})", loc="left")
-    caption = [*describe_case(result), *_limits_caption(result), plain(version_text(result))]
-    compose(figure, title, caption, handles, columns=min(5, len(handles)))
-    return figure
+    for ax in page.axes:
+        ax.set_xlim(values.min(), values.max())
+    page.letter()
+    pieces = caption_pieces(result, look, describe_case(result))
+    caption = [*pieces, *_limits_caption(result), plain(version_text(result))]
+    return page.finish(title, caption, handles, columns=min(5, len(handles)))
 
 
 def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:

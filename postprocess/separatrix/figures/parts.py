@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Set
 _JOINTS = ("spring", "friction", "contact")
 # 0 unless the case says otherwise, so not mentioned where they are 0
 _ZERO = (
-    "load", "x0", "v0", "quadratic", "cubic", "damping", "damping_ratios", "free_length", "velocity",
-    "tension", "mean", "amplitude", "angle",
+    "load", "x0", "v0", "quadratic", "cubic", "modulation", "damping", "damping_ratios", "free_length",
+    "velocity", "tension", "mean", "amplitude", "angle",
 )  # fmt: skip
 # numbers of a list beyond which a caption only counts them
 _LONGEST = 16

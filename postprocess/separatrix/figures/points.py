@@ -10,19 +10,19 @@ from matplotlib.ticker import MaxNLocator
 
 from separatrix import style
 from separatrix.classes import class_counts, classes
-from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Figures, Page
 from separatrix.labels import axis_label, count_text, plain, share_texts
-from separatrix.layout import compose
 
 # a second cue beside colour
 _MARKERS = "osD^vP*X"
 
 
-def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure of a points file by name."""
     look.require("list of points", "units")
-    return {"regime": scatter(look.selected(result), title, look)}
+    return Figures({"regime": lambda: scatter(look.selected(result), title, look)})
 
 
 def scatter_axes(result: xr.Dataset) -> tuple[str, str]:
@@ -42,8 +42,8 @@ def scatter(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     shares = share_texts(class_counts(entries, counts))
     size = float(np.clip(400.0 / np.sqrt(codes.size), 0.5, 14.0))
 
-    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 65.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.SINGLE_COLUMN, 65.0))
+    (ax,) = page.axes
     handles = []
     for entry, share, marker in zip(entries, shares, _MARKERS, strict=False):
         chosen = np.isin(codes, entry.codes)
@@ -68,5 +68,4 @@ def scatter(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         f"$N$ = {count_text(codes.size)} points",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), handles)
-    return figure
+    return page.finish(title, caption, handles)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 
+from separatrix.labels import unit
 from separatrix.open import flag_names
 
 _IMPACTING = {"impact", "mixed", "chattering"}
@@ -50,8 +51,9 @@ def brackets(limits: xr.Dataset, *, in_steps: bool = False) -> np.ndarray:
 def limit_texts(limits: xr.Dataset) -> list[str]:
     """Return each limit as text, with how it is known where that is in steps only."""
     known = np.isfinite(limits["lower"].values + limits["upper"].values) if "lower" in limits else []
+    shown = f" {unit(limits['lower'])}".rstrip() if "lower" in limits else ""
     return [
-        f"{'' if settled else 'in steps '}{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}"
+        f"{'' if settled else 'in steps '}{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}{shown}"
         for name, (lower, upper), settled in zip(
             limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
         )

@@ -10,10 +10,10 @@ from matplotlib.patches import Patch
 from separatrix import style
 from separatrix.classes import classes, recoloured
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures.caption import caption_pieces, describe_case, shown, start_pieces, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, start_pieces, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Page
 from separatrix.labels import axis_label, count_text, plain
-from separatrix.layout import compose
 from separatrix.open import table
 from separatrix.variables import is_start
 
@@ -34,8 +34,8 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     totals = dict(zip(codes.tolist(), numbers.tolist(), strict=True))
     entries = recoloured(classes(result, "attractor", totals), look.colours)
     parts = [np.isin(slices, entry.codes).mean(axis=1) for entry in entries]
-    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 50.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.SINGLE_COLUMN, 50.0))
+    (ax,) = page.axes
     values = result[name].values
     below = np.zeros(values.size)
     for entry, part in zip(entries, parts, strict=True):
@@ -57,8 +57,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         f"{count_text(slices.shape[1])} starts at each of {values.size} values",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), handles)
-    return figure
+    return page.finish(title, caption, handles)
 
 
 def sampled(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
@@ -74,8 +73,8 @@ def sampled(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     totals = dict(zip(codes.tolist(), numbers.tolist(), strict=True))
     entries = recoloured(classes(result, "attractor", totals), look.colours)
     places = result[varying[0]].values if varying else np.array([0.0])
-    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 50.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.SINGLE_COLUMN, 50.0))
+    (ax,) = page.axes
     columns = {
         name: catalogue[name].values for name in ("slice", "attractor", "share", "share_lower", "share_upper")
     }
@@ -107,5 +106,4 @@ def sampled(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         f"{', '.join(plain(name) for name in drawn)}; bars: 95 % confidence",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), handles)
-    return figure
+    return page.finish(title, caption, handles)

@@ -6,22 +6,22 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from separatrix import style
-from separatrix.figures.caption import caption_pieces, describe_case, shown, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, version_text
 from separatrix.figures.look import DEFAULT, Look
+from separatrix.figures.page import Figures, Page
 from separatrix.labels import axis_label, plain
-from separatrix.layout import compose
 
 
-def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure by name."""
     look.require("survival under blows")
-    return {"survival": diagram(result, title, look)}
+    return Figures({"survival": lambda: diagram(result, title, look)})
 
 
 def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the share over the time with its band, and the law with its own."""
-    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 55.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.SINGLE_COLUMN, 55.0))
+    (ax,) = page.axes
     time = result["time"].values
     lines = []
     for name, colour, text in (
@@ -42,5 +42,4 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         f"standard deviation {about['deviation']:.4g} m/s, p = {about['p']:.4g}; bands: 95 % confidence",
         plain(version_text(result)),
     ]
-    compose(figure, title, shown(caption, look), lines)
-    return figure
+    return page.finish(title, caption, lines)

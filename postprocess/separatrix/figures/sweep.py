@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sweeps: amplitude-frequency diagram with its regions, bifurcation diagram with impact speeds."""
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -11,27 +13,33 @@ from matplotlib.patches import Patch
 
 from separatrix import style
 from separatrix.figures import pair_sweep
-from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
+from separatrix.figures.page import Figures, Page
 from separatrix.figures.regions import Boundary, Region, boundaries, limit_texts, regions
 from separatrix.labels import axis_label, count_text, plain, unit
-from separatrix.layout import compose
 from separatrix.open import table
 
 _UP, _DOWN = 0, 1
+# sizes of the texts above the axes, which are so many points apart
+_NAME, _VALUE = 7.0, 6.0
+# in mm: limits so close have their values turned, axes so narrow no room beside turned values
+_CLOSE, _NARROW = 6.8, 100.0
 _NOT_RUN = 0
 
 
-def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figures of a sweep file by name."""
-    if "driven_mass" in resolved_case(result).get("body", {}):
-        return {"regimes": pair_sweep.regimes(result, swept_axis(result), title)}
     look.require("sweep", "region", "units")
     result = look.selected(result)
-    return {
-        "amplitude": amplitude_diagram(result, title, look),
-        "bifurcation": bifurcation_diagram(result, title, look),
-    }
+    if "driven_mass" in resolved_case(result).get("body", {}):
+        return Figures({"regimes": partial(pair_sweep.regimes, result, swept_axis(result), title, look)})
+    return Figures(
+        {
+            "amplitude": partial(amplitude_diagram, result, title, look),
+            "bifurcation": partial(bifurcation_diagram, result, title, look),
+        }
+    )
 
 
 def swept_axis(result: xr.Dataset) -> str:
@@ -42,8 +50,8 @@ def swept_axis(result: xr.Dataset) -> str:
 def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return extreme positions against the swept parameter, both runs, with the regions of motion."""
     name = swept_axis(result)
-    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 85.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.DOUBLE_COLUMN, 85.0))
+    (ax,) = page.axes
     handles = _draw_branches(ax, result, name)
     handles += _draw_runs(ax, result, name)
     handles += _draw_barriers(ax, result)
@@ -51,15 +59,14 @@ def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> F
     ax.set_xlabel(axis_label(result[name]))
     ax.set_ylabel(rf"extreme positions $x_\mathrm{{max}}$, $x_\mathrm{{min}}$ ({unit(result['x_max'])})")
     caption = [*_caption(result, name, look), *_limits_caption(result), plain(version_text(result))]
-    compose(figure, title, shown(caption, look), handles, columns=5)
-    return figure
+    return page.finish(title, caption, handles, columns=5)
 
 
 def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return stroboscopic positions and mean impact speeds against the swept parameter."""
     name = swept_axis(result)
-    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 105.0)))
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    page = Page(look, (style.DOUBLE_COLUMN, 105.0), 2, sharex=True, height_ratios=(3, 2))
+    top, bottom = page.axes
     values = result[name].values
     strobe = result["strobe_x"].transpose("direction", name, "sample").values
     speed = result["mean_impact_speed"].transpose("direction", name).values
@@ -76,9 +83,9 @@ def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) ->
     bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
     bottom.set_xlabel(axis_label(result[name]))
     bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
-    top.set_xlim(values.min(), values.max())
-    for letter, ax in zip("ab", (top, bottom), strict=True):
-        ax.set_title(f"{letter})", loc="left")
+    for ax in page.axes:
+        ax.set_xlim(values.min(), values.max())
+    page.letter()
     caption = [
         f"last {result.sizes['sample']} stroboscopic points of each hold",
         *_caption(result, name, look),
@@ -86,8 +93,7 @@ def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) ->
     caption.append(plain(version_text(result)))
     dots = [_dot(colour, ("run-up", "run-down")[code]) for code, colour in colours.items()]
     dots += [_dot(style.BOTH_RUNS, "both alike")] if agree.any() else []
-    compose(figure, title, shown(caption, look), [*dots, *_barrier_handles(result)], columns=4)
-    return figure
+    return page.finish(title, caption, [*dots, *_barrier_handles(result)], columns=4)
 
 
 def _dot(colour: str, label: str) -> Line2D:
@@ -201,14 +207,19 @@ def _draw_regions(ax: Axes, result: xr.Dataset, name: str) -> list[Patch]:
     """Draw the bracketed limits as vertical lines and name the regions between them."""
     lines = boundaries(table(result, "limits"))
     low, high = ax.get_xlim()
+    scale = ax.get_window_extent().width / ax.figure.dpi * 25.4 / (high - low)
     for line in lines:
         ax.axvspan(line.lower, line.upper, color="#999999", alpha=0.35, linewidth=0, zorder=0)
         ax.axvline(line.middle, color="black", linewidth=0.7, zorder=2)
+    gaps = []
+    for line in lines:
+        others = [other.middle - line.middle for other in lines if other is not line]
+        gaps.append(scale * min(others, key=abs, default=high - low))
+        _name_limit(ax, line, gaps[-1])
+    # names in narrow axes stand above turned values
+    height = 22.0 if scale * (high - low) < _NARROW and min(map(abs, gaps), default=_CLOSE) < _CLOSE else 10.0
     for region in regions(result, name, lines):
-        _name_region(ax, region, (region.upper - region.lower) / (high - low))
-    for place, line in enumerate(lines):
-        gaps = [other.middle - line.middle for k, other in enumerate(lines) if k != place]
-        _name_limit(ax, line, min(gaps, key=abs, default=high - low) / (high - low))
+        _name_region(ax, region, scale * (region.upper - region.lower), height)
     if not lines:
         return []
     return [Line2D([], [], color="black", linewidth=0.7, label="limit of a region")]
@@ -217,26 +228,27 @@ def _draw_regions(ax: Axes, result: xr.Dataset, name: str) -> list[Patch]:
 def _name_limit(ax: Axes, line: Boundary, gap: float) -> None:
     """Write the value of a limit above it, with as many digits as its bracket is worth.
 
-    `gap` is the way to the nearest limit as a share of the axis; two close ones are turned and moved apart.
+    `gap` is the way to the nearest limit in mm; two close ones are turned and moved apart.
     """
     digits = int(np.clip(-np.floor(np.log10(max(line.upper - line.lower, 1e-6))), 0, 6))
     text = f"{line.middle:.{digits}f}"
-    if abs(gap) > 0.05:
-        _write_above(ax, line.middle, text, (0.0, 2.0), fontsize=6.0)
+    if abs(gap) > _CLOSE:
+        _write_above(ax, line.middle, text, (0.0, 2.0), fontsize=_VALUE)
     else:
-        _write_above(ax, line.middle, text, (-2.0 if gap > 0 else 5.0, 2.0), rotation=60, fontsize=6.0)
+        _write_above(ax, line.middle, text, (-2.0 if gap > 0 else 5.0, 2.0), rotation=60, fontsize=_VALUE)
 
 
-def _name_region(ax: Axes, region: Region, share: float) -> None:
-    if share < 0.01:
+def _name_region(ax: Axes, region: Region, width: float, height: float) -> None:
+    """Write the name of a region that is so many mm wide above it, `height` points up, if there is room."""
+    if width < 1.4:
         return
     centre = (region.lower + region.upper) / 2
-    if share > 0.08:
-        text = region.text if share > 0.14 else region.text.replace(" ", "\n")
-        _write_above(ax, centre, text, (0.0, 10.0))
+    if width > 11.0:
+        text = region.text if width > 19.0 else region.text.replace(" ", "\n")
+        _write_above(ax, centre, text, (0.0, height), fontsize=_NAME)
     else:
         # beyond the turned values of the limits on both sides
-        _write_above(ax, centre, region.text.replace(" ", "\n"), (13.0, 22.0), rotation=60)
+        _write_above(ax, centre, region.text.replace(" ", "\n"), (13.0, 22.0), rotation=60, fontsize=_NAME)
 
 
 def _write_above(

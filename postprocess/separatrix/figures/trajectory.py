@@ -3,6 +3,7 @@
 """One motion: its history in time and its phase portrait when it is steady."""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,12 +14,12 @@ from matplotlib.lines import Line2D
 
 from separatrix import style
 from separatrix.errors import SeparatrixError
-from separatrix.figures import contact, energy, impacts, pair
-from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, shown, version_text
+from separatrix.figures import contact, energy, impacts, pair, stroboscopic
+from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
+from separatrix.figures.page import Figures, Page
 from separatrix.given_up import given_up_text, left_text, reason_of
 from separatrix.labels import axis_label, flag_text, plain, unit
-from separatrix.layout import compose
 from separatrix.open import flag_names
 
 ZOOM_PERIODS = 5
@@ -35,25 +36,27 @@ _NUMBERS = {
 _JUMPS = {"impact_upper", "impact_lower", "chatter_upper", "chatter_lower"}
 
 
-def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> dict[str, Figure]:
-    """Return the figures of a trajectory file by name."""
-    look.require("trajectory", "units")
+def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
+    """Return the figures of a trajectory file by name; the section of a short motion on request alone."""
+    look.require("trajectory", "units", "crank_angle", "transient")
     if result.sizes["time"] <= 1:
         raise SeparatrixError(f"found {result.sizes['time']} samples, a figure needs two or more")
     given, result = result, _in_units(result, look)
+    seen = pair.relative_to_stop(result)
     two_bodies = "driver_x" in result
-    made = {"history": pair.history(result, title) if two_bodies else time_history(result, title, look)}
+    caption = pair.caption(result, look) if two_bodies else _caption(result, look)
+    made = {"history": partial(pair.history if two_bodies else time_history, result, title, look)}
     # files of earlier versions have no energies of one body
     if "kinetic_energy" in result:
-        caption = pair.caption(result) if two_bodies else _caption(result, look)
-        made["energy"] = energy.decomposition(result, title, shown(caption, look))
+        made["energy"] = partial(energy.decomposition, result, title, caption, look)
     if "contact_force" in result:
-        made["contact"] = contact.loops(pair.relative_to_stop(given), title, look)
-    seen = pair.relative_to_stop(result)
-    struck = impacts.section(seen, title, look)
-    if struck is not None:
-        made["impacts"] = struck
-    return {**made, "phase": phase_portrait(seen, title, look)}
+        made["contact"] = lambda: contact.loops(pair.relative_to_stop(given), title, look)
+    if impacts.settled(seen).sum() >= impacts.FEWEST:
+        made["impacts"] = partial(impacts.section, seen, title, look)
+    made["phase"] = partial(phase_portrait, seen, title, look)
+    periods = stroboscopic.periods(seen)
+    section = {"section": partial(stroboscopic.section, seen, title, look)} if periods >= 1 else {}
+    return Figures(made | section if periods >= stroboscopic.LONG else made, section)
 
 
 def _in_units(result: xr.Dataset, look: Look) -> xr.Dataset:
@@ -69,8 +72,8 @@ def _in_units(result: xr.Dataset, look: Look) -> xr.Dataset:
 
 def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the position during the whole run and, enlarged, during the last periods."""
-    figure = style.new_figure(*(look.size or (style.DOUBLE_COLUMN, 100.0)))
-    whole, zoom = figure.subplots(2, 1)
+    page = Page(look, (style.DOUBLE_COLUMN, 100.0), 2)
+    whole, zoom = page.axes
     time, position = result["time"].values, result["x"].values
     whole.plot(*_envelope(time, position), color=style.MOTION, linewidth=0.7)
     end = _end(result, look)
@@ -93,10 +96,10 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
         )
     zoom.set_xlim(start, end)
     marked = False
-    for letter, ax in zip("ab", (whole, zoom), strict=True):
+    page.letter()
+    for ax in (whole, zoom):
         _draw_barriers(ax.axhline, result)
         marked |= _mark_impacts(ax, result)
-        ax.set_title(f"{letter})", loc="left")
         ax.set_xlabel(axis_label(result["time"]))
         ax.set_ylabel(axis_label(result["x"]))
     handles = [
@@ -113,8 +116,7 @@ def time_history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure
             Line2D([], [], linestyle="", marker="v", markersize=2.5, color=style.IMPACT, label="impact")
         )
     caption = [f"b) the last {_zoom_text(result, end - start)}", *_caption(result, look)]
-    compose(figure, title, shown(caption, look), handles, columns=4)
-    return figure
+    return page.finish(title, caption, handles, columns=4)
 
 
 def _zoom_text(result: xr.Dataset, length: float) -> str:
@@ -150,8 +152,8 @@ def phase_portrait(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figu
 
     A body that stands still then is shown from its start.
     """
-    figure = style.new_figure(*(look.size or (style.SINGLE_COLUMN, 68.0)))
-    ax = figure.add_subplot()
+    page = Page(look, (style.SINGLE_COLUMN, 68.0))
+    (ax,) = page.axes
     window = float(result.attrs["window"])
     start = float(result["time"].values[-1]) - window
     window_text = f"last {window:g} {unit(result['time'])}"
@@ -170,8 +172,7 @@ def phase_portrait(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figu
     handles = [Line2D([], [], color=style.MOTION, linewidth=0.8, label="motion"), *_barrier_handle(result)]
     if jumps:
         handles.append(Line2D([], [], color=style.IMPACT, linewidth=0.8, label="impact"))
-    compose(figure, title, shown([window_text, *_caption(result, look)], look), handles, columns=3)
-    return figure
+    return page.finish(title, [window_text, *_caption(result, look)], handles, columns=3)
 
 
 def steady_path(result: xr.Dataset, start: float) -> tuple[np.ndarray, np.ndarray, list[tuple]]:
@@ -279,7 +280,8 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
         if not attributes.get("driven", 1):
             windows = attributes["window"] / attributes["drive_period"]
             impacts = attributes.get("impacts", round(attributes["impacts_per_period"] * windows))
-            rate = f"{impacts} impacts in {attributes['window']:.4g} s"
+            several = "impact" if impacts == 1 else "impacts"
+            rate = f"{impacts} {several} in {attributes['window']:.4g} {unit(result['time'])}"
         pieces.append(f"{rate}, their mean speed {attributes['mean_impact_speed']:.4g} {unit(result['v'])}")
     return [*pieces, plain(version_text(result))]
 

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.palette import of_attractors
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION
 from separatrix.view.packing import clean
@@ -133,6 +134,7 @@ class ResultFile:
             "axes": axes,
             "variables": self.variables,
             "catalogue": catalogue,
+            "colours": self._colours(entries),
             "points": int(np.prod(self.shape, dtype=np.int64)) if self.shape else 0,
             "machine": self.machine(),
             "attributes": {
@@ -140,6 +142,14 @@ class ResultFile:
             },
         }
         return clean(description)
+
+    def _colours(self, catalogue: dict[str, list]) -> dict[int, str]:
+        """Return the colours of the attractors by number, which are those of figures of the whole map."""
+        points: dict[int, int] = {}
+        numbers = catalogue.get("attractor", [])
+        for number, count in zip(numbers, catalogue.get("count", [0] * len(numbers)), strict=True):
+            points[number] = points.get(number, 0) + count
+        return of_attractors(points, max(points, default=0))
 
     def machine(self) -> dict:
         """Return the tables of the case that say what to draw."""

@@ -32,7 +32,7 @@ class Parameters:
             return default
         digits = (text or "").removeprefix("-")
         if not (digits.isascii() and digits.isdigit() and len(digits) <= 12 and low <= int(text) <= high):
-            raise RefusedError(f"{name}: found {shown(text)}, allowed is a whole number from {low} to {high}")
+            raise RefusedError(f"{name}: found {shown(text)}, allowed a whole number from {low} to {high}")
         return int(text)
 
     def real(self, name: str, default: float | None = None) -> float:
@@ -45,7 +45,7 @@ class Parameters:
         except ValueError:
             value = math.nan
         if not abs(value) <= _LARGEST:
-            raise RefusedError(f"{name}: found {shown(text)}, allowed is a finite number")
+            raise RefusedError(f"{name}: found {shown(text)}, allowed a finite number")
         return value
 
     def changes(self) -> dict[str, float]:

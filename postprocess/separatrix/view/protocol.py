@@ -15,6 +15,7 @@ import numpy as np
 
 from separatrix.errors import SeparatrixError
 from separatrix.library import CaseError
+from separatrix.palette import for_page
 from separatrix.view import live
 from separatrix.view.files import ResultFile
 from separatrix.view.keep import keep_file
@@ -94,7 +95,7 @@ class Desk:
         """Return the file that a request is about."""
         found = self.files[parameters.whole("file", 0, len(self.files) - 1, 0)]
         if kind and found.kind != kind:
-            raise RefusedError(f"file: holds {found.kind}, allowed is {kind}")
+            raise RefusedError(f"file: holds {found.kind}, allowed {kind}")
         return found
 
     def place(self, source: ResultFile, parameters: Parameters) -> tuple[int, int, tuple[int, ...]]:
@@ -160,7 +161,7 @@ class Desk:
 
 
 def describe(desk: Desk, _: Parameters) -> bytes:
-    """All files, and what the codes mean."""
+    """All files, what the codes mean, and the colours."""
     described = []
     for source in desk.files:
         one = source.describe()
@@ -171,7 +172,8 @@ def describe(desk: Desk, _: Parameters) -> bytes:
             one["no_motions"] = str(error)
         described.append(one)
     codes = {"events": EVENTS, "regimes": REGIMES, "reasons": REASONS}
-    return pack({"version": PROTOCOL_VERSION, "files": described, "keeps": desk.folder is not None, **codes})
+    about = {"version": PROTOCOL_VERSION, "keeps": desk.folder is not None, "palette": for_page()}
+    return pack({**about, "files": described, **codes})
 
 
 def tile(desk: Desk, parameters: Parameters) -> bytes:

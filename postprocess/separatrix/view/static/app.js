@@ -13,7 +13,7 @@ import { LiveLayer } from "./live.js";
 import { marksOf } from "./marks.js";
 import { MapView, axisLabel, valueAt } from "./mapview.js";
 import { MotionPanel, units } from "./motion.js";
-import { Painter, rangeOf } from "./palette.js";
+import { PALETTE, Painter, rangeOf } from "./palette.js";
 import { PointsPanel, SweepPanel } from "./series.js";
 import { Starter, asMotion } from "./starter.js";
 import { Tiles } from "./tiles.js";
@@ -53,6 +53,7 @@ class Viewer {
 
   async start() {
     this.described = await this.transport.ask("describe");
+    Object.assign(PALETTE, this.described.palette);
     const { files } = this.described;
     this.maps = files.map((file, index) => ({ ...file, index })).filter((file) => file.kind === "basin");
     this.panel = new MotionPanel(this.described, this.transport.live ? (what) => this.starter.download(what) : null);
@@ -263,6 +264,9 @@ class Viewer {
     return this.hidden.get(key);
   }
 
+  /** Colours of the classes of the variable that have one of their own. */
+  get own() { return { attractor: this.file.colours, regime: PALETTE.regimes }[this.variable.name]; }
+
   /** New colours: of classes, or over the range of the numbers. */
   paint() {
     const { map, variable } = this;
@@ -271,13 +275,13 @@ class Viewer {
     const shade = map.slow ? this.settling(map.slow.overview()) : null;
     this.shaded = Boolean(shade);
     const options = variable.classes ? {} : rangeOf(overview);
-    map.painter = new Painter({ classes: variable.classes, offset, hidden: this.hiddenNow, mix: this.checks.mix.checked, shade, ...options });
+    map.painter = new Painter({ classes: variable.classes, offset, own: this.own, hidden: this.hiddenNow, mix: this.checks.mix.checked, shade, ...options });
     map.classOf = variable.name === "event_word" ? (word) => wordClass(this.names, word) : null;
     if (variable.name === "attractor") fill(this.legend);
     else if (variable.classes) {
       const values = map.tiles.classesSeen();
       const names = variable.name === "period" ? Object.fromEntries(values.map((v) => [v, v ? `period ${v}` : "no known period"])) : this.names;
-      fill(this.legend, classLegend({ values, names, offset, hidden: this.hiddenNow, toggle: (value, alone) => this.toggle(value, alone, values) }));
+      fill(this.legend, classLegend({ values, names, offset, own: this.own, hidden: this.hiddenNow, toggle: (value, alone) => this.toggle(value, alone, values) }));
     } else if (overview.length) fill(this.legend, scaleLegend(map.painter, words(variable.name), variable.unit));
     map.draw();
   }
@@ -335,7 +339,7 @@ class Viewer {
     const hidden = this.variable.name === "attractor" ? this.hiddenNow : new Set();
     const labels = [...known.map((one) => one.attractor), 0];
     fill(this.table, ...(known.length ? attractorTable({
-      entries: known, total: this.fromFile ? this.total : 0, unlabelled: this.fromFile ? this.total - counted : 0, hidden,
+      entries: known, total: this.fromFile ? this.total : 0, unlabelled: this.fromFile ? this.total - counted : 0, own: this.file.colours, hidden,
       regimes: this.described.regimes, fromFile: this.fromFile, unit: units(this.file.machine)[0], toggle: (label, alone) => { if (this.variable.name === "attractor") this.toggle(label, alone, labels); },
     }) : [h("p", { class: "note" }, "No attractors are listed for this picture.")]));
     const shares = known.filter((one) => one.count).map((one) => `${describeAttractor(one, this.described.regimes)}: ${((100 * one.count) / this.total).toFixed(1)} %`).join("; ");

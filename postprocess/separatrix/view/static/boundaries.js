@@ -5,13 +5,13 @@
 import { fill, h, number, words } from "./dom.js";
 import { wordText } from "./legend.js";
 import { indexOf } from "./mapview.js";
+import { PALETTE } from "./palette.js";
 
-// What a curve leads to: text, colour, dashes.
+// What a curve leads to: text and dashes; its colour is in the palette.
 const LINES = {
-  stable_set: ["stable set of a saddle", "#000000", []], recurrent: ["recurrent edge state", "#0072B2", []],
-  graze: ["edge of a graze", "#D55E00", [6, 3]], stick: ["rim of a stick set", "#117733", [6, 3]],
-  chatter: ["edge of a completed chatter", "#882255", [6, 3]], other_event: ["edge at another event", "#AA4499", [6, 3]],
-  not_known: ["leads to what is not known", "#404040", [6, 3, 1, 3]], edge: ["edge of what is not known", "#555555", [2, 3]],
+  stable_set: ["stable set of a saddle", []], recurrent: ["recurrent edge state", []], graze: ["edge of a graze", [6, 3]],
+  stick: ["rim of a stick set", [6, 3]], chatter: ["edge of a completed chatter", [6, 3]], other_event: ["edge at another event", [6, 3]],
+  not_known: ["leads to what is not known", [6, 3, 1, 3]], edge: ["edge of what is not known", [2, 3]],
 };
 
 export class BoundaryPanel {
@@ -34,7 +34,7 @@ export class BoundaryPanel {
   legend() {
     const names = new Set(Array.from(this.answer.arrays.first, (_, piece) => this.nameOf(piece)));
     const entries = [...names].filter((name) => name in LINES).map((name) => {
-      const [text, colour, dashes] = LINES[name], box = h("span", { class: "line", "aria-hidden": "true" });
+      const [text, dashes] = LINES[name], colour = PALETTE.boundaries[name], box = h("span", { class: "line", "aria-hidden": "true" });
       box.style.borderTop = `2px ${dashes.length ? (dashes.length > 2 || dashes[0] < 6 ? "dotted" : "dashed") : "solid"} ${colour}`;
       return h("span", {}, box, " ", text);
     });
@@ -78,7 +78,7 @@ export class BoundaryPanel {
       if (!this.here("piece_", piece)) continue;
       const first = arrays.first[piece], count = arrays.points[piece] + (arrays.closed[piece] ? 1 : 0);
       const [xs, ys] = [a, b].map(({ axis, values }) => Float64Array.from({ length: count }, (_, i) => indexOf(axis, values[first + (i % arrays.points[piece])])));
-      found.push({ xs, ys, colour: LINES[this.nameOf(piece)][1], dashes: LINES[this.nameOf(piece)][2] });
+      found.push({ xs, ys, colour: PALETTE.boundaries[this.nameOf(piece)], dashes: LINES[this.nameOf(piece)][1] });
     }
     return found;
   }

@@ -14,9 +14,9 @@ export function describeAttractor(one, regimes) {
 }
 
 /** The table of a slice's attractors. `entries` have label, regime, period, ..., count; `toggle(label, alone)`. */
-export function attractorTable({ entries, total, unlabelled, hidden, regimes, toggle, fromFile, unit }) {
-  const rows = entries.map((one) => row(one, total, hidden, regimes, toggle));
-  if (unlabelled > 0) rows.push(row({ attractor: 0, count: unlabelled, none: true }, total, hidden, regimes, toggle));
+export function attractorTable({ entries, total, unlabelled, own, hidden, regimes, toggle, fromFile, unit }) {
+  const rows = entries.map((one) => row(one, total, own, hidden, regimes, toggle));
+  if (unlabelled > 0) rows.push(row({ attractor: 0, count: unlabelled, none: true }, total, own, hidden, regimes, toggle));
   const columns = [["", ""], ["attractor", ""], ["share", "number"], ["word", ""], [`amplitude (${unit})`, "number"], ["impacts", "number"], ["multiplier", "number"]];
   const head = h("tr", {}, ...columns.map(([text, kind]) => h("th", { class: kind, scope: "col", title: text === "impacts" ? "impacts per drive period" : null }, text || h("span", { class: "sr" }, "shown"))));
   const chaotic = entries.some((one) => one.period === 0);
@@ -27,11 +27,11 @@ export function attractorTable({ entries, total, unlabelled, hidden, regimes, to
   ];
 }
 
-function row(one, total, hidden, regimes, toggle) {
+function row(one, total, own, hidden, regimes, toggle) {
   const label = one.attractor, off = hidden.has(label);
   const name = one.none ? "none (not captured)" : `${label}: ${describeAttractor(one, regimes)}`;
   const button = h("button", { class: "swatch", "aria-pressed": String(!off), title: "Click: hide or show; Shift-click: this one alone", "aria-label": `${off ? "Show" : "Hide"} ${name}`, onclick: (event) => toggle(label, event.shiftKey) });
-  button.style.background = off ? "#ffffff" : swatch(label, 1);
+  button.style.background = off ? "#ffffff" : swatch(label, 1, own);
   const share = one.count === undefined || !total ? "–" : shareText(one.count, total);
   const cells = one.none ? ["", "", "", ""] : [one.word || "", number(one.amplitude, 4), number(one.impacts_per_period, 4), number(one.multiplier, 4)];
   return h("tr", { class: off ? "hidden-class" : "" }, h("td", {}, button), h("td", {}, name), h("td", { class: "number" }, share),
@@ -44,11 +44,11 @@ export function shareText(count, total) {
 }
 
 /** The legend of the classes that are in sight: buttons that hide and show. */
-export function classLegend({ values, names, offset, hidden, toggle }) {
+export function classLegend({ values, names, offset, own, hidden, toggle }) {
   const shown = values.slice(0, 40);
   const buttons = shown.map((value) => {
     const off = hidden.has(value), box = h("span", { class: "swatch", "aria-hidden": "true" });
-    box.style.background = off ? "#ffffff" : swatch(value, offset);
+    box.style.background = off ? "#ffffff" : swatch(value, offset, own);
     return h("button", { class: "class", "aria-pressed": String(!off), onclick: (event) => toggle(value, event.shiftKey) }, box, h("span", { class: off ? "off" : "" }, words(names[value] ?? value)));
   });
   const more = values.length > shown.length ? h("span", { class: "note" }, `and ${values.length - shown.length} more`) : null;

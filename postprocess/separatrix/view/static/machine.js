@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // The machine at an instant, drawn from its case: body, spring, foot or driving body, barriers.
+import { PALETTE } from "./palette.js";
 import { INK, SOFT, hatch, line } from "./plot.js";
 
-const BODY = "#0072B2", DRIVER = "#8a949c", HIT = "#D55E00";
+const DRIVER = "#8a949c";
 
 /** Draws a machine. `state`: x, driver, hit (0 to 1, fading after an impact), side of it. `range` of positions. */
 export function drawMachine(context, width, height, machine, summary, range, state) {
@@ -23,8 +24,10 @@ export function drawMachine(context, width, height, machine, summary, range, sta
     if (barrier === null || !Number.isFinite(barrier)) continue;
     const wall = place(barrier) + (side * size) / 2;
     if (state.hit > 0 && state.side === side) {
-      context.fillStyle = `rgba(213, 94, 0, ${0.75 * state.hit})`;
+      context.fillStyle = PALETTE.impact;
+      context.globalAlpha = 0.75 * state.hit;
       context.fillRect(side > 0 ? wall : wall - 9, ground - 2.1 * size, 9, 2.1 * size);
+      context.globalAlpha = 1;
     }
     hatch(context, wall, ground - 2.1 * size, 2.1 * size, side);
   }
@@ -40,7 +43,7 @@ export function drawMachine(context, width, height, machine, summary, range, sta
 }
 
 function box(context, x, ground, size, state) {
-  context.fillStyle = state.hit > 0.5 ? HIT : BODY;
+  context.fillStyle = state.hit > 0.5 ? PALETTE.impact : PALETTE.motion;
   context.fillRect(x - size / 2, ground - size, size, size);
   context.strokeStyle = INK;
   context.lineWidth = 1.2;
@@ -92,7 +95,7 @@ function drawPendulum(context, width, height, summary, state) {
   line(context, ...pivot, ...end(state.x));
   context.beginPath();
   context.arc(...end(state.x), 9, 0, 2 * Math.PI);
-  context.fillStyle = state.hit > 0.5 ? HIT : BODY;
+  context.fillStyle = state.hit > 0.5 ? PALETTE.impact : PALETTE.motion;
   context.fill();
   context.stroke();
 }

@@ -16,7 +16,7 @@ export function marksOf({ file, across, up, at, starter, attractorPoints, links,
     }
     for (const one of attractorPoints || []) {
       if (one.period === 0) continue;
-      for (const point of one.points) marks.push({ kind: "attractor", x: point[phase[0]], y: point[phase[1]], colour: css(classColour(one.attractor)) });
+      for (const point of one.points) marks.push({ kind: "attractor", x: point[phase[0]], y: point[phase[1]], colour: css(classColour(one.attractor, 1, file.colours)) });
     }
   }
   if (starter.started) marks.push({ kind: "start", ...starter.started });

@@ -4,9 +4,10 @@
 // One motion: time history, phase portrait, the machine moving, events, downloads.
 import { fill, h, number, prepare, quantity, save, words } from "./dom.js";
 import { drawMachine } from "./machine.js";
+import { PALETTE } from "./palette.js";
 import { INK, Plot, SOFT, extent, hatch, line } from "./plot.js";
 
-const LINE = "#0072B2", DRIVER = "#7d8891", IMPACT = "#D55E00", SECTION = "#000000";
+const DRIVER = "#7d8891", SECTION = "#000000";
 const SHOWN = 400, FLASH = 0.06;
 
 export class MotionPanel {
@@ -175,12 +176,12 @@ export class MotionPanel {
       context.strokeStyle = DRIVER;
       context.lineWidth = 1;
       plot.path(arrays.time, arrays.driver, this.from, this.to);
-      context.strokeStyle = LINE;
+      context.strokeStyle = PALETTE.motion;
       context.lineWidth = 1.5;
       plot.path(this.line.time, this.line.x, ...this.drawn);
       for (let k = 0; k < arrays.event_kind.length; k++) {
         const time = arrays.event_time[k];
-        if (time >= this.part[0] && time <= this.part[1] && [1, 2, 9, 10].includes(arrays.event_kind[k])) plot.dot(time, arrays.event_x[k], 2.4, IMPACT);
+        if (time >= this.part[0] && time <= this.part[1] && [1, 2, 9, 10].includes(arrays.event_kind[k])) plot.dot(time, arrays.event_x[k], 2.4, PALETTE.impact);
       }
       context.strokeStyle = INK;
       context.lineWidth = 1;
@@ -206,10 +207,10 @@ export class MotionPanel {
     const labels = this.relative ? ["relative position (m)", "relative velocity (m/s)"] : [this.unitText(), `velocity v (${units(this.machine)[1]})`];
     const plot = new Plot(context, width, height, extent(part(arrays.x), barriers), extent(part(arrays.v)), labels);
     plot.clip(() => {
-      context.strokeStyle = LINE;
+      context.strokeStyle = PALETTE.motion;
       context.lineWidth = 1.1;
       plot.path(this.loop.x, this.loop.v, ...this.looped);
-      context.strokeStyle = IMPACT;
+      context.strokeStyle = PALETTE.impact;
       context.setLineDash([3, 3]);
       for (let k = 0; k < arrays.event_kind.length; k++) {
         if (arrays.event_time[k] < this.part[0] || arrays.event_time[k] > this.part[1] || arrays.event_v_before[k] === arrays.event_v_after[k]) continue;
@@ -220,7 +221,7 @@ export class MotionPanel {
         if (i >= this.from && i < this.to) plot.dot(arrays.x[i], arrays.v[i], 3, SECTION, "#ffffff");
       }
       const i = Math.min(lowest(arrays.time, this.time), arrays.time.length - 1);
-      plot.dot(arrays.x[i], arrays.v[i], 4.5, LINE, "#ffffff");
+      plot.dot(arrays.x[i], arrays.v[i], 4.5, PALETTE.motion, "#ffffff");
       for (const barrier of barriers) hatch(context, plot.x(barrier), plot.box[1], plot.box[3], barrier === this.motion.summary.barrier_upper ? 1 : -1);
     });
     plot.frame();

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Colours that colour-blind readers can tell apart and that differ in grey where they are few.
+// Colours of the figures: the server sends them (separatrix/palette.py).
 
-// Okabe and Ito (2008): blue and orange first, which differ most in lightness; then Paul Tol's muted ones.
-const CLASSES = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#332288", "#117733",
-  "#882255", "#88CCEE", "#DDCC77", "#AA4499", "#661100", "#44AA99", "#999933"];
-const NOTHING = "#D6D9DC";
+/** classes, nothing, regimes (by code), boundaries (by name), up, down, many, motion, impact. */
+export const PALETTE = {};
+// Up to so many classes of their own have the colours of their places.
+const FEW = 8;
 const HIDDEN = [250, 250, 250];
 // cividis (Nuñez, Anderton, Renslow 2018) at equal steps
 const CIVIDIS = ["#00224e", "#083370", "#35456c", "#4f576c", "#666970", "#7d7c78", "#948e77", "#aea371", "#c8b866",
@@ -16,15 +16,14 @@ function rgb(hex) {
   return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
 }
 
-const CLASS_RGB = CLASSES.map(rgb);
-const NOTHING_RGB = rgb(NOTHING);
 const SCALE_RGB = CIVIDIS.map(rgb);
 
-/** Colour of a class; classes beyond the table get hues of their own, so that many can be told apart. */
-export function classColour(value, first = 1) {
-  if (value < first) return NOTHING_RGB;
+/** Colour of a class: its own, else that of its place. Classes beyond get hues, so that many can be told apart. */
+export function classColour(value, first = 1, own = {}) {
+  if (own[value]) return rgb(own[value]);
+  if (value < first) return rgb(PALETTE.nothing);
   const place = value - first;
-  if (place < CLASS_RGB.length) return CLASS_RGB[place];
+  if (place < PALETTE.classes.length && Object.keys(own).length <= FEW) return rgb(PALETTE.classes[place]);
   const hue = (place * 137.508) % 360, light = 0.35 + 0.3 * ((place * 0.618) % 1);
   return fromHue(hue, 0.55, light);
 }
@@ -54,9 +53,10 @@ export function css([r, g, b]) {
 
 /** What paints cells of one variable: classes, or numbers over a range. */
 export class Painter {
-  /** `offset`: the class that gets the first colour. */
-  constructor({ classes, offset = 1, hidden = new Set(), mix = true, range = [0, 1], log = false, shade = null }) {
-    Object.assign(this, { classes, offset, hidden, mix, log, range, shade });
+  /** `offset`: the class that gets the first colour; `own`: colours of classes by number. */
+  constructor({ classes, offset = 1, own = {}, hidden = new Set(), mix = true, range = [0, 1], log = false, shade = null }) {
+    Object.assign(this, { classes, offset, own, hidden, mix, log, range, shade });
+    this.nothing = rgb(PALETTE.nothing);
     this.colours = new Map();
     const [low, high] = range;
     this.low = log ? Math.log(low) : low;
@@ -66,7 +66,7 @@ export class Painter {
   colour(value) {
     let found = this.colours.get(value);
     if (!found) {
-      found = this.hidden.has(value) ? HIDDEN : classColour(value, this.offset);
+      found = this.hidden.has(value) ? HIDDEN : classColour(value, this.offset, this.own);
       this.colours.set(value, found);
     }
     return found;
@@ -94,7 +94,7 @@ export class Painter {
       }
     } else {
       const value = cells.first[i];
-      if (value !== value) [r, g, b] = NOTHING_RGB;
+      if (value !== value) [r, g, b] = this.nothing;
       else {
         const t = ((this.log ? Math.log(value) : value) - this.low) / this.span;
         const k = 3 * Math.round(255 * Math.min(Math.max(t, 0), 1));

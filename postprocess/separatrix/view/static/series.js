@@ -4,17 +4,15 @@
 // Files that are no maps: diagrams of sweeps, linked with maps, and points of lists.
 import { h, prepare, words } from "./dom.js";
 import { Diagram, nearest } from "./diagram.js";
-import { classColour, css } from "./palette.js";
+import { PALETTE } from "./palette.js";
 import { INK, Plot, extent, line } from "./plot.js";
-
-const UP = "#0072B2", DOWN = "#E69F00", MANY = "#B9C0C6";
 
 export class SweepPanel extends Diagram {
   constructor(file, answer, links) {
     const { arrays, shapes } = answer;
     const key = Object.keys(arrays).find((name) => shapes[name].length === 1 && shapes.amplitude && shapes[name][0] === shapes.amplitude[1] && answer.variables[name] && name !== "amplitude");
     const names = ["strobe_x", "strobe_v", "x_max", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period"].filter((name) => name in arrays);
-    super({ file, answer, key, kind: "Sweep", names, note: "blue: run up, orange: run down, grey: many starts; click: this value in the map", links });
+    super({ file, answer, key, kind: "Sweep", names, note: "orange: run-up, blue: run-down, grey: many starts; click: this value in the map", links });
   }
 
   get values() { return this.answer.arrays[this.key]; }
@@ -30,8 +28,8 @@ export class SweepPanel extends Diagram {
       [(variables[this.key] || {}).label || words(this.key), `${this.text(name)}${unit}`]);
     this.plot = plot;
     plot.clip(() => {
-      for (const one of many) this.dots(plot, arrays[one], shapes[one][1], MANY, 1.4, 0);
-      for (const [direction, colour] of [[1, DOWN], [0, UP]]) {
+      for (const one of many) this.dots(plot, arrays[one], shapes[one][1], PALETTE.many, 1.4, 0);
+      for (const [direction, colour] of [[1, PALETTE.down], [0, PALETTE.up]]) {
         for (const one of runs) {
           const [, count, samples = 1] = shapes[one], size = count * samples;
           this.dots(plot, arrays[one].subarray(direction * size, (direction + 1) * size), samples, colour, samples > 1 ? 0.9 : 2 - 0.7 * (1 - direction), 0);
@@ -84,7 +82,7 @@ export class PointsPanel {
     const plot = new Plot(context, width, height, extent(x), extent(v), ["position x (m)", "velocity v (m/s)"]);
     plot.clip(() => {
       for (let i = 0; i < x.length; i++) {
-        context.fillStyle = css(classColour(regime[i]));
+        context.fillStyle = PALETTE.regimes[regime[i]];
         context.fillRect(plot.x(x[i]) - 1.3, plot.y(v[i]) - 1.3, 2.6, 2.6);
       }
     });

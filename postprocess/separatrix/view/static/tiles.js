@@ -154,6 +154,6 @@ export class Tiles {
 }
 
 /** A swatch's colour of a class. */
-export function swatch(value, offset) {
-  return `rgb(${classColour(value, offset).join(" ")})`;
+export function swatch(value, offset, own) {
+  return `rgb(${classColour(value, offset, own).join(" ")})`;
 }
