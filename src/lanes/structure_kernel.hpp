@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Exact flight of many multibody structures at once: linear structures with dry friction and contacts, rigid or
-// linear. In every mode (which friction joints stick, which soft contacts are pressed) the motion is a sum of
-// complex exponentials and harmonics.
+// Exact flight of many multibody structures at once: linear structures with dry friction and contacts, rigid
+// or linear. In every mode (which friction joints stick, which soft contacts are pressed) the motion is a sum
+// of complex exponentials and harmonics.
 #ifndef SEPARATRIX_STRUCTURE_KERNEL_HPP
 #define SEPARATRIX_STRUCTURE_KERNEL_HPP
 

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// The motion of multibody structures between events, in lanes: sums of complex exponentials and harmonics; see
-// `structure_mode`.
+// The motion of multibody structures between events, in lanes: sums of complex exponentials and harmonics;
+// see `structure_mode`.
 #ifndef SEPARATRIX_STRUCTURE_MOTION_HPP
 #define SEPARATRIX_STRUCTURE_MOTION_HPP
 

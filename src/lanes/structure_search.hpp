@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// The first event of flights of multibody structures. A flight is walked along in panels: from one to the next
-// by a fixed turn of its exponentials. Over a panel each function of a joint is proven to stay within its
-// limits by the Bernstein coefficients of the quintic through its values, slopes and curvatures at both ends,
-// less a bound on the error from the amplitudes. Where the proof fails the root is polished by Householder
-// steps of fourth order from the quintic's, and the panel up to it is proven.
+// The first event of flights of multibody structures. A flight is walked along in panels: from one to the
+// next by a fixed turn of its exponentials. Over a panel each function of a joint is proven to stay within
+// its limits by the Bernstein coefficients of the quintic through its values, slopes and curvatures at both
+// ends, less a bound on the error from the amplitudes. Where the proof fails the root is polished by
+// Householder steps of fourth order from the quintic's, and the panel up to it is proven.
 #ifndef SEPARATRIX_STRUCTURE_SEARCH_HPP
 #define SEPARATRIX_STRUCTURE_SEARCH_HPP
 

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// What the kernel for multibody structures and its caller share beside `lane_types.hpp`. `structure_types.f90`
-// mirrors these structures member by member.
+// What the kernel for multibody structures and its caller share beside `lane_types.hpp`.
+// `structure_types.f90` mirrors these structures member by member.
 #ifndef SEPARATRIX_STRUCTURE_TYPES_HPP
 #define SEPARATRIX_STRUCTURE_TYPES_HPP
 

@@ -129,7 +129,7 @@ def start(source_dir, folder, pause: float, *more: str, doubts: bool = False) ->
     package = folder / "stand_in" / "separatrix"
     (package / "discovery").mkdir(parents=True, exist_ok=True)
     (package / "discovery" / "__init__.py").write_text(STAND_IN.format(pause=pause, doubts=doubts))
-    for name in ("errors", "style"):
+    for name in ("errors", "style", "palette"):
         (package / f"{name}.py").write_text(
             (source_dir / "postprocess" / "separatrix" / f"{name}.py").read_text()
         )
