@@ -16,8 +16,8 @@ module rest_sets
 
   public :: rest_set_of
 
-  !> Places between two positions of rest at which a body has to stay.
-  integer, parameter :: places_between = 15
+  !> Positions between two of rest at which a body has to stay.
+  integer, parameter :: positions_between = 15
 
 contains
 
@@ -36,7 +36,7 @@ contains
   end function rest_set_of
 
   !> Whether a body stays everywhere on the line from one position of rest to another. Forces that are linear, of springs that
-  !> pull back, with friction and stops have equilibria that form a convex set. Two bodies rest by moving as one, at any place.
+  !> pull back, with friction and stops have equilibria that form a convex set. Two bodies rest by moving as one, at any position.
   pure logical function are_joined(moving, one, other) result(joined)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: one(:), other(:)
@@ -50,8 +50,8 @@ contains
     ! What section points leave open, such as how far an elastic friction is stretched, may be what holds them.
     if (.not. joined) joined = .not. (stays(moving, from) .and. stays(moving, to))
     if (joined) return
-    do i = 1, places_between
-      if (.not. stays(moving, from + (i*(to - from))/(places_between + 1))) return
+    do i = 1, positions_between
+      if (.not. stays(moving, from + (i*(to - from))/(positions_between + 1))) return
     end do
     joined = .true.
   end function are_joined

@@ -99,13 +99,15 @@ contains
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(inout) :: choices(:)
     type(parameter_row_t), allocatable :: rows(:)
+    logical :: is_angle
     integer :: i, k
     do i = 1, size(choices)
       if (choices(i)%family /= part_family .or. .not. any(kinds_of_parts == part_kind(choices(i)%name))) cycle
       rows = parameters_of(choices(i)%family, choices(i)%name)
+      is_angle = is_of_angle(choices, i)
       do k = 1, size(rows)
         if (is_hidden(rows(k)) .or. .not. is_of_position(rows(k))) cycle
-        call take_row(source, path_of(choices(i)), rows(k), is_of_angle(choices, i), choices(i)%parameters(k)%values)
+        call take_row(source, path_of(choices(i)), rows(k), is_angle, choices(i)%parameters(k)%values)
       end do
     end do
   end subroutine read_positions

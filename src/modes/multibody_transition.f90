@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What follows a fallen guard of a multibody structure: impacts, sticking and sliding, the completion of chatter.
+!> What follows a triggered guard of a multibody structure: impacts, sticking and sliding, the completion of chatter.
 module multibody_transition
   use blow, only: strike
   use chatter, only: look_ahead

@@ -308,3 +308,9 @@ def test_limits_have_the_unit_of_their_axis() -> None:
     limits = xr.Dataset({"limits_lower": ("limit", [0.5], {"units": "m"})})
     changed = Look(units="mm").selected(limits)["limits_lower"]
     assert (float(changed[0]), changed.attrs["units"]) == (500.0, "mm")
+
+
+@pytest.mark.parametrize("wish", [{"crank_angle": 0.0}, {"transient": 0.0}, {"units": ["mm"]}])
+def test_what_a_kind_does_not_serve_is_refused_also_where_it_is_zero(wish):
+    with pytest.raises(SeparatrixError, match="not served by the figures of a map"):
+        Look(**wish).require("map", "region")

@@ -93,7 +93,9 @@ class Look:
     def require(self, kind: str, *served: str) -> None:
         """Refuse wishes that the figures of a kind do not serve."""
         for name in _SERVED_BY_SOME:
-            if getattr(self, name) and name not in served:
+            wish = getattr(self, name)
+            # A number may be 0.
+            if (wish or isinstance(wish, float)) and name not in served:
                 raise SeparatrixError(
                     f"{name.replace('_', ' ')}: not served by the figures of a {kind}", USAGE
                 )

@@ -18,7 +18,7 @@ function rgb(hex) {
 
 const SCALE_RGB = CIVIDIS.map(rgb);
 
-/** Colour of a class: its own, else that of its place. Classes beyond get hues, so that many can be told apart. */
+/** Colour of a class: its own, else that of its index. Classes beyond get hues, so that many can be distinguished. */
 export function classColour(value, first = 1, own = {}) {
   if (own[value]) return rgb(own[value]);
   if (value < first) return rgb(PALETTE.nothing);
