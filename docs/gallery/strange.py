@@ -22,14 +22,14 @@ case = sx.load("petals.toml").with_({"drive.ratio": RATIO})
 period = 2 * np.pi / RATIO
 motion = sx.trajectory(case, -1.0, 0.3, 0.0, duration=periods * period, samples=2)
 settled = motion.time.values > 100 * period
-strobe = settled & (np.arange(motion.time.size) % 2 == 0)
+section = settled & (np.arange(motion.time.size) % 2 == 0)
 impact = (motion.event_kind.values == 1) & (motion.event_time.values > 100 * period)
 phase = motion.event_time.values[impact] / period % 1 * 360
 speed = motion.event_v_before.values[impact]
-print(f"{strobe.sum()} periods of the drive, {impact.sum()} impacts, the slowest at {speed.min():.1e} m/s")
+print(f"{section.sum()} periods of the drive, {impact.sum()} impacts, the slowest at {speed.min():.1e} m/s")
 with style.context():
     figure, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3.4), layout="constrained")
-    left.plot(motion.x.values[strobe], motion.v.values[strobe], ",", color="#0072b2")
+    left.plot(motion.x.values[section], motion.v.values[section], ",", color="#0072b2")
     left.set(xlabel="$x$ (m)", ylabel="$v$ (m/s)", title="once per period")
     right.plot(phase, speed, ",", color="#b04a00")
     right.set(

@@ -13,7 +13,7 @@ import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import CASE_GIVEN, try_first
-from separatrix.variables import FORMAT_VERSION
+from separatrix.variables import FORMAT_VERSION, RENAMED
 from separatrix.version import __version__
 from separatrix.words import decode_word
 
@@ -42,6 +42,8 @@ def open_result(path: str | Path) -> xr.Dataset:
             parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
             parts += [_open_table(path, name) for name in groups]
             result = xr.merge(parts, join="exact", compat="no_conflicts")
+            if attributes["format_version"] == 1:
+                result = result.rename({old: new for old, new in RENAMED.items() if old in result})
         except Exception:
             _close(parts)
             raise

@@ -8,14 +8,14 @@ module edge_state
   use attractors, only: attractor_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use machine_family, only: fly_sections, fly_to_section, nearest_copy, strobe_of_section
+  use machine_family, only: fly_sections, fly_to_section, nearest_copy, section_of_section
   use motion, only: motion_t
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
     event_touch_lower, event_touch_upper, tally_t
   use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance, sides_of_saddle
   use start_label, only: label_from, label_not_known, label_of
-  use strobe, only: strobe_t
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use section, only: section_state_t
+  use single_trajectory, only: outcome_t, run_trajectory, span_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -58,7 +58,7 @@ module edge_state
   end type labeller_t
 
   !> Two motions, one on either side of a boundary: section points (columns), or, before the first section, starts as
-  !> `start_strobe` has them.
+  !> `start_section` has them.
   type :: pair_t
     real(wp), allocatable :: points(:, :)
     logical :: on_section = .false.
@@ -218,12 +218,12 @@ contains
     logical, intent(in) :: on_section
     real(wp), intent(in) :: point(:)
     type(outcome_t) :: outcome
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     logical :: ok
     if (on_section) then
-      call strobe_of_section(machine, labeller%moving, point, strobe, ok)
+      call section_of_section(machine, labeller%moving, point, section, ok)
       label = label_not_known
-      if (ok) label = label_from(labeller%moving, labeller%catalogue, labeller%span, strobe)
+      if (ok) label = label_from(labeller%moving, labeller%catalogue, labeller%span, section)
     else
       call run_trajectory(labeller%moving, labeller%catalogue, labeller%span, point(1), point(2), point(3), outcome, &
                           others=point(4:))

@@ -97,7 +97,7 @@ contains
     select type (body => machines%centre)
     type is (one_body_t)
       call open_log(log, 0.0_wp)
-      log%book%kept = .false.
+      log%balance%kept = .false.
       spectrum%has_sum = has_exact_sum(body)
       call fly_on(body, state, log, transient - aligning, spectrum%reason)
       if (spectrum%reason /= 0) return

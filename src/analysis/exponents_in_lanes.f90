@@ -88,7 +88,7 @@ contains
     spectrum%errors = [0.0_wp, 0.0_wp]
     flow = flow_of(body)
     call open_log(log, 0.0_wp)
-    log%book%kept = .false.
+    log%balance%kept = .false.
     call lead_the_way(body, state, log, transient, starts, section, spectrum%reason)
     if (spectrum%reason /= 0) return
     spectrum%point = [state%x, state%v]

@@ -114,7 +114,7 @@ contains
       settled = next
       if (modulo(i, any_period) /= 0) cycle
       if (distance(machines, settled, then) < at_rest) exit
-      if (is_captured(machines, settled, then, found)) return
+      if (has_converged(machines, settled, then, found)) return
       then = settled
     end do
     image = settled
@@ -129,20 +129,20 @@ contains
   end subroutine settle
 
   !> Whether a motion that was at `before` a number of periods ago approaches a known stable orbit.
-  logical function is_captured(machines, point, before, found)
+  logical function has_converged(machines, point, before, found)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: point(:), before(:)
     type(found_t), intent(in) :: found
     integer :: i
     real(wp) :: near
-    is_captured = .false.
+    has_converged = .false.
     do i = 1, size(found%orbits)
       if (maxval(abs(found%orbits(i)%multipliers)) >= 1) cycle
       near = distance(machines, point, found%orbits(i)%y)
-      is_captured = near < captured .and. near < distance(machines, before, found%orbits(i)%y)
-      if (is_captured) return
+      has_converged = near < captured .and. near < distance(machines, before, found%orbits(i)%y)
+      if (has_converged) return
     end do
-  end function is_captured
+  end function has_converged
 
   !> Image of a section point.
   subroutine image_of(machines, point, image, ok)

@@ -6,7 +6,7 @@
 !> transient.
 module aperiodic
   use attractors, only: attractor_t, features_t, kind_chaotic, kind_family, kind_not_known, make_points, most_coordinates
-  use capture, only: captor_of
+  use capture, only: attractor_reached
   use circle, only: nearest_turn, point_near
   use cycle, only: derivative, map_point, unattractive
   use elementary, only: exponential, logarithm
@@ -16,8 +16,8 @@ module aperiodic
   use motion, only: motion_t
   use motion_features, only: features_over
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, scales_of, section_point, section_state, strobe_at, &
-    strobe_t
+  use section, only: advance_section_period, begin_tally, coordinates_of, scales_of, section_point, section_state, section_at, &
+    section_state_t
   implicit none
   private
 
@@ -40,13 +40,13 @@ module aperiodic
 
 contains
 
-  !> Watches a motion of half range `amplitude` [m] over many drive periods. `known` if it was captured by the catalogue
+  !> Watches a motion of half range `amplitude` [m] over many drive periods. `known` if it was converged by the catalogue
   !> meanwhile, `ok` unless it had to be given up; else `found` describes it, and `returns` tells of its returns.
-  pure subroutine watch_long(moving, catalogue, amplitude, strobe, found, returns, known, ok)
+  pure subroutine watch_long(moving, catalogue, amplitude, section, found, returns, known, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: amplitude
-    type(strobe_t), intent(inout) :: strobe
+    type(section_state_t), intent(inout) :: section
     type(attractor_t), intent(out) :: found
     type(returns_t), intent(inout) :: returns
     logical, intent(out) :: known, ok
@@ -56,40 +56,40 @@ contains
     integer :: i, reason
     known = .false.
     tally%wants_v_max = .true.
-    call begin_tally(moving, strobe, tally)
+    call begin_tally(moving, section, tally)
     call watch_anew(returns)
     found%coordinates = coordinates_of(moving)
     found%turn = moving%machine%turn
     call make_points(found, 2)
-    before = section_point(moving, strobe)
+    before = section_point(moving, section)
     found%points = spread(before, 2, 2)
     scale = max(scales_of(moving, amplitude), tiny(amplitude))
     direction = 0
     do i = 1, box_periods
       slips = tally%slips
-      call advance_strobe_period(moving, strobe, tally, reason)
+      call advance_section_period(moving, section, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      associate (now => section_point(moving, strobe))
-        known = captor_of(moving, catalogue, strobe, tally%slips > slips) > 0
+      associate (now => section_point(moving, section))
+        known = attractor_reached(moving, catalogue, section, tally%slips > slips) > 0
         if (known) return
         call widen(found, spread(now, 2, 2))
         call follow_neighbour(moving, found%coordinates, scale, before, now, direction, drift(i))
         before = now
       end associate
-      call watch_returns(moving, strobe, tally%chatters, returns)
+      call watch_returns(moving, section, tally%chatters, returns)
     end do
     found%features = features_over(moving, tally, real(box_periods, wp))
     found%features%word = 0
     call judge_drift(drift, found)
   end subroutine watch_long
 
-  !> Whether a motion of half range `amplitude` [m] that `watch_long` did not know, now at `strobe`, is one of a family of cycles of
-  !> at most `max_period` drive periods: it comes back to rounding, and has a multiplier +1. Beside a fold of cycles it does not
+  !> Whether a motion of half range `amplitude` [m] that `watch_long` did not know, now at `section`, is one of a family of cycles
+  !> of at most `max_period` drive periods: it comes back to rounding, and has a multiplier +1. Beside a fold of cycles it does not
   !> come back so well.
-  pure subroutine tell_family(moving, strobe, amplitude, max_period, found)
+  pure subroutine tell_family(moving, section, amplitude, max_period, found)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     real(wp), intent(in) :: amplitude
     integer, intent(in) :: max_period
     type(attractor_t), intent(inout) :: found
@@ -101,7 +101,7 @@ contains
     if (found%kind /= kind_not_known) return
     n = found%coordinates
     scale = max(scales_of(moving, amplitude), tiny(amplitude))
-    here = section_point(moving, strobe)
+    here = section_point(moving, section)
     point = here(:n)
     do period = 1, max_period
       call map_point(moving, point, period, image, unused, ok)
@@ -121,10 +121,10 @@ contains
   !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly, as `returns` tells.
   !> `forgets` if it came to a completed chatter that leaves one motion alone, whatever came before: then nothing drifts apart for
   !> good.
-  pure subroutine outlast(moving, catalogue, strobe, returns, known, forgets, ok)
+  pure subroutine outlast(moving, catalogue, section, returns, known, forgets, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
-    type(strobe_t), intent(inout) :: strobe
+    type(section_state_t), intent(inout) :: section
     type(returns_t), intent(inout) :: returns
     logical, intent(out) :: known, forgets, ok
     type(tally_t) :: tally
@@ -133,17 +133,17 @@ contains
     known = .false.
     forgets = .false.
     ok = .true.
-    call begin_tally(moving, strobe, tally)
+    call begin_tally(moving, section, tally)
     call watch_anew(returns)
     do i = 1, merge(lasting_exact, lasting, moving%exact)
       slips = tally%slips
-      call advance_strobe_period(moving, strobe, tally, reason)
+      call advance_section_period(moving, section, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      known = captor_of(moving, catalogue, strobe, tally%slips > slips) > 0
+      known = attractor_reached(moving, catalogue, section, tally%slips > slips) > 0
       if (known) return
       forgets = tally%chatters > 0 .and. coordinates_of(moving) == 2
-      call watch_returns(moving, strobe, tally%chatters, returns)
+      call watch_returns(moving, section, tally%chatters, returns)
       if (returns%period > 0) return
     end do
   end subroutine outlast
@@ -167,7 +167,7 @@ contains
     real(wp), intent(in) :: scale(:), before(:), now(:)
     real(wp), intent(inout) :: direction(:)
     real(wp), intent(out) :: drift
-    type(strobe_t) :: twin
+    type(section_state_t) :: twin
     type(tally_t) :: unused
     real(wp) :: start(n), reached(most_coordinates), distance
     integer :: reason
@@ -176,8 +176,8 @@ contains
     if (start(1) > moving%machine%contact%upper .or. start(1) < moving%machine%contact%lower) then
       start = before(:n) - neighbour*scale(:n)*direction(:n)
     end if
-    twin = strobe_at(moving, start)
-    call advance_strobe_period(moving, twin, unused, reason)
+    twin = section_at(moving, start)
+    call advance_section_period(moving, twin, unused, reason)
     reached = section_point(moving, twin)
     direction = 0
     reached = point_near(reached, now, moving%machine%turn)

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What an attractor is here, and whether a state on the stroboscopic section has been captured by one.
+!> What an attractor is here, and whether a state on the stroboscopic section has been converged by one.
 module attractors
   use circle, only: nearest_turn, point_near
   use kinds, only: int64, wp

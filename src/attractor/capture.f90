@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Whether a motion under way has been captured by an attractor of a catalogue.
+!> Whether a motion under way has been converged by an attractor of a catalogue.
 module capture
   use attractors, only: attractor_t, find_capture, most_coordinates, squared_distance
   use kinds, only: wp
@@ -9,35 +9,35 @@ module capture
   use motion, only: motion_t
   use motion_state, only: tally_t
   use rest_sets, only: rest_set_of
-  use strobe, only: advance_to_section, copy_of, section_point, speed_number, stays_clear, strobe_t, turn_point
+  use section, only: advance_to_section, copy_of, section_point, speed_number, stays_clear, section_state_t, turn_point
   implicit none
   private
 
-  public :: captor_of, captor_of_point, stays_in_family
+  public :: attractor_reached, attractor_reached_at, stays_in_family
 
 contains
 
-  !> Index of the attractor that has captured the motion at the end of a drive period, 0 if none. `slipped` tells whether the body
+  !> Index of the attractor that has converged the motion at the end of a drive period, 0 if none. `slipped` tells whether the body
   !> moved during the last whole period. For the cycles of a machine without a clock a copy goes on to the section.
-  pure integer function captor_of(moving, catalogue, strobe, slipped) result(found)
+  pure integer function attractor_reached(moving, catalogue, section, slipped) result(found)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     logical, intent(in) :: slipped
-    type(strobe_t) :: later
+    type(section_state_t) :: later
     type(tally_t) :: unused
     integer :: reason
     found = 0
     if (size(catalogue) == 0) return
-    found = captor_of_point(moving, catalogue, section_point(moving, strobe), slipped .or. .not. rest_lasts(moving))
+    found = attractor_reached_at(moving, catalogue, section_point(moving, section), slipped .or. .not. rest_lasts(moving))
     if (found > 0 .or. .not. any(catalogue%by_event)) return
-    later = copy_of(strobe)
+    later = copy_of(section)
     call advance_to_section(moving, later, unused, reason)
     if (reason == 0) found = find_capture(catalogue, turn_point(moving, later), .true., by_event=.true.)
-  end function captor_of
+  end function attractor_reached
 
   !> The same of a section point; of one at rest the positions of rest to which it belongs come first.
-  pure integer function captor_of_point(moving, catalogue, point, slipped) result(found)
+  pure integer function attractor_reached_at(moving, catalogue, point, slipped) result(found)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
@@ -46,22 +46,22 @@ contains
     if (found == 0) return
     if (catalogue(found)%rests) found = rest_set_of(moving, catalogue, point)
     if (found == 0) found = find_capture(catalogue, point, .true.)
-  end function captor_of_point
+  end function attractor_reached_at
 
   !> Whether a motion on the section, with what was counted since its window began, has settled at one of a family of cycles, each
   !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left
   !> of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it
   !> misses the stops.
-  pure logical function stays_in_family(moving, catalogue, strobe, tally)
+  pure logical function stays_in_family(moving, catalogue, section, tally)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     type(tally_t), intent(in) :: tally
     real(wp) :: point(most_coordinates), drift
     integer :: k, i, n
     stays_in_family = .false.
     if (tally%impacts > 0 .or. .not. any(catalogue%any_place)) return
-    point = section_point(moving, strobe)
+    point = section_point(moving, section)
     do k = 1, size(catalogue)
       associate (attractor => catalogue(k), after => catalogue(k)%places + 1)
         if (.not. attractor%any_place .or. attractor%multiplier >= 1) cycle
@@ -71,7 +71,7 @@ contains
           drift = attractor%scale(speed_number(moving) - attractor%places) &
                   *attractor%period*moving%machine%period/(1 - attractor%multiplier) &
                   *sum(abs(point(after:after + n - 1) - attractor%points(:n, i))/attractor%scale(:n))
-          stays_in_family = stays_clear(moving, strobe, tally, attractor%period, 2*drift)
+          stays_in_family = stays_clear(moving, section, tally, attractor%period, 2*drift)
           if (stays_in_family) return
         end do
       end associate

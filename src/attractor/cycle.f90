@@ -16,7 +16,7 @@ module cycle
   use motion_features, only: cycle_word, features_over
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
   use section_slopes, only: slopes_of
-  use strobe, only: advance_strobe_period, begin_tally, scales_of, section_point, strobe_at, strobe_t, turn_of
+  use section, only: advance_section_period, begin_tally, scales_of, section_point, section_at, section_state_t, turn_of
   use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
@@ -48,20 +48,20 @@ contains
     logical, intent(out) :: ok
     logical, intent(in), optional :: wants_v_max
     real(wp), intent(out), optional :: duration
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     real(wp) :: reached(most_coordinates)
     integer :: i, reason
-    strobe = strobe_at(moving, point)
+    section = section_at(moving, point)
     if (present(wants_v_max)) tally%wants_v_max = wants_v_max
-    call begin_tally(moving, strobe, tally)
+    call begin_tally(moving, section, tally)
     reason = 0
     if (present(duration)) duration = 0
     do i = 1, periods
-      call advance_strobe_period(moving, strobe, tally, reason)
-      if (present(duration)) duration = duration + strobe%lasted
+      call advance_section_period(moving, section, tally, reason)
+      if (present(duration)) duration = duration + section%lasted
       if (reason /= 0) exit
     end do
-    reached = section_point(moving, strobe)
+    reached = section_point(moving, section)
     image = reached(:size(image))
     ok = reason == 0
   end subroutine map_point
@@ -100,7 +100,7 @@ contains
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
     call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true., attractor%duration)
-    ! Rounding may put the point and its image on different sides of the seam.
+    ! Rounding may put the point and its image on different sides of the matching_point.
     if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
     if (moving%by_event) then
       attractor%features = features_over(moving, tally, attractor%duration/moving%machine%period)
@@ -108,7 +108,7 @@ contains
       attractor%features = features_over(moving, tally, real(attractor%period, wp))
     end if
     if (attractor%period > 1) attractor%features%word = &
-      cycle_word(moving, strobe_at(moving, attractor%points(:n, 1)), attractor%period)
+      cycle_word(moving, section_at(moving, attractor%points(:n, 1)), attractor%period)
     if (is_linear(moving) .and. tally%impacts == 0) then
       attractor%multipliers(:2) = free_multipliers(moving, attractor%period)
       attractor%multiplier = abs(attractor%multipliers(1))
@@ -323,9 +323,9 @@ contains
   pure logical function rests_at(moving, point)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
-    type(strobe_t) :: strobe
-    strobe = strobe_at(moving, point)
-    rests_at = strobe%state%mode /= mode_slip_plus .and. strobe%state%mode /= mode_slip_minus
+    type(section_state_t) :: section
+    section = section_at(moving, point)
+    rests_at = section%state%mode /= mode_slip_plus .and. section%state%mode /= mode_slip_minus
   end function rests_at
 
   !> Bounds of the eigenvalues of the metric at the `i`-th point: exact up to two coordinates, else 1, which none is below,

@@ -7,7 +7,7 @@ module discover
   use aperiodic, only: add_aperiodic, meets_chaos, outlast, tell_family, watch_long
   use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_not_known, kind_rest, longest_period, &
     make_points, most_coordinates, regime_at_rest, regime_non_impact
-  use capture, only: captor_of, captor_of_point
+  use capture, only: attractor_reached, attractor_reached_at
   use circle, only: point_near
   use contact_law, only: contact_t
   use cycle, only: map_point, refine_cycle
@@ -19,9 +19,9 @@ module discover
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
-    start_strobe, strobe_at, strobe_t, turn_of, without_stops
-  use trajectory, only: span_t
+  use section, only: advance_section_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
+    start_section, section_at, section_state_t, turn_of, without_stops
+  use single_trajectory, only: span_t
   use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
@@ -31,7 +31,7 @@ module discover
   !> Relative distance at which a section point counts as a return to an earlier one.
   real(wp), parameter :: return_tolerance = 0.05_wp
 
-  !> What a stretch of a motion showed: its regime and half range [m], whether it was captured, given up, or came back exactly.
+  !> What a stretch of a motion showed: its regime and half range [m], whether it was converged, given up, or came back exactly.
   type :: stretch_t
     integer :: regime = 0
     real(wp) :: amplitude = 0
@@ -52,7 +52,7 @@ contains
     integer, intent(in) :: max_period
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     logical, intent(in), optional :: within_span
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     type(attractor_t) :: found
     type(stretch_t) :: stretch
     real(wp) :: patience
@@ -63,19 +63,19 @@ contains
     if (.not. allocated(catalogue)) allocate (catalogue(0))
     if (.not. has_section(moving)) return
     do i = 1, size(starts, 2)
-      strobe = start_strobe(moving, starts(:, i))
+      section = start_section(moving, starts(:, i))
       patience = span%duration
       do
-        call settle(moving, catalogue, patience, strobe, stretch)
+        call settle(moving, catalogue, patience, section, stretch)
         if (stretch%known .or. .not. stretch%ok) exit
-        call identify(moving, strobe, stretch%returns, max_period, found, ok)
+        call identify(moving, section, stretch%returns, max_period, found, ok)
         if (ok) then
           if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
-        if (find_box(catalogue, section_point(moving, strobe), stretch%regime) > 0) exit
+        if (find_box(catalogue, section_point(moving, section), stretch%regime) > 0) exit
         if (2*patience > span%extension*span%duration) then
-          call look_longer(moving, max_period, longer, stretch, strobe, catalogue)
+          call look_longer(moving, max_period, longer, stretch, section, catalogue)
           exit
         end if
         patience = 2*patience
@@ -85,12 +85,12 @@ contains
 
   !> The end of patience: the motion without impact of a linear oscillator is known without it; any other is watched for a fixed
   !> number of periods more if it may take `longer`, and if it has come to no cycle then, it is not periodic, or not known.
-  pure subroutine look_longer(moving, max_period, longer, stretch, strobe, catalogue)
+  pure subroutine look_longer(moving, max_period, longer, stretch, section, catalogue)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: max_period
     logical, intent(in) :: longer
     type(stretch_t), intent(in) :: stretch
-    type(strobe_t), intent(inout) :: strobe
+    type(section_state_t), intent(inout) :: section
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     type(attractor_t) :: found, cycle_found
     type(returns_t) :: returns
@@ -106,16 +106,16 @@ contains
     lasts = .false.
     forgets = .false.
     do
-      call watch_long(moving, catalogue, stretch%amplitude, strobe, found, returns, known, ok)
+      call watch_long(moving, catalogue, stretch%amplitude, section, found, returns, known, ok)
       if (known .or. .not. ok) return
-      call identify(moving, strobe, returns, max_period, cycle_found, ok)
+      call identify(moving, section, returns, max_period, cycle_found, ok)
       if (ok) then
         if (.not. holds(moving, catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
         return
       end if
-      if (.not. has_no_clock(moving)) call tell_family(moving, strobe, stretch%amplitude, min(max_period, longest_period), found)
+      if (.not. has_no_clock(moving)) call tell_family(moving, section, stretch%amplitude, min(max_period, longest_period), found)
       if (lasts .or. found%kind /= kind_chaotic .or. meets_chaos(catalogue, found)) exit
-      call outlast(moving, catalogue, strobe, returns, known, forgets, ok)
+      call outlast(moving, catalogue, section, returns, known, forgets, ok)
       if (known .or. .not. ok) return
       lasts = .true.
     end do
@@ -152,35 +152,35 @@ contains
   end subroutine motion_without_impact
 
   !> The attractor at which a settled state is, if it is at rest or periodic.
-  pure subroutine identify(moving, strobe, returns, max_period, found, ok)
+  pure subroutine identify(moving, section, returns, max_period, found, ok)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     type(returns_t), intent(in) :: returns
     integer, intent(in) :: max_period
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
     ok = .false.
-    if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, strobe, returns%period, found, ok)
-    if (.not. ok) call recognise(moving, strobe, min(max_period, longest_period), found, ok)
-    if (.not. ok .and. returns%period > 0) call exact_cycle(moving, strobe, returns%period, found, ok)
+    if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, section, returns%period, found, ok)
+    if (.not. ok) call recognise(moving, section, min(max_period, longest_period), found, ok)
+    if (.not. ok .and. returns%period > 0) call exact_cycle(moving, section, returns%period, found, ok)
     if (.not. is_undriven(moving)) return
     if (ok) then
       call take_as_one_point(moving, found)
       call tell_equilibrium(found)
     else
-      call recognise_equilibrium(moving, strobe, found, ok)
-      if (.not. ok .and. has_no_clock(moving)) call recognise_by_event(moving, strobe, min(max_period, longest_period), found, ok)
+      call recognise_equilibrium(moving, section, found, ok)
+      if (.not. ok .and. has_no_clock(moving)) call recognise_by_event(moving, section, min(max_period, longest_period), found, ok)
     end if
   end subroutine identify
 
   !> The equilibrium that a state approaches: what is left of its motion shrinks with the motion, and never looks like a return.
-  pure subroutine recognise_equilibrium(moving, strobe, found, ok)
+  pure subroutine recognise_equilibrium(moving, section, found, ok)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
     real(wp) :: point(most_coordinates)
-    point = section_point(moving, strobe)
+    point = section_point(moving, section)
     call refine_cycle(moving, point(:coordinates_of(moving)), 1, found, ok)
     if (.not. ok) return
     found%section = section_state(moving, found%points(:, 1))
@@ -217,27 +217,27 @@ contains
   end subroutine tell_equilibrium
 
   !> The limit cycle of a machine without a clock at which a settled state is, by its returns to where it turns round.
-  pure subroutine recognise_by_event(moving, strobe, max_period, found, ok)
+  pure subroutine recognise_by_event(moving, section, max_period, found, ok)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     integer, intent(in) :: max_period
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
     type(motion_t) :: turning
-    type(strobe_t) :: later
+    type(section_state_t) :: later
     type(tally_t) :: unused
     integer :: reason
     turning = moving
     turning%by_event = .true.
-    later = strobe
-    call advance_strobe_period(turning, later, unused, reason)
+    later = section
+    call advance_section_period(turning, later, unused, reason)
     ok = reason == 0
     if (ok) call recognise(turning, later, max_period, found, ok)
     ! What turns round by rounding alone is on no cycle.
     if (ok) ok = found%features%amplitude > 1e-9_wp*max(abs(found%features%x_max), abs(found%features%x_min))
   end subroutine recognise_by_event
 
-  !> Whether a catalogue has an attractor already, found again from a start that was not captured in time.
+  !> Whether a catalogue has an attractor already, found again from a start that was not converged in time.
   pure logical function holds(moving, catalogue, found)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:), found
@@ -246,31 +246,31 @@ contains
     else if (found%by_event) then
       holds = find_capture(catalogue, found%points(:, 1), .true., by_event=.true.) > 0
     else
-      holds = captor_of_point(moving, catalogue, found%points(:, 1), .not. found%rests) > 0
+      holds = attractor_reached_at(moving, catalogue, found%points(:, 1), .not. found%rests) > 0
     end if
   end function holds
 
-  !> Runs for `patience` [s] unless captured before, or back at a state from which a completed chatter has led to it again.
-  pure subroutine settle(moving, catalogue, patience, strobe, stretch)
+  !> Runs for `patience` [s] unless converged before, or back at a state from which a completed chatter has led to it again.
+  pure subroutine settle(moving, catalogue, patience, section, stretch)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: patience
-    type(strobe_t), intent(inout) :: strobe
+    type(section_state_t), intent(inout) :: section
     type(stretch_t), intent(out) :: stretch
     type(tally_t) :: tally
     integer(int64) :: slips
     integer :: i, reason
     logical :: whole
-    call begin_tally(moving, strobe, tally)
+    call begin_tally(moving, section, tally)
     do i = 1, max(1, ceiling(patience/moving%machine%period))
       slips = tally%slips
-      whole = .not. strobe%state%time > 0 .and. rest_lasts(moving)
-      call advance_strobe_period(moving, strobe, tally, reason)
+      whole = .not. section%state%time > 0 .and. rest_lasts(moving)
+      call advance_section_period(moving, section, tally, reason)
       stretch%ok = reason == 0
       if (.not. stretch%ok) return
-      stretch%known = captor_of(moving, catalogue, strobe, .not. whole .or. tally%slips > slips) > 0
+      stretch%known = attractor_reached(moving, catalogue, section, .not. whole .or. tally%slips > slips) > 0
       if (stretch%known) return
-      call watch_returns(moving, strobe, tally%chatters, stretch%returns)
+      call watch_returns(moving, section, tally%chatters, stretch%returns)
       if (stretch%returns%period > 0 .and. stretch%returns%chattered) exit
     end do
     associate (features => features_over(moving, tally, 1.0_wp))
@@ -280,22 +280,22 @@ contains
   end subroutine settle
 
   !> The attractor at which a settled state is, if it is at rest or periodic.
-  pure subroutine recognise(moving, strobe, max_period, found, ok)
+  pure subroutine recognise(moving, section, max_period, found, ok)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     integer, intent(in) :: max_period
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
-    type(strobe_t) :: later
+    type(section_state_t) :: later
     type(tally_t) :: tally
     real(wp) :: points(most_coordinates, 0:2*longest_period)
     type(motion_t) :: free
     integer :: i, p, reason, n, first, places
-    later = strobe
+    later = section
     call begin_tally(moving, later, tally)
     points(:, 0) = section_point(moving, later)
     do i = 1, 2*max_period
-      call advance_strobe_period(moving, later, tally, reason)
+      call advance_section_period(moving, later, tally, reason)
       ok = reason == 0
       if (.not. ok) return
       points(:, i) = section_point(moving, later)
@@ -311,7 +311,7 @@ contains
       found%turn = moving%machine%turn
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0
-      found%features%word = cycle_word(moving, strobe, 1)
+      found%features%word = cycle_word(moving, section, 1)
       found%section = section_state(moving, points(:, 0))
       return
     end if
@@ -341,16 +341,16 @@ contains
   pure logical function comes_back(moving, free, cycle)
     type(motion_t), intent(in) :: moving, free
     type(attractor_t), intent(in) :: cycle
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     type(tally_t) :: unused
     real(wp) :: before(most_coordinates), after(most_coordinates)
     integer :: i, reason
-    strobe = strobe_at(free, cycle%points(:cycle%coordinates, 1))
-    before = section_point(moving, strobe)
+    section = section_at(free, cycle%points(:cycle%coordinates, 1))
+    before = section_point(moving, section)
     do i = 1, cycle%period
-      call advance_strobe_period(free, strobe, unused, reason)
+      call advance_section_period(free, section, unused, reason)
     end do
-    after = section_point(moving, strobe)
+    after = section_point(moving, section)
     comes_back = all(abs(after(:cycle%places) - before(:cycle%places)) <= 1e-9_wp*maxval(cycle%scale(:cycle%coordinates)))
   end function comes_back
 

@@ -13,7 +13,7 @@ module exact_return
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, section_point, section_state, strobe_at, strobe_t
+  use section, only: advance_section_period, begin_tally, coordinates_of, section_point, section_state, section_at, section_state_t
   implicit none
   private
 
@@ -51,15 +51,15 @@ contains
   end subroutine watch_anew
 
   !> Notes the state on the next section; `chatters` is a running count.
-  pure subroutine watch_returns(moving, strobe, chatters, returns)
+  pure subroutine watch_returns(moving, section, chatters, returns)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     integer(int64), intent(in) :: chatters
     type(returns_t), intent(inout) :: returns
     real(wp) :: now(most_coordinates + 1)
-    now = [section_point(moving, strobe), strobe%state%z]
+    now = [section_point(moving, section), section%state%z]
     returns%since = returns%since + 1
-    if (strobe%state%mode == returns%kept_mode .and. .not. any(abs(now - returns%kept) > 0)) then
+    if (section%state%mode == returns%kept_mode .and. .not. any(abs(now - returns%kept) > 0)) then
       returns%period = returns%since
       returns%chattered = chatters > returns%kept_chatters
     else if (returns%since < returns%stride) then
@@ -68,22 +68,22 @@ contains
       returns%stride = 2*returns%stride
     end if
     returns%kept = now
-    returns%kept_mode = strobe%state%mode
+    returns%kept_mode = section%state%mode
     returns%kept_chatters = chatters
     returns%since = 0
   end subroutine watch_returns
 
   !> The attractor of a state on the section that comes back after `period` drive periods. `found` is false if it is not
   !> stable, one of a family, or its return owed to rounding. A cycle with a completed chatter has the multipliers 0.
-  pure subroutine exact_cycle(moving, strobe, period, attractor, found)
+  pure subroutine exact_cycle(moving, section, period, attractor, found)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     integer, intent(in) :: period
     type(attractor_t), intent(out) :: attractor
     logical, intent(out) :: found
     real(wp), allocatable :: points(:, :), jacobian(:, :)
     logical, allocatable :: chattered(:)
-    type(strobe_t) :: first
+    type(section_state_t) :: first
     type(tally_t) :: tally
     integer :: n, i, start, reason
     found = .false.
@@ -92,14 +92,14 @@ contains
     attractor%coordinates = n
     attractor%turn = moving%machine%turn
     allocate (points(most_coordinates, 0:period), jacobian(n, n), chattered(period))
-    call collect(moving, strobe, period, points, chattered, tally, found)
+    call collect(moving, section, period, points, chattered, tally, found)
     if (.not. found) return
     attractor%scale = scale_of(moving, tally)
     attractor%period = smallest_period(points(:n, 0:period - 1), attractor%scale(:n), attractor%turn)
     start = minloc(points(1, :attractor%period - 1), 1) - 1
-    first = strobe
+    first = section
     do i = 1, start
-      call advance_strobe_period(moving, first, tally, reason)
+      call advance_section_period(moving, first, tally, reason)
     end do
     call make_points(attractor, attractor%period)
     attractor%metric([(i*(i + 1)/2, i=1, n)], :) = 1
@@ -158,24 +158,24 @@ contains
 
   !> Section points of `periods` drive periods from a state on, what happened meanwhile, and whether a chatter was completed in
   !> each.
-  pure subroutine collect(moving, strobe, periods, points, chattered, tally, ok)
+  pure subroutine collect(moving, section, periods, points, chattered, tally, ok)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     integer, intent(in) :: periods
     real(wp), intent(out) :: points(:, 0:)
     logical, intent(out) :: chattered(:)
     type(tally_t), intent(inout) :: tally
     logical, intent(out) :: ok
-    type(strobe_t) :: later
+    type(section_state_t) :: later
     integer(int64) :: before
     integer :: i, reason
-    later = strobe
+    later = section
     call begin_tally(moving, later, tally)
     points(:, 0) = section_point(moving, later)
     chattered = .false.
     do i = 1, periods
       before = tally%chatters
-      call advance_strobe_period(moving, later, tally, reason)
+      call advance_section_period(moving, later, tally, reason)
       ok = reason == 0
       if (.not. ok) return
       points(:, i) = section_point(moving, later)
@@ -230,19 +230,19 @@ contains
     integer, intent(in) :: i
     real(wp), intent(in) :: point(:), radius
     logical, intent(in) :: chatters
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     type(tally_t) :: tally
     real(wp) :: reached(most_coordinates), distance
     integer :: k, n, reason
     follows = .false.
     n = attractor%coordinates
-    strobe = strobe_at(moving, point)
-    call begin_tally(moving, strobe, tally)
+    section = section_at(moving, point)
+    call begin_tally(moving, section, tally)
     do k = 1, attractor%period
-      call advance_strobe_period(moving, strobe, tally, reason)
+      call advance_section_period(moving, section, tally, reason)
       if (reason /= 0) return
       associate (wanted => attractor%points(:, 1 + modulo(i + k - 1, attractor%period)))
-        reached = point_near(section_point(moving, strobe), wanted, attractor%turn)
+        reached = point_near(section_point(moving, section), wanted, attractor%turn)
         distance = norm2((reached(:n) - wanted(:n))/attractor%scale(:n))
       end associate
       follows = distance <= max(merged*radius, rounding) .and. (tally%chatters > 0 .or. .not. chatters)

@@ -9,7 +9,7 @@ module motion_features
   use machine_facts, only: rides_along
   use motion, only: motion_t
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, strobe_t
+  use section, only: advance_section_period, begin_tally, section_state_t
   implicit none
   private
 
@@ -30,19 +30,19 @@ contains
   end function features_over
 
   !> Event word of the cycle of `periods` drive periods that a state on the section has reached, wherever on it that is.
-  pure integer(int64) function cycle_word(moving, strobe, periods) result(word)
+  pure integer(int64) function cycle_word(moving, section, periods) result(word)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     integer, intent(in) :: periods
     integer(int64) :: words(periods)
-    type(strobe_t) :: later
+    type(section_state_t) :: later
     type(tally_t) :: tally
     integer :: i, reason
-    later = strobe
+    later = section
     words = 0
     do i = 1, periods
       call begin_tally(moving, later, tally)
-      call advance_strobe_period(moving, later, tally, reason)
+      call advance_section_period(moving, later, tally, reason)
       if (reason /= 0) exit
       words(i) = tally%word
     end do

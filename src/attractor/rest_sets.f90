@@ -10,7 +10,7 @@ module rest_sets
   use machine_facts, only: has_driver, is_one_body
   use motion, only: motion_t
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, strobe_at, strobe_t, turn_of
+  use section, only: advance_section_period, begin_tally, coordinates_of, section_at, section_state_t, turn_of
   implicit none
   private
 
@@ -60,12 +60,12 @@ contains
   pure logical function stays(moving, point)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     type(tally_t) :: tally
     integer :: reason
-    strobe = strobe_at(moving, point)
-    call begin_tally(moving, strobe, tally)
-    call advance_strobe_period(moving, strobe, tally, reason)
+    section = section_at(moving, point)
+    call begin_tally(moving, section, tally)
+    call advance_section_period(moving, section, tally, reason)
     stays = reason == 0 .and. tally%slips == 0
   end function stays
 

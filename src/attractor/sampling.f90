@@ -6,7 +6,7 @@ module sampling
   use kinds, only: wp
   use motion, only: motion_t
   use motion_state, only: place_of, tally_t
-  use strobe, only: advance_strobe, advance_strobe_period, driver_now, start_strobe, strobe_t
+  use section, only: advance_section, advance_section_period, driver_now, start_section, section_state_t
   implicit none
   private
 
@@ -22,22 +22,22 @@ contains
     real(wp), intent(in) :: start(3), times(:)
     real(wp), intent(out) :: x(:), driver(:)
     integer, intent(out) :: reason
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     type(tally_t) :: tally
-    real(wp) :: section
+    real(wp) :: section_time
     integer :: i
     reason = 0
     driver = 0
-    strobe = start_strobe(moving, start)
-    section = -strobe%state%time
+    section = start_section(moving, start)
+    section_time = -section%state%time
     do i = 1, size(times)
-      do while (times(i) - section >= moving%machine%period .and. reason == 0)
-        call advance_strobe_period(moving, strobe, tally, reason)
-        section = section + moving%machine%period
+      do while (times(i) - section_time >= moving%machine%period .and. reason == 0)
+        call advance_section_period(moving, section, tally, reason)
+        section_time = section_time + moving%machine%period
       end do
-      if (reason == 0) call advance_strobe(moving, strobe, times(i) - section, tally, reason)
-      x(i) = place_of(strobe%state)
-      associate (now => driver_now(moving, strobe))
+      if (reason == 0) call advance_section(moving, section, times(i) - section_time, tally, reason)
+      x(i) = place_of(section%state)
+      associate (now => driver_now(moving, section))
         driver(i) = now(1)
       end associate
     end do

@@ -9,7 +9,7 @@ module settled_cycle
   use kinds, only: wp
   use motion, only: motion_t
   use status, only: reason_settled, reason_time_over
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use single_trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
   private
 

@@ -7,14 +7,14 @@ module start_label
   use kinds, only: wp
   use motion, only: motion_t
   use status, only: reason_left_domain
-  use strobe, only: strobe_t
-  use trajectory, only: outcome_t, run_from_section, span_t
+  use section, only: section_state_t
+  use single_trajectory, only: outcome_t, run_from_section, span_t
   implicit none
   private
 
   public :: label_of, label_from
 
-  !> Labels that are no attractors: the motion is not known (not captured, or given up), or it has left the domain.
+  !> Labels that are no attractors: the motion is not known (not converged, or given up), or it has left the domain.
   integer, parameter, public :: label_not_known = 0, label_left_domain = -1
 
 contains
@@ -27,13 +27,13 @@ contains
   end function label_of
 
   !> Label of a state on the section.
-  pure integer function label_from(moving, catalogue, span, strobe) result(label)
+  pure integer function label_from(moving, catalogue, span, section) result(label)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
-    type(strobe_t), intent(in) :: strobe
+    type(section_state_t), intent(in) :: section
     type(outcome_t) :: outcome
-    call run_from_section(moving, catalogue, span, strobe, outcome)
+    call run_from_section(moving, catalogue, span, section, outcome)
     label = label_of(outcome)
   end function label_from
 

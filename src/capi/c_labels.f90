@@ -18,7 +18,7 @@ module c_labels
   use status, only: exit_resumable, exit_usage
   use text, only: to_text
   use trajectories, only: block_size, run_trajectories
-  use trajectory, only: outcome_t
+  use single_trajectory, only: outcome_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
   implicit none
@@ -98,7 +98,7 @@ contains
           exit
         end if
         if (.not. is_start(prepared, starts(:, i))) cycle
-        call discover_attractors(prepared%journey%moving, prepared%journey%span, starts(:, i:i), settings%max_period, &
+        call discover_attractors(prepared%ensemble%moving, prepared%ensemble%span, starts(:, i:i), settings%max_period, &
                                  self%attractors)
       end do
     end associate
@@ -145,7 +145,7 @@ contains
         numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
                    one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
                    margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
-                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, has_driver(self%prepared%journey%moving)), &
+                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, has_driver(self%prepared%ensemble%moving)), &
                    real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
         shown = min(point_count, point_capacity)
@@ -199,7 +199,7 @@ contains
     type(error_t), allocatable :: error
     integer :: first, last, points
     call c_f_pointer(catalogue, self)
-    points = block_size(self%prepared%journey)
+    points = block_size(self%prepared%ensemble)
     last = 0
     do while (last < start_count)
       first = last + 1
@@ -223,7 +223,7 @@ contains
     integer, allocatable :: allowed(:)
     integer :: i
     allowed = pack([(i, i=1, size(starts, 2))], [(is_start(self%prepared, starts(:, i)), i=1, size(starts, 2))])
-    call run_trajectories(self%prepared%journey, self%attractors, starts(:, allowed), outcomes(:size(allowed)))
+    call run_trajectories(self%prepared%ensemble, self%attractors, starts(:, allowed), outcomes(:size(allowed)))
     values = 0
     do i = 1, size(allowed)
       values(:, allowed(i)) = outcome_values(outcomes(i))

@@ -4,20 +4,20 @@
 !> The machine of a model with other values, ready for whole trajectories as the program flies them.
 module c_machine
   use axis, only: axis_t
-  use basin, only: open_journey
+  use basin, only: open_ensemble
   use case_check, only: beyond
   use case_setup, only: grid_of
   use case_type, only: case_t
   use errors, only: error_t
-  use fleet, only: prepare_flow
+  use lane_slots, only: prepare_flow
   use grid, only: grid_t, slice_motion
   use kinds, only: int64, wp
   use model_type, only: check_values, model_t
   use parameter_list, only: put_values
   use span_check, only: check_periods
-  use strobe, only: start_is_allowed
-  use trajectories, only: describe_all, describe_regime, journey_t
-  use trajectory, only: span_t
+  use section, only: start_is_allowed
+  use trajectories, only: describe_all, describe_regime, ensemble_t
+  use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none
   private
@@ -28,7 +28,7 @@ module c_machine
   type, public :: prepared_t
     type(case_t) :: the_case
     type(grid_t) :: grid
-    type(journey_t) :: journey
+    type(ensemble_t) :: ensemble
   end type prepared_t
 
 contains
@@ -57,16 +57,16 @@ contains
     end do
     prepared%grid = grid_of(prepared%the_case, axes)
     if (to_label) then
-      call open_journey(prepared%grid, span, 0_int64, describe_all, prepared%journey, error)
+      call open_ensemble(prepared%grid, span, 0_int64, describe_all, prepared%ensemble, error)
       return
     end if
-    associate (journey => prepared%journey)
-      call slice_motion(prepared%grid, 0_int64, journey%moving, error)
-      if (.not. allocated(error)) call check_periods(span, journey%moving%machine%period, error)
+    associate (ensemble => prepared%ensemble)
+      call slice_motion(prepared%grid, 0_int64, ensemble%moving, error)
+      if (.not. allocated(error)) call check_periods(span, ensemble%moving%machine%period, error)
       if (allocated(error)) return
-      journey%span = span
-      journey%describe = describe_regime
-      call prepare_flow(journey%moving, journey%flow)
+      ensemble%span = span
+      ensemble%describe = describe_regime
+      call prepare_flow(ensemble%moving, ensemble%flow)
     end associate
   end subroutine prepare_machine
 
@@ -79,7 +79,7 @@ contains
     problem = 'found a number that is not finite'
     if (.not. all(ieee_is_finite(start))) return
     problem = ''
-    if (start_is_allowed(prepared%journey%moving, start)) return
+    if (start_is_allowed(prepared%ensemble%moving, start)) return
     problem = beyond(prepared%the_case, no_axes, start(1))
     if (len(problem) == 0) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
   end function start_problem
@@ -89,7 +89,7 @@ contains
     type(prepared_t), intent(in) :: prepared
     real(wp), intent(in) :: start(3)
     is_start = all(ieee_is_finite(start))
-    if (is_start) is_start = start_is_allowed(prepared%journey%moving, start)
+    if (is_start) is_start = start_is_allowed(prepared%ensemble%moving, start)
   end function is_start
 
 end module c_machine

@@ -22,7 +22,7 @@ module c_trajectory
   use status, only: exit_given_up, exit_usage, is_given_up, reason_name, reason_time_over
   use text, only: to_text
   use trajectories, only: run_trajectories
-  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
+  use single_trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_positive_inf, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
   implicit none
@@ -66,10 +66,10 @@ contains
       sample_count = log%samples
       event_count = log%events
       kept = min(sample_count, sample_capacity)
-      if (kept > 0) call put_samples(prepared%journey%moving, start(3), log, kept, sample)
+      if (kept > 0) call put_samples(prepared%ensemble%moving, start(3), log, kept, sample)
       kept = min(event_count, event_capacity)
-      if (kept > 0) call put_events(prepared%journey%moving, log, kept, event)
-      call summarise(prepared%journey%moving, log, outcome, summary)
+      if (kept > 0) call put_events(prepared%ensemble%moving, log, kept, event)
+      call summarise(prepared%ensemble%moving, log, outcome, summary)
       summary(28) = merge(1.0_wp, 0.0_wp, position_is_angle(self%the_case%laws))
       if (is_given_up(outcome%reason)) call fail(error, exit_given_up, 'the motion was given up: '//reason_name(outcome%reason))
     end if
@@ -96,13 +96,13 @@ contains
     if (duration > 0) span%duration = duration
     span%window = min(span%window, span%duration)
     span%extension = 1
-    span%stop_when_captured = .false.
+    span%stop_when_converged = .false.
     call prepare_machine(self, chosen, values, span, .false., prepared, error)
     if (allocated(error)) return
     problem = start_problem(prepared, start)
     samples = samples_per_period
     if (samples == 0) samples = self%the_case%trajectory%samples_per_period
-    associate (period => prepared%journey%moving%machine%period)
+    associate (period => prepared%ensemble%moving%machine%period)
       if (len(problem) > 0) then
         call fail(error, exit_usage, 'start: '//problem)
       else if (samples*(span%duration/period) > most_samples) then
@@ -129,8 +129,8 @@ contains
     type(attractor_t) :: cycle
     type(outcome_t) :: ends(1)
     type(span_t) :: span
-    span = prepared%journey%span
-    associate (moving => prepared%journey%moving)
+    span = prepared%ensemble%span
+    associate (moving => prepared%ensemble%moving)
       call fit_window(moving%machine%period, span)
       call run_trajectory(moving, no_catalogue, span, start(1), start(2), start(3), outcome, log)
       if (.not. another_duration) then
@@ -138,7 +138,7 @@ contains
         summary(26) = cycle%period
       end if
     end associate
-    call run_trajectories(prepared%journey, no_catalogue, reshape(start, [3, 1]), ends)
+    call run_trajectories(prepared%ensemble, no_catalogue, reshape(start, [3, 1]), ends)
     associate (last => ends(1))
       summary(:6) = [last%x, last%v, real(last%impacts, wp), last%last_impact_speed, real(last%features%regime, wp), &
                      real(last%reason, wp)]
@@ -170,10 +170,10 @@ contains
       column = contact_forces(moving, log)
       sample(7, :kept) = column(:kept)
     end if
-    sample(8, :kept) = log%sample_book(5, :kept)
+    sample(8, :kept) = log%sample_balance(5, :kept)
     column = kinetic_energies(moving, log)
     sample(9, :kept) = column(:kept)
-    sample(10:13, :kept) = log%sample_book(:4, :kept)
+    sample(10:13, :kept) = log%sample_balance(:4, :kept)
   end subroutine put_samples
 
   !> Rows: kind, time, x, v before and after, driving body: x and v.
@@ -188,7 +188,7 @@ contains
     if (has_driver(moving)) event(6:7, :kept) = log%event_driver(:, :kept)
   end subroutine put_events
 
-  !> The steady values, the machine and the book of energy.
+  !> The steady values, the machine and the balance of energy.
   subroutine summarise(moving, log, outcome, summary)
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log
@@ -199,13 +199,13 @@ contains
     stops = stops_of(moving)
     barriers = barrier_positions(stops)
     where (abs(barriers) > unreachable) barriers = sign(ieee_value(1.0_wp, ieee_positive_inf), barriers)
-    associate (f => outcome%window, book => log%book)
+    associate (f => outcome%window, balance => log%balance)
       summary(7:12) = [f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed]
       summary(13:18) = [moving%machine%period, barriers, merge(1.0_wp, 0.0_wp, stops%soft), &
                         merge(1.0_wp, 0.0_wp, has_driver(moving)), real(outcome%reason, wp)]
-      summary(19:23) = [book%at_start, book%friction, book%damping, book%contact, book%work]
+      summary(19:23) = [balance%at_start, balance%friction, balance%damping, balance%contact, balance%work]
       summary(27) = merge(1.0_wp, 0.0_wp, has_drive_period(moving))
-      if (outcome%reason == reason_time_over) summary(24:25) = [book%at_end, closing_error(book)]
+      if (outcome%reason == reason_time_over) summary(24:25) = [balance%at_end, closing_error(balance)]
     end associate
   end subroutine summarise
 

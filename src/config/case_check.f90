@@ -20,7 +20,7 @@ module case_check
   use motion_state, only: options_t
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
-  use strobe, only: start_is_allowed
+  use section, only: start_is_allowed
   use text, only: to_text
   implicit none
   private

@@ -12,7 +12,7 @@ module case_setup
   use motion_state, only: flight_adaptive, flight_auto, flight_exact, options_t
   use refinement, only: refine_t
   use text, only: parse_integer
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   implicit none
   private
 
@@ -65,7 +65,7 @@ contains
     span%window = the_case%run%window
     span%whole_periods = the_case%run%average == 'whole_periods'
     span%extension = the_case%run%extension
-    span%stop_when_captured = the_case%run%stop == 'captured'
+    span%stop_when_converged = the_case%run%stop == 'captured'
   end function span_of
 
   !> The grid of a case over `axes`.

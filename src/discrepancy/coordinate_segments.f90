@@ -94,7 +94,7 @@ contains
   pure subroutine open_run(run)
     type(run_t), intent(out) :: run
     run%log%sample_interval = 1
-    run%log%book%kept = .false.
+    run%log%balance%kept = .false.
     allocate (run%impact(5, 16))
   end subroutine open_run
 

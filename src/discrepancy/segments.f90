@@ -122,7 +122,7 @@ contains
   pure subroutine open_run(run)
     type(run_t), intent(out) :: run
     run%log%sample_interval = 1
-    run%log%book%kept = .false.
+    run%log%balance%kept = .false.
     allocate (run%flight%impact(4, 16), run%flight%x(0), run%flight%v(0))
   end subroutine open_run
 

@@ -5,7 +5,7 @@
 !> leaves to the event loop flies there with all its neighbours.
 module segments_in_lanes
   use contact_law, only: barrier_positions
-  use fleet, only: prepare_flow
+  use lane_slots, only: prepare_flow
   use kinds, only: wp
   use lane_sampling, only: can_sample, sample_in_lanes, sampled_t
   use lane_types, only: lane_flow_t

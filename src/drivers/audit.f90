@@ -5,7 +5,7 @@
 module audit
   use kinds, only: int64, wp
   use random, only: uniform
-  use trajectory, only: outcome_t
+  use single_trajectory, only: outcome_t
   implicit none
   private
 

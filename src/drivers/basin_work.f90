@@ -13,7 +13,7 @@ module basin_work
   use refinement, only: last_origin
   use session, only: session_t
   use status, only: last_reason, reason_settled, reason_time_over
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   implicit none
   private
 

@@ -5,7 +5,7 @@
 !> run again, in double and in quadruple precision.
 module boundary_audit
   use audit, only: audit_t, sampled
-  use basin, only: catalogue_t, open_journey
+  use basin, only: catalogue_t, open_ensemble
   use bisection, only: label_starts
   use case_setup, only: grid_of, options_of, span_of
   use case_type, only: case_t
@@ -22,7 +22,7 @@ module boundary_audit
   use status, only: exit_io, reason_left_domain
   use stored_map, only: restore_catalogues
   use text, only: to_text
-  use trajectories, only: describe_regime, journey_t
+  use trajectories, only: describe_regime, ensemble_t
   implicit none
   private
 
@@ -120,7 +120,7 @@ contains
     type(serial_team_t) :: alone
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
-    type(journey_t) :: journey
+    type(ensemble_t) :: ensemble
     type(points_t) :: points
     integer, allocatable :: found(:), index(:, :)
     integer :: axes(2), i, k, chosen(1)
@@ -138,8 +138,8 @@ contains
       chosen = sampled([size(found)], audit%whole, seed, i)
       k = found(chosen(1))
       associate (here => index(:, points%piece(k)))
-        call open_journey(grid, span_of(the_case), point_slice(grid, here), describe_regime, journey, error)
-        if (.not. allocated(error)) call compare_sides(grid, axes, here, points, k, journey, &
+        call open_ensemble(grid, span_of(the_case), point_slice(grid, here), describe_regime, ensemble, error)
+        if (.not. allocated(error)) call compare_sides(grid, axes, here, points, k, ensemble, &
                                                        catalogues(point_slice(grid, here) + 1), the_case, audit, error)
       end associate
       if (allocated(error)) return
@@ -183,11 +183,11 @@ contains
 
   !> Whether the labels on both sides of point `k` are those of the file, in the plane through the index `here`: at the ends of its
   !> interval in double precision, in quadruple precision there or a little further out, where rounding does not matter.
-  subroutine compare_sides(grid, axes, here, points, k, journey, catalogue, the_case, audit, error)
+  subroutine compare_sides(grid, axes, here, points, k, ensemble, catalogue, the_case, audit, error)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: axes(2), here(:), k
     type(points_t), intent(in) :: points
-    type(journey_t), intent(in) :: journey
+    type(ensemble_t), intent(in) :: ensemble
     type(catalogue_t), intent(in) :: catalogue
     type(case_t), intent(in) :: the_case
     type(audit_t), intent(inout) :: audit
@@ -199,7 +199,7 @@ contains
     audit%points = audit%points + 1
     call ends_of_interval(grid, axes, here, points, k, starts, exact)
     if (exact) then
-      call label_starts(journey, catalogue%attractors, starts, labels)
+      call label_starts(ensemble, catalogue%attractors, starts, labels)
       if (any(labels /= wanted)) then
         audit%differing = audit%differing + 1
         if (audit%differing == 1) audit%first_difference = 'point '//to_text(k - 1)//': the file has '//to_text(wanted(1))// &
@@ -215,7 +215,7 @@ contains
         end associate
         starts(:, side) = start_at(grid, axes, here, place)
       end do
-      call ask_reference(laws_at(grid, axes, here, points%place(:, k)), journey, catalogue, the_case, starts(:3, :), wanted, &
+      call ask_reference(laws_at(grid, axes, here, points%place(:, k)), ensemble, catalogue, the_case, starts(:3, :), wanted, &
                          confirmed, error)
       if (allocated(error)) return
       if (confirmed) exit
@@ -258,9 +258,9 @@ contains
   end subroutine ends_of_interval
 
   !> Whether both starts have the labels `wanted` in quadruple precision.
-  subroutine ask_reference(laws, journey, catalogue, the_case, starts, wanted, same, error)
+  subroutine ask_reference(laws, ensemble, catalogue, the_case, starts, wanted, same, error)
     type(law_choice_t), intent(in) :: laws(:)
-    type(journey_t), intent(in) :: journey
+    type(ensemble_t), intent(in) :: ensemble
     type(catalogue_t), intent(in) :: catalogue
     type(case_t), intent(in) :: the_case
     real(wp), intent(in) :: starts(:, :)
@@ -271,7 +271,7 @@ contains
     integer :: side, label
     same = .false.
     do side = 1, 2
-      call run_reference(laws, options_of(the_case), journey%span, catalogue%attractors, starts(:, side:side), results, error)
+      call run_reference(laws, options_of(the_case), ensemble%span, catalogue%attractors, starts(:, side:side), results, error)
       if (allocated(error)) return
       label = max(nint(results(2, 1)), 0)
       if (label == 0 .and. nint(results(1, 1)) == reason_left_domain) label = label_left_domain

@@ -4,7 +4,7 @@
 !> `separatrix boundary`: the boundaries between the basins of a finished map, as curves.
 module boundary_driver
   use axis, only: axis_t
-  use basin, only: catalogue_t, open_journey
+  use basin, only: catalogue_t, open_ensemble
   use boundary_layout, only: describe_boundary
   use boundary_search, only: plane_t, search_lines
   use boundary_lines, only: crossed_edges
@@ -73,7 +73,7 @@ contains
     allocate (names(size(planes)))
     do i = 1, size(planes)
       associate (slice => point_slice(grid, planes(i)%index))
-        call open_journey(grid, span_of(session%the_case), slice, describe_regime, planes(i)%journey, error)
+        call open_ensemble(grid, span_of(session%the_case), slice, describe_regime, planes(i)%ensemble, error)
         call session%stop_if(error)
         planes(i)%attractors = catalogues(slice + 1)%attractors
       end associate

@@ -66,7 +66,7 @@ contains
     names%problem = ''
     if (allocated(error)) names%problem = error%message
     if (allocated(error)) return
-    labeller = labeller_t(plane%journey%moving, plane%attractors, plane%journey%span)
+    labeller = labeller_t(plane%ensemble%moving, plane%attractors, plane%ensemble%span)
     do round = 1, size(most_tracked)
       if (round == 1) points = chosen_points(plane, most_tracked(round))
       ! What is left is mostly where one name ends and another begins.

@@ -11,7 +11,7 @@ module boundary_search
   use grid, only: grid_t, point_start
   use kinds, only: int64, wp
   use session, only: session_t
-  use trajectories, only: journey_t
+  use trajectories, only: ensemble_t
   implicit none
   private
 
@@ -29,7 +29,7 @@ module boundary_search
     integer :: axes(2) = 0
     integer, allocatable :: index(:)
     real(wp), allocatable :: first(:), second(:)
-    type(journey_t) :: journey
+    type(ensemble_t) :: ensemble
     type(attractor_t), allocatable :: attractors(:)
     integer, allocatable :: labels(:, :)
     logical, allocatable :: inferred(:, :)
@@ -112,7 +112,7 @@ contains
         associate (team => session%team)
           mine = [(k, k=first + team%rank(), last, team%size())]
           allocate (own(size(mine)), sums(first:last))
-          call label_starts(plane%journey, plane%attractors, starts(:, mine), own)
+          call label_starts(plane%ensemble, plane%attractors, starts(:, mine), own)
           sums = 0
           sums(mine) = own
           call team%sum(sums)
@@ -227,7 +227,7 @@ contains
       end associate
     end do
     do
-      call halve_intervals(plane%journey, plane%attractors, from, to, tolerance, own, left)
+      call halve_intervals(plane%ensemble, plane%attractors, from, to, tolerance, own, left)
       call session%journal%progress(min(int(last, int64), int(first - 1, int64) + max(size(mine) - left, 0)*session%team%size()))
       if (left == 0) exit
     end do

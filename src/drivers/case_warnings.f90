@@ -18,7 +18,7 @@ module case_warnings
   use kinds, only: int64, wp
   use machine_facts, only: contact_sizes, stops_of
   use motion, only: motion_t
-  use strobe, only: section_obstacle
+  use section, only: section_obstacle
   use text, only: to_text
   use touching_row, only: contacts_in_row
   implicit none

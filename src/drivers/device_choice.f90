@@ -7,7 +7,7 @@ module device_choice
   use case_type, only: case_t
   use command_line, only: command_t
   use errors, only: error_t, fail
-  use fleet, only: prepare_flow
+  use lane_slots, only: prepare_flow
   use grid, only: grid_t, slice_motion, two_axes
   use kinds, only: int64, wp
   use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, gpu_number, use_gpu
@@ -136,7 +136,7 @@ contains
     close (unit)
   end function lines_of
 
-  !> Threads that attend to the bodies of a rank that has so many `neighbours` on its host, itself included: one for each of its
+  !> Threads that service to the bodies of a rank that has so many `neighbours` on its host, itself included: one for each of its
   !> cores.
   integer function threads_of(neighbours) result(threads)
     integer, intent(in) :: neighbours

@@ -14,13 +14,13 @@ module list_audit
   use law_table, only: change_parameter
   use map_reader, only: reader_t
   use point_list, only: point_list_t
-  use points_driver, only: open_list_journey, read_further
+  use points_driver, only: open_list_ensemble, read_further
   use reference, only: run_reference
   use span_check, only: check_periods
   use status, only: exit_io
   use text, only: to_text
-  use trajectories, only: journey_t, run_trajectories
-  use trajectory, only: outcome_t
+  use trajectories, only: ensemble_t, run_trajectories
+  use single_trajectory, only: outcome_t
   implicit none
   private
 
@@ -36,7 +36,7 @@ contains
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
     type(grid_t) :: grid
-    type(journey_t) :: journey
+    type(ensemble_t) :: ensemble
     type(catalogue_t) :: none
     type(outcome_t) :: outcomes(1)
     type(point_list_t) :: list
@@ -57,14 +57,14 @@ contains
         call fail(error, exit_io, "'"//reader%path//"', point "//to_text(point - 1)//': the start is not finite')
         return
       end if
-      call open_point(the_case, list, point, table(point, 3), grid, journey, error)
+      call open_point(the_case, list, point, table(point, 3), grid, ensemble, error)
       if (allocated(error)) then
         error%code = exit_io
         error%message = "'"//reader%path//"', point "//to_text(point - 1)//': '//error%message
         return
       end if
       start(:, 1) = [table(point, 1), table(point, 2), grid%start(3)]
-      call run_trajectories(journey, none%attractors, start, outcomes)
+      call run_trajectories(ensemble, none%attractors, start, outcomes)
       associate (outcome => outcomes(1))
         audit%points = audit%points + 1
         if (abs(outcome%x - table(point, 4)) > 0 .or. abs(outcome%v - table(point, 5)) > 0 &
@@ -73,7 +73,7 @@ contains
           if (audit%differing == 1) audit%first_difference = 'point '//to_text(point - 1)
         end if
       end associate
-      call run_reference(slice_laws(grid, 0_int64), options_of(the_case), journey%span, none%attractors, start, results, error)
+      call run_reference(slice_laws(grid, 0_int64), options_of(the_case), ensemble%span, none%attractors, start, results, error)
       if (allocated(error)) return
       if (nint(results(3, 1)) /= outcomes(1)%features%regime) audit%flips = audit%flips + 1
       call note_deviation(outcomes(1), results(:, 1), audit)
@@ -82,13 +82,13 @@ contains
   end subroutine audit_points
 
   !> The machine of a point of a list, with its own drive `ratio`, where that is above 0, and starts of further bodies.
-  subroutine open_point(the_case, list, point, ratio, grid, journey, error)
+  subroutine open_point(the_case, list, point, ratio, grid, ensemble, error)
     type(case_t), intent(in) :: the_case
     type(point_list_t), intent(in) :: list
     integer, intent(in) :: point
     real(wp), intent(in) :: ratio
     type(grid_t), intent(out) :: grid
-    type(journey_t), intent(out) :: journey
+    type(ensemble_t), intent(out) :: ensemble
     type(error_t), allocatable, intent(out) :: error
     type(axis_t) :: axes(3)
     type(case_t) :: own
@@ -100,8 +100,8 @@ contains
       call change_parameter(own%laws, list%names(k), list%further(k, point), known)
     end do
     grid = grid_of(own, axes(:merge(1, 0, ratio > 0)))
-    call open_list_journey(grid, the_case, journey, error)
-    if (.not. allocated(error)) call check_periods(journey%span, journey%moving%machine%period, error)
+    call open_list_ensemble(grid, the_case, ensemble, error)
+    if (.not. allocated(error)) call check_periods(ensemble%span, ensemble%moving%machine%period, error)
   end subroutine open_point
 
 end module list_audit

@@ -12,7 +12,7 @@ module points_driver
   use endings, only: judge_reasons, report_reasons
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime, axis_dimension
-  use fleet, only: prepare_flow
+  use lane_slots, only: prepare_flow
   use grid, only: grid_t, machine_with, make_grid, point_start, sample_axis, slice_motion
   use kinds, only: int64, int8, wp
   use machine_facts, only: stops_of
@@ -28,12 +28,12 @@ module points_driver
   use text_table, only: table_t
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use work_watch, only: watch_t
-  use trajectories, only: block_size, describe_regime, journey_t, run_on_device
-  use trajectory, only: outcome_t
+  use trajectories, only: block_size, describe_regime, ensemble_t, run_on_device
+  use single_trajectory, only: outcome_t
   implicit none
   private
 
-  public :: run_points, open_list_journey, read_list, read_further, describe_list, end_points
+  public :: run_points, open_list_ensemble, read_list, read_further, describe_list, end_points
 
   integer, parameter, public :: points_per_tile = 256
   !> Starts, final state, impacts, last impact speed, regime, reason.
@@ -46,7 +46,7 @@ module points_driver
   type, extends(point_work_t), public :: list_work_t
     !> The machine of the list, and the starts: a grid along the points.
     type(grid_t) :: grid, starts
-    type(journey_t) :: journey
+    type(ensemble_t) :: ensemble
     type(point_list_t) :: list
     real(wp) :: ratio = -1
     integer(int64) :: reasons(0:last_reason) = 0
@@ -72,13 +72,13 @@ contains
     call open_session(command, session)
     work%variables = point_variables
     work%grid = grid_of(session%the_case, session%the_case%axes(:0))
-    call open_list_journey(work%grid, session%the_case, work%journey, error)
-    work%block = block_size(work%journey)
-    if (.not. allocated(error)) work%ratio = work%journey%moving%machine%drive%ratio
-    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, stops_of(work%journey%moving), &
+    call open_list_ensemble(work%grid, session%the_case, work%ensemble, error)
+    work%block = block_size(work%ensemble)
+    if (.not. allocated(error)) work%ratio = work%ensemble%moving%machine%drive%ratio
+    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, stops_of(work%ensemble%moving), &
                                                      session%the_case%laws, work%list, error)
     if (.not. allocated(error)) work%starts = starts_of(work%grid, work%list)
-    if (.not. allocated(error)) call check_periods(work%journey%span, shortest_period(work), error)
+    if (.not. allocated(error)) call check_periods(work%ensemble%span, shortest_period(work), error)
     call session%stop_if(error)
     path = output_path(command%output, command%path, command%name)
     if (command%shard > 0) path = shard_path(path, command%shard, command%shard_count)
@@ -127,19 +127,19 @@ contains
   end subroutine end_points
 
   !> The machine of a list of starts: whole durations, of whose windows only the regime is told.
-  subroutine open_list_journey(grid, the_case, journey, error)
+  subroutine open_list_ensemble(grid, the_case, ensemble, error)
     type(grid_t), intent(in) :: grid
     type(case_t), intent(in) :: the_case
-    type(journey_t), intent(out) :: journey
+    type(ensemble_t), intent(out) :: ensemble
     type(error_t), allocatable, intent(out) :: error
-    call slice_motion(grid, 0_int64, journey%moving, error)
+    call slice_motion(grid, 0_int64, ensemble%moving, error)
     if (allocated(error)) return
-    call prepare_flow(journey%moving, journey%flow)
-    journey%span = span_of(the_case)
-    journey%span%stop_when_captured = .false.
-    journey%span%extension = 1
-    journey%describe = describe_regime
-  end subroutine open_list_journey
+    call prepare_flow(ensemble%moving, ensemble%flow)
+    ensemble%span = span_of(the_case)
+    ensemble%span%stop_when_converged = .false.
+    ensemble%span%extension = 1
+    ensemble%describe = describe_regime
+  end subroutine open_list_ensemble
 
   !> The starts of a list as a grid along its points.
   pure function starts_of(grid, list) result(starts)
@@ -162,7 +162,7 @@ contains
   !> The drive period of the fastest point.
   pure real(wp) function shortest_period(work)
     type(list_work_t), intent(in) :: work
-    shortest_period = work%journey%moving%machine%period
+    shortest_period = work%ensemble%moving%machine%period
     if (work%ratio > 0) shortest_period = shortest_period*work%ratio/maxval(work%list%ratio)
   end function shortest_period
 
@@ -283,9 +283,9 @@ contains
           last = last + 1
         end do
         if (abs(ratio - self%ratio) > 0) then
-          call machine_with(self%grid, 'drive.ratio', ratio, self%journey%moving, error)
+          call machine_with(self%grid, 'drive.ratio', ratio, self%ensemble%moving, error)
           if (allocated(error)) return
-          call prepare_flow(self%journey%moving, self%journey%flow)
+          call prepare_flow(self%ensemble%moving, self%ensemble%flow)
           self%ratio = ratio
         end if
       end associate
@@ -311,7 +311,7 @@ contains
     do i = 1, size(points)
       starts(:, i) = point_start(work%starts, [points(i)])
     end do
-    call run_on_device(work%journey, no_catalogue, starts, outcomes, whole, error, watch)
+    call run_on_device(work%ensemble, no_catalogue, starts, outcomes, whole, error, watch)
     if (allocated(error) .or. .not. whole) return
     do i = 1, size(points)
       associate (outcome => outcomes(i))

@@ -28,7 +28,7 @@ module second_look
   use team, only: team_t
   use text, only: to_text
   use tiled_run, only: index_in_block, run_tiles
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   implicit none
   private
 

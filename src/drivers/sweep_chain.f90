@@ -12,11 +12,11 @@ module sweep_chain
   use status, only: reason_time_over
   use stop_check, only: check_stop
   use settling, only: settled_t
-  use strobe, only: strobe_t
+  use section, only: section_state_t
   use sweep, only: hold_parameter, hold_t
   use sweep_limits, only: branch_end, limit_not_known, observe_limit
   use team, only: team_t
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -115,21 +115,22 @@ contains
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), observed(2), bracket(2)
-    real(wp) :: limits(limit_numbers, size(values)), course(size(values))
+    real(wp) :: limits(limit_numbers, size(values)), trajectory(size(values))
     type(hold_t) :: held
     type(settled_t) :: settled(size(values))
-    type(strobe_t) :: state
+    type(section_state_t) :: state
     integer :: i, k, found, before, mark, next, outcome
     state%state%x = grid%start(1)
     state%state%v = grid%start(2)
     found = 0
     before = 0
     mark = 0
-    course = values
-    if (.not. up) course = values(size(values):1:-1)
+    trajectory = values
+    if (.not. up) trajectory = values(size(values):1:-1)
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
-      call hold_parameter(grid, span, path, course(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, error)
+      call hold_parameter(grid, span, path, trajectory(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, &
+        error)
       if (allocated(error)) return
       settled(i) = held%settled
       holds(:, k) = numbers_of(held)
@@ -138,8 +139,8 @@ contains
       if (held%reason == reason_time_over) then
         if (before > 0 .and. held%mark /= mark) then
           next = held%mark
-          call observe_limit(grid, span, path, course(before), course(i), state, mark, tolerance, next, observed, error)
-          if (.not. allocated(error)) call branch_end(grid, path, course, settled(:before), state, mark, longest, tolerance, &
+          call observe_limit(grid, span, path, trajectory(before), trajectory(i), state, mark, tolerance, next, observed, error)
+          if (.not. allocated(error)) call branch_end(grid, path, trajectory, settled(:before), state, mark, longest, tolerance, &
                                                       bracket, outcome, error)
           if (allocated(error)) return
           found = found + 1

@@ -24,7 +24,7 @@ module sweep_driver
   use point_columns, only: point_values
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
-  use strobe, only: strobe_t
+  use section, only: section_state_t
   use sweep, only: hold_parameter, hold_t
   use sweep_chain, only: chains_t, hold_reason, new_chains, run_chains
   use sweep_report, only: describe_chains, report_given_up, report_limits
@@ -32,7 +32,7 @@ module sweep_driver
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
   use work_watch, only: watch_t
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   use written_check, only: check_written
   implicit none
   private
@@ -164,7 +164,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(grid_t) :: grid
     type(hold_t) :: held
-    type(strobe_t) :: state
+    type(section_state_t) :: state
     grid = grid_of(session%the_case, session%the_case%axes(:0))
     state%state%x = grid%start(1)
     state%state%v = grid%start(2)

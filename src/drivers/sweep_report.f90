@@ -53,10 +53,10 @@ contains
     if (position_is_angle(session%the_case%laws)) then
       call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 11)
     end if
-    call schema%add_variable('strobe_x', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
+    call schema%add_variable('section_x', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
       units='m', long_name='position at crank angle 0', data=reshape(chains%samples(1, :, :, :), &
       [size(chains%samples)/2]))
-    call schema%add_variable('strobe_v', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
+    call schema%add_variable('section_v', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
       units='m/s', long_name='velocity at crank angle 0', data=reshape(chains%samples(2, :, :, :), &
       [size(chains%samples)/2]))
     if (size(chains%limits) > 0) call add_limits(session, schema, chains%limits)

@@ -22,19 +22,20 @@ module trajectory_driver
   use motion, only: motion_t
   use motion_columns, only: event_columns, motion_column_t, sample_columns
   use motion_history, only: contact_forces, kinetic_energies
-  use motion_state, only: book_t, closing_error, event_names, log_t, open_log
+  use motion_state, only: energy_balance_t, closing_error, event_names, log_t, open_log
   use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
   use status, only: exit_bad_case, exit_done, reason_name, reason_time_over
-  use strobe, only: coordinates_of
+  use section, only: coordinates_of
   use system, only: monotonic_seconds
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
   use trajectory_report, only: counted_over, ended_after, explained, report
-  use trajectory, only: begin_course, begin_record, conclude, course_t, end_record, fit_window, go_on, is_recorded, &
+  use single_trajectory, only: begin_trajectory, begin_record, conclude, trajectory_state_t, end_record, fit_window, go_on, &
+    is_recorded, &
     outcome_t, span_t
   implicit none
   private
@@ -67,7 +68,7 @@ contains
     grid = grid_of(session%the_case, session%the_case%axes(:0))
     span = span_of(session%the_case)
     span%extension = 1
-    span%stop_when_captured = .false.
+    span%stop_when_converged = .false.
     call slice_motion(grid, 0_int64, moving, error)
     if (.not. allocated(error)) call fit_window(moving%machine%period, span)
     if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
@@ -92,7 +93,7 @@ contains
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     call add_columns(event_columns(moving, log), 'event', 'event_', schema)
     call add_energy(moving, log, schema)
-    call add_book(log%book, outcome%reason == reason_time_over, schema)
+    call add_balance(log%balance, outcome%reason == reason_time_over, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
@@ -123,18 +124,18 @@ contains
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout) :: log
     type(attractor_t) :: no_catalogue(0)
-    type(course_t) :: course
+    type(trajectory_state_t) :: trajectory
     real(wp) :: began, periods, searched
     began = monotonic_seconds()
-    call begin_course(moving, span, start, course)
+    call begin_trajectory(moving, span, start, trajectory)
     call session%journal%begin('periods', ceiling(span%duration/moving%machine%period, int64), 0_int64)
-    call begin_record(moving, course, log)
-    do while (is_recorded(course))
-      call go_on(moving, no_catalogue, span, course, outcome, log)
-      call session%journal%progress(int(course%elapsed/moving%machine%period, int64))
+    call begin_record(moving, trajectory, log)
+    do while (is_recorded(trajectory))
+      call go_on(moving, no_catalogue, span, trajectory, outcome, log)
+      call session%journal%progress(int(trajectory%elapsed/moving%machine%period, int64))
     end do
-    call end_record(moving, span, course, log)
-    call conclude(moving, no_catalogue, course, outcome)
+    call end_record(moving, span, trajectory, log)
+    call conclude(moving, no_catalogue, trajectory, outcome)
     call note_rest(moving, span, log, outcome%window)
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
     ! Newton's method at each period, four steps in the mean, with differences along every coordinate.
@@ -254,19 +255,19 @@ contains
   end subroutine add_history
 
   !> Where the energy went by the end, or until the motion was given up.
-  subroutine add_book(book, complete, schema)
-    type(book_t), intent(in) :: book
+  subroutine add_balance(balance, complete, schema)
+    type(energy_balance_t), intent(in) :: balance
     logical, intent(in) :: complete
     type(schema_t), intent(inout) :: schema
-    call schema%add_attribute('', 'energy_start', book%at_start)
-    call schema%add_attribute('', 'energy_lost_to_friction', book%friction)
-    call schema%add_attribute('', 'energy_lost_to_damping', book%damping)
-    call schema%add_attribute('', 'energy_lost_to_contacts', book%contact)
-    call schema%add_attribute('', 'energy_put_in', book%work)
+    call schema%add_attribute('', 'energy_start', balance%at_start)
+    call schema%add_attribute('', 'energy_lost_to_friction', balance%friction)
+    call schema%add_attribute('', 'energy_lost_to_damping', balance%damping)
+    call schema%add_attribute('', 'energy_lost_to_contacts', balance%contact)
+    call schema%add_attribute('', 'energy_put_in', balance%work)
     if (.not. complete) return
-    call schema%add_attribute('', 'energy_end', book%at_end)
-    call schema%add_attribute('', 'energy_closing_error', closing_error(book))
-  end subroutine add_book
+    call schema%add_attribute('', 'energy_end', balance%at_end)
+    call schema%add_attribute('', 'energy_closing_error', closing_error(balance))
+  end subroutine add_balance
 
   !> The columns of the machine along a dimension; `prefix` comes before their names.
   subroutine add_columns(columns, dimension, prefix, schema)
@@ -301,14 +302,14 @@ contains
     type(schema_t), intent(inout) :: schema
     real(wp) :: kinetic(log%samples)
     kinetic = kinetic_energies(moving, log)
-    associate (book => log%sample_book(:, :log%samples))
-      call add('energy', book(5, :), 'energy of spring and bodies')
+    associate (balance => log%sample_balance(:, :log%samples))
+      call add('energy', balance(5, :), 'energy of spring and bodies')
       call add('kinetic_energy', kinetic, 'kinetic energy')
-      call add('potential_energy', book(5, :) - kinetic, 'energy of the spring')
-      call add('friction_loss', book(1, :), 'energy lost to dry friction since the start')
-      call add('damping_loss', book(2, :), 'energy lost to viscous damping since the start')
-      call add('contact_loss', book(3, :), 'energy put into barriers since the start; of a pressed soft one, part comes back')
-      call add('drive_work', book(4, :), 'work of drive and blows since the start')
+      call add('potential_energy', balance(5, :) - kinetic, 'energy of the spring')
+      call add('friction_loss', balance(1, :), 'energy lost to dry friction since the start')
+      call add('damping_loss', balance(2, :), 'energy lost to viscous damping since the start')
+      call add('contact_loss', balance(3, :), 'energy put into barriers since the start; of a pressed soft one, part comes back')
+      call add('drive_work', balance(4, :), 'work of drive and blows since the start')
     end associate
 
   contains

@@ -14,7 +14,7 @@ module trajectory_report
   use session, only: session_t
   use status, only: is_given_up, reason_event_budget, reason_left_domain, reason_name, reason_time_over
   use text, only: to_text
-  use trajectory, only: outcome_t, span_t
+  use single_trajectory, only: outcome_t, span_t
   implicit none
   private
 

@@ -33,8 +33,8 @@ module verify_driver
   use stored_map, only: restore_catalogues
   use sweep_driver, only: sweep_axes
   use text, only: to_text
-  use trajectories, only: journey_t, run_trajectories
-  use trajectory, only: outcome_t
+  use trajectories, only: ensemble_t, run_trajectories
+  use single_trajectory, only: outcome_t
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
   private
@@ -169,7 +169,7 @@ contains
       before = audit%flips + audit%inferred_differing
       call compare_with_file(reader, prefix, place, values(1, :), audit, error)
       if (allocated(error)) return
-      call compare_with_reference(grid, catalogues, index, values(1, :), cache%journey, &
+      call compare_with_reference(grid, catalogues, index, values(1, :), cache%ensemble, &
                                   audit, error)
       if (allocated(error)) return
       if (audit%flips + audit%inferred_differing > before) audit%changes = audit%changes + 1
@@ -245,21 +245,21 @@ contains
 
   !> Label from a quadruple-precision run, and how far the double one has drifted at the end of the duration if the
   !> motion settles (on a chaotic one any error grows to its size).
-  subroutine compare_with_reference(grid, catalogues, index, values, journey, audit, error)
+  subroutine compare_with_reference(grid, catalogues, index, values, ensemble, audit, error)
     type(grid_t), intent(in) :: grid
     type(catalogue_t), intent(in) :: catalogues(:)
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    type(journey_t), intent(in) :: journey
+    type(ensemble_t), intent(in) :: ensemble
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
     type(catalogue_t) :: own
     type(outcome_t) :: outcome(1)
-    type(journey_t) :: whole
+    type(ensemble_t) :: whole
     real(wp) :: start(3 + size(grid%others), 1), results(6, 1)
     start(:, 1) = point_start(grid, index)
-    whole = journey
-    whole%span%stop_when_captured = .false.
+    whole = ensemble
+    whole%span%stop_when_converged = .false.
     allocate (own%attractors(0))
     if (size(catalogues) > 0) own = catalogues(point_slice(grid, index) + 1)
     call run_trajectories(whole, own%attractors, start, outcome)

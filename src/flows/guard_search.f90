@@ -27,18 +27,18 @@ module guard_search
 
 contains
 
-  !> The first falls within `duration` [s]: `time` is that of the first, `fallen` all guards that fall with it by no more than
-  !> rounding; time = duration and none fallen if there is none. `extremes` are those of the watched coordinate on the way,
+  !> The first falls within `duration` [s]: `time` is that of the first, `triggered` all guards that fall with it by no more than
+  !> rounding; time = duration and none triggered if there is none. `extremes` are those of the watched coordinate on the way,
   !> `top_speed` the largest of its speeds if `wants_speed`; `margin` the smallest gap at which a stop was missed [m] if
   !> `wants_margin`.
-  pure subroutine find_first(search, list, origin, duration, wants_speed, wants_margin, time, fallen, extremes, top_speed, &
+  pure subroutine find_first(search, list, origin, duration, wants_speed, wants_margin, time, triggered, extremes, top_speed, &
                              margin, evaluations)
     type(search_t), intent(inout) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: origin, duration
     logical, intent(in) :: wants_speed, wants_margin
     real(wp), intent(out) :: time
-    logical, intent(out) :: fallen(:)
+    logical, intent(out) :: triggered(:)
     real(wp), intent(inout) :: extremes(2), top_speed, margin
     integer, intent(out) :: evaluations
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
@@ -47,7 +47,7 @@ contains
     real(wp) :: a, b, length, longest, tie
     integer :: g, panels
     evaluations = 1
-    fallen = .false.
+    triggered = .false.
     a = 0
     call bases_at(search, a, growth, turning)
     do g = 1, search%functions
@@ -60,10 +60,10 @@ contains
     panels = 0
     tie = 8*spacing(max(origin, origin + duration))
     time = duration
-    call look_at_start(search, list, here, length, certified, fallen)
-    if (any(fallen)) time = 0
+    call look_at_start(search, list, here, length, certified, triggered)
+    if (any(triggered)) time = 0
     call note_extremes(search, here(:, search%functions), extremes, top_speed)
-    if (any(fallen)) return
+    if (any(triggered)) return
     do while (a < time)
       b = min(a + length, time)
       if (time - b < 1e-6_wp*length) b = time
@@ -74,15 +74,15 @@ contains
       end do
       call search_panel(search, a, b, here, there, tie, certified, time, root, evaluations)
       if (any(root(:search%guards) <= time)) then
-        fallen(:search%guards) = root(:search%guards) <= time + tie
+        triggered(:search%guards) = root(:search%guards) <= time + tie
         call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
                    top_speed, evaluations)
-        if (wants_margin) call note_misses(search, list, a, time, here, fallen, margin, evaluations)
+        if (wants_margin) call note_misses(search, list, a, time, here, triggered, margin, evaluations)
         return
       end if
       call watch(search, a, b, here(:, search%functions), there(:, search%functions), .false., wants_speed, extremes, &
                  top_speed, evaluations)
-      if (wants_margin) call note_misses(search, list, a, b, here, fallen, margin, evaluations)
+      if (wants_margin) call note_misses(search, list, a, b, here, triggered, margin, evaluations)
       a = b
       here = there
       panels = panels + 1
@@ -133,13 +133,13 @@ contains
 
   !> Guards that are zero at the start, where the values are `here`: those that fall at once, and how long within `length` [s] the
   !> others are `certified` not to fall. One that is nothing but rounding falls when it is below that.
-  pure subroutine look_at_start(search, list, here, length, certified, fallen)
+  pure subroutine look_at_start(search, list, here, length, certified, triggered)
     type(search_t), intent(inout) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(inout) :: here(0:, :)
     real(wp), intent(in) :: length
     real(wp), intent(out) :: certified(:)
-    logical, intent(inout) :: fallen(:)
+    logical, intent(inout) :: triggered(:)
     real(wp) :: none, sizes(0:3)
     logical :: idle
     integer :: g, order
@@ -150,7 +150,7 @@ contains
       if (.not. (list(g)%from_zero .or. here(0, g) <= none)) cycle
       sizes(1:) = [(bound(search, g, order, 0.0_wp, length) + search%blur(order, g), order=1, 3)]
       call departure(here(1:3, g), sizes, bound(search, g, 4, 0.0_wp, length), length, certified(g), idle)
-      fallen(g) = .not. idle .and. certified(g) <= 0
+      triggered(g) = .not. idle .and. certified(g) <= 0
       if (.not. idle) cycle
       search%lift(g) = none - min(here(0, g), 0.0_wp) + tiny(none)
       search%power(0, g) = search%power(0, g) + search%lift(g)
@@ -219,13 +219,13 @@ contains
     end do
   end subroutine turning_point
 
-  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, where some have `fallen`. The rate of a gap has one
-  !> extreme on a panel at most: where it has, either side is looked at.
-  pure subroutine note_misses(search, list, a, b, here, fallen, margin, evaluations)
+  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, where some have `triggered`. The rate of a gap has
+  !> one extreme on a panel at most: where it has, either side is looked at.
+  pure subroutine note_misses(search, list, a, b, here, triggered, margin, evaluations)
     type(search_t), intent(in) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: a, b, here(0:, :)
-    logical, intent(in) :: fallen(:)
+    logical, intent(in) :: triggered(:)
     real(wp), intent(inout) :: margin
     integer, intent(inout) :: evaluations
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
@@ -242,7 +242,7 @@ contains
       middle = here(:, g)
       if (bends) call turning_point(search, g, 2, a, b, here(:, g), last, 0.0_wp, between, middle)
       if (bends) call note_miss(search, g, a, between, here(:, g), middle, margin)
-      if (.not. fallen(g)) call note_miss(search, g, between, b, middle, last, margin)
+      if (.not. triggered(g)) call note_miss(search, g, between, b, middle, last, margin)
     end do
   end subroutine note_misses
 

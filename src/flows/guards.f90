@@ -16,7 +16,7 @@ module guards
 
   integer, parameter, public :: most_guards = 3*most_joints
 
-  !> What a fallen guard means: a slide ends; friction gives way upwards or downwards; the upper or lower stop is reached; a
+  !> What a triggered guard means: a slide ends; friction gives way upwards or downwards; the upper or lower stop is reached; a
   !> closed contact is let go; a pressed one is without force; one without force pushes again; a soft stop is left; the watched
   !> coordinate turns round.
   integer, parameter, public :: slide_ends = 1, slides_up = 2, slides_down = 3, meets_upper = 4, meets_lower = 5, &

@@ -33,16 +33,16 @@ module linear_flight
 
 contains
 
-  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `fallen` those that fell together at
+  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `triggered` those that fell together at
   !> the end, none if the time is over. `path` is the way.
-  pure subroutine fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
+  pure subroutine fly_linear(machine, flow, state, until, list, count_guards, triggered, path, watch)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards
-    logical, intent(out) :: fallen(most_guards)
+    logical, intent(out) :: triggered(most_guards)
     type(path_t), intent(out) :: path
     type(watch_t), intent(inout) :: watch
     type(search_t) :: search
@@ -52,19 +52,19 @@ contains
     call begin_path(machine, flow, state, path)
     if (flow%modal) then
       call prepare_search(machine, flow, path, list, count_guards, machine%watched, search)
-      call find_first(search, list, path%start, until - path%start, watch%wants_speed, watch%wants_margin, time, fallen, &
+      call find_first(search, list, path%start, until - path%start, watch%wants_speed, watch%wants_margin, time, triggered, &
                       watch%extremes, watch%top_speed, watch%margin, evaluations)
       watch%evaluations = watch%evaluations + evaluations
       call path_at(machine, flow, path, time, state%q, state%v)
     else
-      call fly_series(machine, flow, path, list, count_guards, until - path%start, state, time, fallen, watch)
+      call fly_series(machine, flow, path, list, count_guards, until - path%start, state, time, triggered, watch)
     end if
     state%time = path%start + time
-    if (.not. any(fallen)) state%time = until
+    if (.not. any(triggered)) state%time = until
   end subroutine fly_linear
 
   !> The same by stretches of the exponential series.
-  pure subroutine fly_series(machine, flow, path, list, count_guards, duration, state, time, fallen, watch)
+  pure subroutine fly_series(machine, flow, path, list, count_guards, duration, state, time, triggered, watch)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
@@ -73,14 +73,14 @@ contains
     real(wp), intent(in) :: duration
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(out) :: time
-    logical, intent(out) :: fallen(:)
+    logical, intent(out) :: triggered(:)
     type(watch_t), intent(inout) :: watch
     real(wp), dimension(size(path%unknowns)) :: y, size_of_y
     real(wp) :: powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
     real(wp) :: length, p(0:order), gap(0:terms, most_guards), root(most_guards), lift(most_guards), first, fraction
     integer :: g, i, k, n, stretches
     n = machine%n
-    fallen = .false.
+    triggered = .false.
     y = path%unknowns
     do g = 1, count_guards
       row(:, g) = guard_row(machine, flow, path, list(g))
@@ -109,7 +109,7 @@ contains
       call watch_series(powers(machine%watched, :), powers(n + machine%watched, :), min(1.0_wp, minval(root)), watch)
       first = minval(root(:max(count_guards, 1)))
       if (count_guards > 0 .and. first <= 1) then
-        fallen(:count_guards) = root(:count_guards) <= first + 8*spacing(path%start + duration)/length
+        triggered(:count_guards) = root(:count_guards) <= first + 8*spacing(path%start + duration)/length
         fraction = first
         y = powers(:, terms)
         do k = terms - 1, 0, -1

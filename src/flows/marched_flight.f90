@@ -201,15 +201,15 @@ contains
     if (amount > tiny(amount)*contact%stiffness) depth = exponential(logarithm(amount/contact%stiffness)/(contact%exponent + more))
   end function depth
 
-  !> One step, until `until` [s after the section] at most. `path` is the step; `fallen` are the guards that fell together at its
+  !> One step, until `until` [s after the section] at most. `path` is the step; `triggered` are the guards that fell together at its
   !> end; `ended` says that the flight is over, `failed` that no step is small enough.
-  pure subroutine step_flight(machine, flight, state, until, path, fallen, ended, failed, watch)
+  pure subroutine step_flight(machine, flight, state, until, path, triggered, ended, failed, watch)
     type(multibody_t), intent(in) :: machine
     type(marched_flight_t), intent(inout) :: flight
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(path_t), intent(inout) :: path
-    logical, intent(out) :: fallen(most_guards), ended, failed
+    logical, intent(out) :: triggered(most_guards), ended, failed
     type(watch_t), intent(inout) :: watch
     real(wp) :: before(most_guards), y(2*machine%n)
     integer :: fell, g, n
@@ -223,16 +223,16 @@ contains
     flight%march%slope_rounding(n + 1:2*n) = force_rounding*sizes_of_terms(flight%system, flight%origin, flight%march%time, y)
     call take_step(flight%march, flight%system, flight%guards(:flight%count_guards), until - flight%system%start, fell)
     watch%evaluations = watch%evaluations + 1
-    fallen = .false.
+    triggered = .false.
     failed = fell == march_failed
     ended = fell /= march_goes_on
     y = flight%march%y(:2*n)
     if (fell > 0) then
       do g = 1, flight%count_guards
-        if (before(g) > rounding*flight%size_of_guard(g)) fallen(g) = value_of(flight, g, flight%march%time, y) <= &
+        if (before(g) > rounding*flight%size_of_guard(g)) triggered(g) = value_of(flight, g, flight%march%time, y) <= &
                                                                       rounding*flight%size_of_guard(g)
       end do
-      fallen(fell) = .true.
+      triggered(fell) = .true.
     end if
     path%start = flight%system%start + flight%march%from
     path%length = 0

@@ -6,7 +6,7 @@
 !> of the drive is periodic. Where the modes are too near to being one, or the drive to one of them, `modal` is false and
 !> the motion is the exponential series of `matrix`, which every linear structure has.
 module mode_flow
-  use boxed_forces, only: dependent, shared_inverse
+  use bounded_lcp, only: dependent, shared_inverse
   use eigen, only: general_eigen, modulus, refine_mode, solve_complex, symmetric_eigen, undamped_modes
   use multibody, only: harmonics_in, integral_of, joint_contact, joint_soft, multibody_t, offset_of
   use multibody_state, only: is_held

@@ -10,15 +10,15 @@ module adaptive_flight
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: context_t => slip_memory_t, dahl_force
-  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight, record_with_book
+  use energy, only: balance_instant, gauss_place, gauss_points, gauss_weight, record_with_balance
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     flight_time_over
   use friction_law, only: sliding_friction
   use kinds, only: wp
   use march_pace, only: pace_t, watch_pace
-  use motion_state, only: book_t, log_t, mode_slip_plus, options_t, sample_due, sample_time, state_t, tally_t
+  use motion_state, only: energy_balance_t, log_t, mode_slip_plus, options_t, sample_due, sample_time, state_t, tally_t
   use oscillator, only: extra_force, system_t => oscillator_t
-  use polynomial, only: degree, first_fall, interpolate, maximum_until, value_at
+  use polynomial, only: degree, first_zero, interpolate, maximum_until, value_at
   use restoring_law, only: restoring_force
   use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
   implicit none
@@ -49,7 +49,7 @@ contains
     type(march_t) :: march
     type(guard_t) :: guards(most_guards)
     type(pace_t) :: pace
-    integer :: ends(most_guards), count_guards, fallen, plain_guards
+    integer :: ends(most_guards), count_guards, triggered, plain_guards
     real(wp) :: direction, until
     logical :: hopeless
     direction = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
@@ -63,18 +63,18 @@ contains
       outcome = flight_time_over
       if (march%time >= time_end) exit
       until = next_sample(machine%drive, march%time, time_end)
-      call step_on(2, march, machine, guards(:count_guards), until, fallen)
+      call step_on(2, march, machine, guards(:count_guards), until, triggered)
       tally%steps = tally%steps + march%tries
       call watch_pace(march%time, time_end, options%step_budget, pace, hopeless)
       ! What it would take is more than there is.
       if (hopeless) tally%steps = options%step_budget + 1
-      if (fallen == march_failed .or. tally%steps > options%step_budget) then
+      if (triggered == march_failed .or. tally%steps > options%step_budget) then
         outcome = flight_failed
         exit
       end if
-      if (march%fraction > 0 .or. fallen > 0) call look_along(machine, march, state, tally, log)
-      if (fallen > 0) then
-        outcome = ends(fallen)
+      if (march%fraction > 0 .or. triggered > 0) call look_along(machine, march, state, tally, log)
+      if (triggered > 0) then
+        outcome = ends(triggered)
         if (outcome /= crosses_knot) exit
         count_guards = plain_guards
         call keep_to_pieces(machine, march%time, march%y, march%context, guards, ends, count_guards)
@@ -196,30 +196,30 @@ contains
         sample%x = value_at(march%path(:, 1), t)
         sample%v = value_at(march%path(:, 2), t)
         if (t > done) then
-          call book_piece(machine, march, done, t, log%book)
+          call balance_piece(machine, march, done, t, log%balance)
           done = t
         end if
-        call record_with_book(machine, sample, log)
+        call record_with_balance(machine, sample, log)
       end do
     end if
-    call book_piece(machine, march, done, march%fraction, log%book)
+    call balance_piece(machine, march, done, march%fraction, log%balance)
   end subroutine look_along
 
   !> Where the energy went between two fractions of the step behind.
-  pure subroutine book_piece(machine, march, from, until, book)
+  pure subroutine balance_piece(machine, march, from, until, balance)
     type(system_t), intent(in) :: machine
     type(march_t), intent(in) :: march
     real(wp), intent(in) :: from, until
-    type(book_t), intent(inout) :: book
+    type(energy_balance_t), intent(inout) :: balance
     real(wp) :: t
     integer :: k
-    if (.not. book%kept) return
+    if (.not. balance%kept) return
     do k = 1, gauss_points
       t = from + (until - from)*gauss_place(k)
-      call book_instant(machine, march%context, march%from + t*march%length, value_at(march%path(:, 1), t), &
-                        value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), book)
+      call balance_instant(machine, march%context, march%from + t*march%length, value_at(march%path(:, 1), t), &
+                        value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), balance)
     end do
-  end subroutine book_piece
+  end subroutine balance_piece
 
   include 'march_steps.inc'
 

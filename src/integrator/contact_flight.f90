@@ -8,7 +8,7 @@ module contact_flight
   use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
-  use energy, only: book_instant, gauss_place, gauss_points, gauss_weight, record_with_book
+  use energy, only: balance_instant, gauss_place, gauss_points, gauss_weight, record_with_balance
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: power, sliding_friction
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step, &
@@ -74,7 +74,7 @@ contains
     type(guard_t) :: guards(most_guards)
     type(pace_t) :: pace
     real(wp) :: y(3), scale(3), duration, time, until
-    integer :: fallen, count_guards
+    integer :: triggered, count_guards
     logical :: hopeless
     pressed%machine = machine
     pressed%machine%contact = contact_at_speed(machine%contact, state%touch_speed)
@@ -90,37 +90,37 @@ contains
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
     do
       until = next_sample(machine%drive, pressed%start + march%time, time_end)
-      call take_step(march, pressed, guards(:count_guards), until - pressed%start, fallen)
-      if (fallen == march_time_over .and. until < time_end) fallen = march_goes_on
+      call take_step(march, pressed, guards(:count_guards), until - pressed%start, triggered)
+      if (triggered == march_time_over .and. until < time_end) triggered = march_goes_on
       tally%steps = tally%steps + 1
       call watch_pace(pressed%start + march%time, time_end, options%step_budget, pace, hopeless)
       ! What it would take is more than there is.
       if (hopeless) tally%steps = options%step_budget + 1
-      if (tally%steps > options%step_budget) fallen = march_failed
+      if (tally%steps > options%step_budget) triggered = march_failed
       call look_along(march, pressed, state%touch_speed, tally, log)
-      if (fallen >= cut) then
-        if (fallen == cut) pressed%pushing = .not. pressed%pushing
+      if (triggered >= cut) then
+        if (triggered == cut) pressed%pushing = .not. pressed%pushing
         y = march%y(:3)
         time = march%time
         call list_guards(pressed, time, y, guards, count_guards)
         call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, time, y)
-      else if (fallen /= march_goes_on) then
+      else if (triggered /= march_goes_on) then
         exit
       end if
     end do
-    state%time = merge(time_end, min(pressed%start + march%time, time_end), fallen == march_time_over)
+    state%time = merge(time_end, min(pressed%start + march%time, time_end), triggered == march_time_over)
     state%x = pressed%surface + side*march%y(1)
     state%v = side*march%y(2)
-    outcome = outcome_of(fallen)
+    outcome = outcome_of(triggered)
     if (outcome == flight_barrier) state%x = pressed%surface
     if (outcome == flight_speed_reached .or. pressed%direction*state%v < 0) state%v = 0
     if (machine%effects%dahl_stiffness > 0) state%z = dahl_force(machine%effects, pressed%memory, state%x)
   end subroutine fly_contact
 
   !> The outcome of a flight that ended so.
-  pure integer function outcome_of(fallen) result(outcome)
-    integer, intent(in) :: fallen
-    select case (fallen)
+  pure integer function outcome_of(triggered) result(outcome)
+    integer, intent(in) :: triggered
+    select case (triggered)
     case (march_failed)
       outcome = flight_failed
     case (march_time_over)
@@ -260,33 +260,33 @@ contains
       if (t >= march%fraction .or. .not. sample_due(log, pressed%start + march%time)) exit
       sample%x = pressed%surface + pressed%side*value_at(march%path(:, 1), t)
       sample%v = pressed%side*value_at(march%path(:, 2), t)
-      call book_piece(pressed, march, done, t, log)
+      call balance_piece(pressed, march, done, t, log)
       done = t
-      call record_with_book(pressed%machine, sample, log)
+      call record_with_balance(pressed%machine, sample, log)
     end do
-    call book_piece(pressed, march, done, march%fraction, log)
+    call balance_piece(pressed, march, done, march%fraction, log)
   end subroutine look_along
 
   !> Where the energy went between two fractions of the step behind. The barrier's part is that until the second one.
-  pure subroutine book_piece(pressed, march, from, until, log)
+  pure subroutine balance_piece(pressed, march, from, until, log)
     type(pressed_t), intent(in) :: pressed
     type(march_t), intent(in) :: march
     real(wp), intent(in) :: from, until
     type(log_t), intent(inout) :: log
     real(wp) :: t, work
     integer :: k
-    if (.not. log%book%kept) return
+    if (.not. log%balance%kept) return
     do k = 1, gauss_points
       t = from + (until - from)*gauss_place(k)
-      call book_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
+      call balance_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
                         pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
-                        pressed%side*value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), log%book)
+                        pressed%side*value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), log%balance)
     end do
     work = value_at(march%path(:, 3), until) - value_at(march%path(:, 3), from)
     if (until >= march%fraction) work = march%y(3) - value_at(march%path(:, 3), from)
-    log%book%contact = log%book%contact + work
+    log%balance%contact = log%balance%contact + work
     log%contact_work = log%contact_work + work
-  end subroutine book_piece
+  end subroutine balance_piece
 
   !> Raises `peak` to the largest force up to a `fraction` of a step, over which penetration and rate are polynomials: a
   !> golden section around the largest of a few.

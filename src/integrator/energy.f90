@@ -12,13 +12,13 @@ module energy
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: stribeck_excess
   use kinds, only: wp
-  use motion_state, only: book_t, log_t, put_sample_book, record_sample, state_t
+  use motion_state, only: energy_balance_t, log_t, put_sample_balance, record_sample, state_t
   use oscillator, only: oscillator_t
   use restoring_law, only: restoring_energy, restoring_force
   implicit none
   private
 
-  public :: energy_of_body, book_instant, book_exact, book_rest, record_with_book
+  public :: energy_of_body, balance_instant, balance_exact, balance_rest, record_with_balance
 
   !> Gauss's rule with 8 points on [0, 1] (Abramowitz, Stegun, 25.4.30).
   integer, parameter, public :: gauss_points = 8
@@ -49,48 +49,48 @@ contains
   end function energy_of_body
 
   !> Adds `weight` [s] times the powers at `time` [s after the section], `x`, `v` of a slip.
-  pure subroutine book_instant(machine, slip, time, x, v, weight, book)
+  pure subroutine balance_instant(machine, slip, time, x, v, weight, balance)
     type(oscillator_t), intent(in) :: machine
     type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: time, x, v, weight
-    type(book_t), intent(inout) :: book
+    type(energy_balance_t), intent(inout) :: balance
     real(wp) :: foot, rate, stretch, measured, losses(2)
-    if (.not. book%kept) return
+    if (.not. balance%kept) return
     call foot_motion(machine%drive, machine%drive_frequency*time, foot, rate)
     associate (law => machine%friction)
-      book%friction = book%friction + weight*(law%kinetic + stribeck_excess(law, abs(v)))*abs(v)
-      book%damping = book%damping + weight*law%damping*v**2
+      balance%friction = balance%friction + weight*(law%kinetic + stribeck_excess(law, abs(v)))*abs(v)
+      balance%damping = balance%damping + weight*law%damping*v**2
     end associate
     stretch = machine%restoring%free_length + foot - x
-    book%work = book%work + weight*restoring_force(machine%restoring, stretch)*rate*machine%drive_frequency
+    balance%work = balance%work + weight*restoring_force(machine%restoring, stretch)*rate*machine%drive_frequency
     if (machine%effects%present) then
       losses = effect_losses(machine%effects, machine%friction, slip, x, v)
-      book%friction = book%friction + weight*losses(1)
-      book%damping = book%damping + weight*losses(2)
-      book%work = book%work + weight*stretch_force(machine%effects, stretch)*rate*machine%drive_frequency
+      balance%friction = balance%friction + weight*losses(1)
+      balance%damping = balance%damping + weight*losses(2)
+      balance%work = balance%work + weight*stretch_force(machine%effects, stretch)*rate*machine%drive_frequency
     end if
     if (machine%drive%interval > 0) then
       call measured_force(machine%drive, time, measured, rate)
-      book%work = book%work + weight*measured*v
+      balance%work = balance%work + weight*measured*v
     end if
-  end subroutine book_instant
+  end subroutine balance_instant
 
-  !> Writes a sample down with the energy then; the book of the log is that until the sample.
-  pure subroutine record_with_book(machine, sample, log)
+  !> Writes a sample down with the energy then; the balance of the log is that until the sample.
+  pure subroutine record_with_balance(machine, sample, log)
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(in) :: sample
     type(log_t), intent(inout) :: log
-    if (log%book%kept) then
-      log%book%at_end = energy_of_body(machine, sample)
-      call record_sample(log, sample, book=log%book)
+    if (log%balance%kept) then
+      log%balance%at_end = energy_of_body(machine, sample)
+      call record_sample(log, sample, balance=log%balance)
     else
       call record_sample(log, sample)
     end if
-  end subroutine record_with_book
+  end subroutine record_with_balance
 
-  !> An exact flight from `start` to `time_end` [s after the section], slipping in `direction`, and the books of the
+  !> An exact flight from `start` to `time_end` [s after the section], slipping in `direction`, and the balances of the
   !> samples from number `first` on, which it has written down.
-  pure subroutine book_exact(machine, flow, start, direction, time_end, first, log)
+  pure subroutine balance_exact(machine, flow, start, direction, time_end, first, log)
     type(oscillator_t), intent(in) :: machine
     type(flow_t), intent(in) :: flow
     type(state_t), intent(in) :: start
@@ -102,7 +102,7 @@ contains
     type(state_t) :: sample
     real(wp) :: done
     integer :: i
-    if (.not. log%book%kept) return
+    if (.not. log%balance%kept) return
     slip = slip_memory_t(direction=direction, x=start%x)
     call begin_segment(flow, start%time, start%x, start%v, direction, segment)
     done = 0
@@ -112,46 +112,46 @@ contains
       sample%x = log%sample_data(2, i)
       sample%v = log%sample_data(3, i)
       if (sample%time > start%time + done) then
-        call book_piece(machine, flow, segment, slip, start%time, done, sample%time - start%time, log%book)
+        call balance_piece(machine, flow, segment, slip, start%time, done, sample%time - start%time, log%balance)
         done = sample%time - start%time
       end if
-      log%book%at_end = energy_of_body(machine, sample)
-      call put_sample_book(log, i, log%book)
+      log%balance%at_end = energy_of_body(machine, sample)
+      call put_sample_balance(log, i, log%balance)
     end do
     if (time_end > start%time + done) then
-      call book_piece(machine, flow, segment, slip, start%time, done, time_end - start%time, log%book)
+      call balance_piece(machine, flow, segment, slip, start%time, done, time_end - start%time, log%balance)
     end if
-  end subroutine book_exact
+  end subroutine balance_exact
 
   !> Part of an exact flight, between two times since its start.
-  pure subroutine book_piece(machine, flow, segment, slip, start, from, until, book)
+  pure subroutine balance_piece(machine, flow, segment, slip, start, from, until, balance)
     type(oscillator_t), intent(in) :: machine
     type(flow_t), intent(in) :: flow
     type(segment_t), intent(in) :: segment
     type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: start, from, until
-    type(book_t), intent(inout) :: book
+    type(energy_balance_t), intent(inout) :: balance
     real(wp) :: fast_until
     if (flow%overdamped) then
       ! The fast part has gone by then.
       fast_until = min(until, max(from, fast_decays/flow%fast))
-      call book_part(machine, flow, segment, slip, start, [from, fast_until], flow%fast, book)
-      call book_part(machine, flow, segment, slip, start, [fast_until, until], &
-                     max(flow%slow, flow%harmonics*flow%drive_frequency), book)
+      call balance_part(machine, flow, segment, slip, start, [from, fast_until], flow%fast, balance)
+      call balance_part(machine, flow, segment, slip, start, [fast_until, until], &
+                     max(flow%slow, flow%harmonics*flow%drive_frequency), balance)
     else
-      call book_part(machine, flow, segment, slip, start, [from, until], &
-                     max(flow%natural, flow%harmonics*flow%drive_frequency), book)
+      call balance_part(machine, flow, segment, slip, start, [from, until], &
+                     max(flow%natural, flow%harmonics*flow%drive_frequency), balance)
     end if
-  end subroutine book_piece
+  end subroutine balance_piece
 
   !> The same where nothing changes faster than `rate` [1/s].
-  pure subroutine book_part(machine, flow, segment, slip, start, span, rate, book)
+  pure subroutine balance_part(machine, flow, segment, slip, start, span, rate, balance)
     type(oscillator_t), intent(in) :: machine
     type(flow_t), intent(in) :: flow
     type(segment_t), intent(in) :: segment
     type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: start, span(2), rate
-    type(book_t), intent(inout) :: book
+    type(energy_balance_t), intent(inout) :: balance
     type(kinematics_t) :: now
     real(wp) :: piece, elapsed
     integer :: pieces, i, k
@@ -162,23 +162,23 @@ contains
       do k = 1, gauss_points
         elapsed = span(1) + (i - 1 + gauss_place(k))*piece
         call evaluate(flow, segment, elapsed, now)
-        call book_instant(machine, slip, start + elapsed, now%x, now%v, gauss_weight(k)*piece, book)
+        call balance_instant(machine, slip, start + elapsed, now%x, now%v, gauss_weight(k)*piece, balance)
       end do
     end do
-  end subroutine book_part
+  end subroutine balance_part
 
   !> A body at rest from `before` to `now`: what the drive does to the spring.
-  pure subroutine book_rest(machine, before, now, book)
+  pure subroutine balance_rest(machine, before, now, balance)
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(in) :: before, now
-    type(book_t), intent(inout) :: book
+    type(energy_balance_t), intent(inout) :: balance
     type(state_t) :: rest
-    if (.not. book%kept) return
+    if (.not. balance%kept) return
     rest = before
     rest%v = 0
-    book%work = book%work - energy_of_body(machine, rest)
+    balance%work = balance%work - energy_of_body(machine, rest)
     rest%time = now%time
-    book%work = book%work + energy_of_body(machine, rest)
-  end subroutine book_rest
+    balance%work = balance%work + energy_of_body(machine, rest)
+  end subroutine balance_rest
 
 end module energy

@@ -9,7 +9,7 @@ module motion
   use contact_flight, only: contact_side
   use contact_law, only: contact_table, velocity_after_impact
   use effect_law, only: dahl_level
-  use energy, only: book_exact, book_rest
+  use energy, only: balance_exact, balance_rest
   use errors, only: error_t, fail
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
@@ -40,7 +40,7 @@ module motion
 
   !> Events without progress in time after which the body is held for an instant: only a tie of forces
   !> to the last bit can bring this about.
-  integer, parameter :: most_stalls = 8
+  integer, parameter :: most_idle_steps = 8
 
   !> A machine ready to move: all that does not change along a trajectory.
   type, public :: motion_t
@@ -103,19 +103,19 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
   !> trajectory had to be given up (codes of module `status`). With `slip_speed` no further than to a slip in the other
-  !> direction that is so fast [m/s], with `seam` no further than to a slip through that place [m], or its opposite.
-  pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed, seam)
+  !> direction that is so fast [m/s], with `matching_point` no further than to a slip through that place [m], or its opposite.
+  pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed, matching_point)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp), intent(in), optional :: slip_speed, seam
+    real(wp), intent(in), optional :: slip_speed, matching_point
     real(wp) :: before
-    integer :: stalls, other
+    integer :: idle_steps, other
     reason = 0
-    stalls = 0
+    idle_steps = 0
     other = merge(mode_slip_minus, mode_slip_plus, state%mode == mode_slip_plus)
     do while (state%time < time_end)
       tally%events = tally%events + 1
@@ -124,17 +124,17 @@ contains
       before = state%time
       select case (state%mode)
       case (mode_slip_plus, mode_slip_minus)
-        call slip_on(moving, state, time_end, tally, reason, log, seam)
+        call slip_on(moving, state, time_end, tally, reason, log, matching_point)
       case default
         call rest_on(moving%machine, state, time_end, tally, log)
       end select
       if (tally%steps > moving%options%step_budget) reason = reason_step_budget
       if (.not. (abs(state%x) <= moving%options%domain)) reason = reason_left_domain
       if (state%x /= state%x .or. state%v /= state%v .or. state%time /= state%time) reason = reason_not_finite
-      stalls = merge(0, stalls + 1, state%time > before)
-      if (stalls >= most_stalls) call break_tie(moving, state, time_end)
-      if (present(seam)) then
-        if (abs(state%x) >= seam .and. abs(state%v) > 0) exit
+      idle_steps = merge(0, idle_steps + 1, state%time > before)
+      if (idle_steps >= most_idle_steps) call break_tie(moving, state, time_end)
+      if (present(matching_point)) then
+        if (abs(state%x) >= matching_point .and. abs(state%v) > 0) exit
       end if
       if (.not. present(slip_speed) .or. reason /= 0) cycle
       if (state%mode == other .and. abs(state%v) >= slip_speed) exit
@@ -158,15 +158,15 @@ contains
     end if
   end subroutine advance_period
 
-  !> One flight and the event at its end, none at a `seam`.
-  pure subroutine slip_on(moving, state, time_end, tally, reason, log, seam)
+  !> One flight and the event at its end, none at a `matching_point`.
+  pure subroutine slip_on(moving, state, time_end, tally, reason, log, matching_point)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp), intent(in), optional :: seam
+    real(wp), intent(in), optional :: matching_point
     type(state_t) :: start
     real(wp) :: barrier, before
     integer :: outcome, direction, first_sample
@@ -180,7 +180,7 @@ contains
       end if
       barrier = merge(moving%machine%contact%soft_upper, moving%machine%contact%soft_lower, direction > 0)
     end if
-    if (present(seam)) barrier = direction*seam
+    if (present(matching_point)) barrier = direction*matching_point
     before = state%time
     inside = moving%layer > 0 .and. abs(state%v) <= moving%layer
     outcome = flight_barrier
@@ -189,7 +189,7 @@ contains
         start = state
         if (present(log)) first_sample = log%samples + 1
         call fly_exact(moving%flow, state, time_end, moving%layer, barrier, tally, outcome, log)
-        if (present(log)) call book_exact(moving%machine, moving%flow, start, direction, state%time, first_sample, log)
+        if (present(log)) call balance_exact(moving%machine, moving%flow, start, direction, state%time, first_sample, log)
         if (outcome == flight_speed_reached .and. moving%layer > 0) outcome = flight_layer_left
       else
         call cross(moving, state, direction, time_end, barrier, tally, outcome, log)
@@ -202,7 +202,7 @@ contains
     select case (outcome)
     case (flight_barrier)
       tally%v_max = max(tally%v_max, state%v)
-      if (present(seam)) then
+      if (present(matching_point)) then
         state%x = barrier
       else if (moving%machine%contact%soft) then
         call touch(state, direction, tally, log)
@@ -210,7 +210,7 @@ contains
         call collide(moving, state, direction, time_end, tally, log)
       end if
     case (flight_speed_reached)
-      if (.not. present(seam)) tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
+      if (.not. present(matching_point)) tally%grazing_margin = min(tally%grazing_margin, direction*(barrier - state%x))
       call come_to_rest(moving, state, event_turning_point, tally, log)
     case (flight_failed)
       reason = reason_step_failed
@@ -312,7 +312,7 @@ contains
     after = velocity_after_impact(moving%machine%contact, state%v)
     call count_impact(tally, state, direction)
     if (present(log)) then
-      log%book%contact = log%book%contact + 0.5_wp*moving%machine%mass*(state%v**2 - after**2)
+      log%balance%contact = log%balance%contact + 0.5_wp*moving%machine%mass*(state%v**2 - after**2)
       call record_event(log, merge(event_impact_upper, event_impact_lower, direction > 0), state, after)
     end if
     state%v = after
@@ -326,7 +326,7 @@ contains
     tally%chatters = tally%chatters + 1
     tally%sticks = tally%sticks + 1
     ! The log has the instant of accumulation even where the clock stops before it.
-    if (present(log)) log%book%contact = log%book%contact + 0.5_wp*moving%machine%mass*after**2
+    if (present(log)) log%balance%contact = log%balance%contact + 0.5_wp*moving%machine%mass*after**2
     before = state
     state%time = state%time + left
     state%v = 0
@@ -335,7 +335,7 @@ contains
     if (present(log)) call record_event(log, merge(event_chatter_upper, event_chatter_lower, direction > 0), &
                                         state, 0.0_wp)
     state%time = min(state%time, time_end)
-    if (present(log)) call book_rest(moving%machine, before, state, log%book)
+    if (present(log)) call balance_rest(moving%machine, before, state, log%balance)
   end subroutine collide
 
   pure subroutine count_impact(tally, state, direction)

@@ -3,7 +3,7 @@
 
 !> The body at rest until it is released.
 module rest_flight
-  use energy, only: book_rest, record_with_book
+  use energy, only: balance_rest, record_with_balance
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_release, log_t, mode_stick, note_position, record_event, sample_due, &
     sample_time, state_t, tally_t
@@ -36,12 +36,12 @@ contains
         before = sample
         sample%time = sample_time(log)
         if (.not. sample_due(log, state%time)) exit
-        call book_rest(machine, before, sample, log%book)
-        call record_with_book(machine, sample, log)
+        call balance_rest(machine, before, sample, log%balance)
+        call record_with_balance(machine, sample, log)
       end do
       start = before
     end if
-    call book_rest(machine, start, state, log%book)
+    call balance_rest(machine, start, state, log%balance)
     if (state%mode == start%mode) return
     kind = merge(event_release, event_barrier_release, start%mode == mode_stick)
     call record_event(log, kind, state, 0.0_wp)

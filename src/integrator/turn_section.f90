@@ -100,7 +100,7 @@ contains
     start = state%time
     until = start + longest_return*moving%machine%period
     do
-      call advance(moving, state, until, tally, reason, slip_speed=0.0_wp, seam=moving%machine%turn/2)
+      call advance(moving, state, until, tally, reason, slip_speed=0.0_wp, matching_point=moving%machine%turn/2)
       if (reason /= 0) exit
       if (state%time >= until) reason = reason_time_over
       if (reason /= 0) exit

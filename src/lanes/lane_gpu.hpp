@@ -3,7 +3,7 @@
 
 // A pool of bodies on a GPU, one thread each, by the kernel of the lanes. Written with the calls of CUDA's
 // runtime, which `lane_gpu_host.hpp` has for the host as well. The pool has two halves: while one flies, the
-// host attends to the other.
+// host services to the other.
 #ifndef SEPARATRIX_LANE_GPU_HPP
 #define SEPARATRIX_LANE_GPU_HPP
 

@@ -401,7 +401,7 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
         mask free = flying & ~pressed, seek = free & (g.found < 0.5);
         if (any(seek))
           left = look_ahead<true, false>(f, seek, g.direction > 0.0, f.barrier, g);
-        // Friction that has fallen to zero stays there. A slip has it where either end has, as its place does
+        // Friction that has dropped to zero stays there. A slip has it where either end has, as its place does
         // not turn round.
         if (m.friction_slope != 0)
           left = left | (seek & ((1.0 + m.friction_slope * g.x <= 0.0) |

@@ -24,7 +24,7 @@ struct course {
   vec acceleration[5], time[4];
 };
 
-LANE_DEVICE inline course course_of(vec rate, vec curl, vec snap, vec crackle, vec pop) {
+LANE_DEVICE inline course derivatives_of(vec rate, vec curl, vec snap, vec crackle, vec pop) {
   course c = {rate, curl, snap, crackle, pop, {}, {}};
   vec unit = 1.0 / rate, g1 = curl * unit, g2 = snap * unit, g3 = crackle * unit, g4 = pop * unit;
   vec square = g1 * g1, power = unit;
@@ -146,7 +146,7 @@ LANE_DEVICE passage pass_layer(const lane_machine &m, const course &c, mask due,
 // the barrier. Returns the lanes where the edge was not found.
 LANE_DEVICE inline mask find_edge(const lane_machine &m, mask found, lane_group &g) {
   vec d = g.direction, speed, rate, curl;
-  course c = course_of(-d * g.end_a, d * g.end_j, -d * g.end_s, vec{}, vec{});
+  course c = derivatives_of(-d * g.end_a, d * g.end_j, -d * g.end_s, vec{}, vec{});
   vec t = time_at(c, m.layer.edge);
   follow(c, t, speed, rate, curl);
   mask hit = g.hits > 0.5;
@@ -174,7 +174,7 @@ LANE_DEVICE inline turning turn_in_layer(const lane_machine &m, mask due, const 
   end_derivatives(m, g, end_s, end_c, end_p);
   turning r;
   vec d = g.direction, bound = derivative_bound(m, g);
-  course in = course_of(-d * g.end_a, d * g.end_j, -d * end_s, d * end_c, -d * end_p);
+  course in = derivatives_of(-d * g.end_a, d * g.end_j, -d * end_s, d * end_c, -d * end_p);
   passage inward = pass_layer<false>(m, in, due, bound);
   r.early = time_at(in, inward.even);
   vec h = -r.early, half = 0.5 * h, third = (1.0 / 3) * h, fourth = 0.25 * h, fifth = 0.2 * h;
@@ -191,7 +191,7 @@ LANE_DEVICE inline turning turn_in_layer(const lane_machine &m, mask due, const 
   s -= stiffness * jump;
   c -= stiffness * (stiffness * v);
   p += stiffness * (stiffness * jump);
-  course out = course_of(-d * a, -d * j, -d * s, -d * c, -d * p);
+  course out = derivatives_of(-d * a, -d * j, -d * s, -d * c, -d * p);
   passage outward = pass_layer<true>(m, out, due & inward.sound, bound);
   r.re = g.end_re;
   r.im = g.end_im;

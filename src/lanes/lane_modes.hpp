@@ -57,7 +57,7 @@ struct lane_modes {
   }
 };
 
-// Once the force of a barrier that may not pull has fallen to zero, does it stay so until the body is out?
+// Once the force of a barrier that may not pull has dropped to zero, does it stay so until the body is out?
 // It does while the speed w outwards is far more than the barrier's time constant `lead` times what the
 // acceleration can be until then.
 LANE_DEVICE inline mask leaves_for_good(const lane_modes &f, const lane_group &g, vec w) {

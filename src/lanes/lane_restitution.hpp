@@ -40,13 +40,13 @@ template <class contact> LANE_DEVICE inline vec restitution_at(const contact &m,
     k = m.restitution - m.coefficients[0] * w;
     put(k, k < 0.0, vec{});
   } else if (m.restitution_law == power_restitution) {
-    vec fallen = k * exponential(-m.coefficients[1] * logarithm(w / m.coefficients[0]));
-    put(k, w > m.coefficients[0], fallen);
+    vec triggered = k * exponential(-m.coefficients[1] * logarithm(w / m.coefficients[0]));
+    put(k, w > m.coefficients[0], triggered);
   } else if (m.restitution_law == viscoelastic_restitution) {
     vec root = exponential(logarithm(w) / 5.0);
-    vec fallen = 1.0 - m.coefficients[0] * root + m.coefficients[1] * (root * root);
-    put(fallen, fallen < 0.0, vec{});
-    put(k, w > 2.2250738585072014e-308, pick(fallen < 1.0, fallen, 1));
+    vec triggered = 1.0 - m.coefficients[0] * root + m.coefficients[1] * (root * root);
+    put(triggered, triggered < 0.0, vec{});
+    put(k, w > 2.2250738585072014e-308, pick(triggered < 1.0, triggered, 1));
   }
   if (m.restitution_law == curve_restitution) {
     k = k + curve_at(m.curve, w);

@@ -300,7 +300,7 @@ LANE_DEVICE inline void value_at(const vec (&c)[degree + 1], vec s, vec &f, vec 
 }
 
 // Where a parabola of value a > 0, or 0, and slope b at 0 that has the value c <= 0 at 1 falls to zero.
-LANE_DEVICE inline vec fall_of_parabola(vec a, vec b, vec c) {
+LANE_DEVICE inline vec zero_of_parabola(vec a, vec b, vec c) {
   vec bend = c - a - b, inner = b * b - 4.0 * a * bend;
   vec root = square_root(pick(inner > 0.0, inner, vec{}));
   mask rising = b > 0.0;
@@ -311,7 +311,7 @@ LANE_DEVICE inline vec fall_of_parabola(vec a, vec b, vec c) {
 // to zero, by Halley's steps within brackets. Returns the lanes that were not found.
 template <int degree>
 LANE_DEVICE inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, vec last, vec &root) {
-  vec low = {}, s = high * fall_of_parabola(c[0], high * c[1], last);
+  vec low = {}, s = high * zero_of_parabola(c[0], high * c[1], last);
   s = pick((s > 0.0) & (s < high), s, high);
   for (int round = 0; round < most_root_rounds && any(seek); round++) {
     vec f, f1, f2;

@@ -37,16 +37,16 @@ const double for_ever = 1e300;
 // What is not known: the speed after a soft contact while that lasts, a sample without a root.
 const double not_known = __builtin_nan("");
 
-// The attractors that have captured points on the section, 0 = none; as `find_capture` of `attractors.f90`.
-LANE_DEVICE inline vec captors(const lane_regions &regions, vec x, vec v) {
-  vec captor = {};
+// The attractors that have converged points on the section, 0 = none; as `find_capture` of `attractors.f90`.
+LANE_DEVICE inline vec attractors_reached(const lane_regions &regions, vec x, vec v) {
+  vec reached = {};
   for (int i = regions.count - 1; i >= 0; i--) {
     const lane_region &r = regions.region[i];
     vec dx = (x - r.x) * r.stretch_x, dv = (v - r.v) * r.stretch_v;
     vec square = r.metric_xx * dx * dx + 2 * r.metric_xv * dv * dx + r.metric_vv * dv * dv;
-    put(captor, square <= r.reach, r.attractor);
+    put(reached, square <= r.reach, r.attractor);
   }
-  return captor;
+  return reached;
 }
 
 // Lanes `there`, where they are to stop, at x and v. At the end of a period the clock starts anew, and those
@@ -54,9 +54,9 @@ LANE_DEVICE inline vec captors(const lane_regions &regions, vec x, vec v) {
 LANE_DEVICE inline void stop_or_pass(double period, double domain, mask there, vec x, vec v,
                                      const lane_regions &regions, lane_group &g) {
   mask section = there & (g.until >= period);
-  vec captor = captors(regions, x, v);
+  vec reached = attractors_reached(regions, x, v);
   mask passing =
-      section & (g.sections > 0.5) & (magnitude(x) <= domain) & ((captor < 0.5) | (g.leaves < 0.5));
+      section & (g.sections > 0.5) & (magnitude(x) <= domain) & ((reached < 0.5) | (g.leaves < 0.5));
   passing = regions.complete ? passing : mask{};
   put(g.flights, there, g.flights + 1.0);
   put(g.x, there, x);
@@ -64,8 +64,8 @@ LANE_DEVICE inline void stop_or_pass(double period, double domain, mask there, v
   put(g.time, there, pick(section, vec{}, g.until));
   put(g.start, section, g.start - period);
   put(g.elapsed, passing, g.elapsed + period);
-  put(g.captor, passing, captor);
-  put(g.settled, passing, pick(captor < 0.5, -1, pick(g.settled < 0.0, g.elapsed, g.settled)));
+  put(g.reached, passing, reached);
+  put(g.settled, passing, pick(reached < 0.5, -1, pick(g.settled < 0.0, g.elapsed, g.settled)));
   put(g.sections, passing, g.sections - 1.0);
   put(g.status, there & ~passing, lane_stopped);
 }

@@ -93,7 +93,7 @@ LANE_DEVICE inline mask keep_in_pieces(const lane_machine &m, const lane_group &
     kept = kept & keep_in_piece(p.x, pieces[over_place], asked, length);
   if (m.law.table[factor_over_place].knots > 0) {
     kept = kept & keep_in_piece(p.x, pieces[factor_over_place], asked, length);
-    // A factor that has fallen to zero stays there: another law.
+    // A factor that has dropped to zero stays there: another law.
     vec factor[order], power = 1.0;
     for (int k = 0; k < order; k++) {
       factor[k] = p.factor[k] * power;

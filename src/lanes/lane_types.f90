@@ -101,7 +101,7 @@ module lane_types
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
       flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
-      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, captor = 0, settled = -1, place = 0, touch = 0, z = 0, skip = 0, &
+      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, reached = 0, settled = -1, place = 0, touch = 0, z = 0, skip = 0, &
       reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
   end type lane_batch_t
 

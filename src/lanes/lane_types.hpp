@@ -169,9 +169,9 @@ template <class T> struct lane_fields {
   // Counts and extremes since the caller last took them away. A section ends a flight, too.
   T flights, impacts, speed_sum, last_speed, margin;
   // Sections that the lane passes before it stops at one; the flights after which it is left to the scalar
-  // code; whether it stops where it is captured. Time since the start of the trajectory, the attractor that
-  // has captured it (0 = none), and since when (-1 = not).
-  T sections, budget, leaves, elapsed, captor, settled;
+  // code; whether it stops where it is converged. Time since the start of the trajectory, the attractor that
+  // has converged it (0 = none), and since when (-1 = not).
+  T sections, budget, leaves, elapsed, reached, settled;
   // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
   // lower barrier (2).
   T place;
@@ -191,7 +191,7 @@ struct lane_region {
   double attractor, x, v, stretch_x, stretch_v, metric_xx, metric_xv, metric_vv, reach;
 };
 
-// What the lanes can be captured by; a point in several belongs to the first. Unless these are all, every
+// What the lanes can be converged by; a point in several belongs to the first. Unless these are all, every
 // lane stops at every section.
 struct lane_regions {
   int count, complete;

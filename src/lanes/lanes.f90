@@ -17,7 +17,7 @@ module lanes
 
 contains
 
-  !> The lanes can be captured by attractor number `attractor` near its point [x, v]: where the square of the distance from
+  !> The lanes can be converged by attractor number `attractor` near its point [x, v]: where the square of the distance from
   !> that, in scaled coordinates and a metric (xx, xv, vv), is at most `reach`. The first of several takes precedence.
   pure subroutine add_region(regions, attractor, point, scale, metric, reach)
     type(regions_t), intent(inout) :: regions

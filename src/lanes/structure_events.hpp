@@ -168,7 +168,7 @@ inline void press_again(int j, mask at, structure_group &g) {
 
 // Impact of contact j where `at` it was found.
 template <class size>
-inline void strike(const structure_machine &m, const size &z, int j, mask at, mask &rare,
+inline void apply_impact(const structure_machine &m, const size &z, int j, mask at, mask &rare,
                    structure_group &g) {
   const structure_joint &joint = m.joint[j];
   vec change = -(1 + restitution_at(joint, magnitude(g.s.end_f1[j]))) * g.s.end_f1[j];
@@ -225,7 +225,7 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
     } else {
       // The scalar code counts impacts that follow each other so fast.
       rare = rare | (at & (g.s.span < m.shortest));
-      strike(m, z, j, at, rare, g);
+      apply_impact(m, z, j, at, rare, g);
       put(speed, at, magnitude(g.s.end_f1[j]));
       put(g.s.burst, at, g.s.burst + 1.0);
       struck = struck | at;
@@ -258,12 +258,12 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
   return rare;
 }
 
-// The attractors that have captured points on the section, 0 = none; as `squared_distance` of
+// The attractors that have converged points on the section, 0 = none; as `squared_distance` of
 // `attractors.f90`.
 template <class size>
-inline vec captors(const size &z, const structure_batch &batch, const vec (&q)[most_coordinates],
+inline vec attractors_reached(const size &z, const structure_batch &batch, const vec (&q)[most_coordinates],
                    const vec (&v)[most_coordinates]) {
-  vec captor = {};
+  vec reached = {};
   for (int r = batch.regions - 1; r >= 0; r--) {
     const structure_region &region = batch.region[r];
     vec d[most_section], square = {};
@@ -278,9 +278,9 @@ inline vec captors(const size &z, const structure_batch &batch, const vec (&q)[m
       square += d[j] * (2 * row + region.metric[at + j] * d[j]);
       at += j + 1;
     }
-    put(captor, square <= region.reach, region.attractor);
+    put(reached, square <= region.reach, region.attractor);
   }
-  return captor;
+  return reached;
 }
 
 // Lanes `there`, where they are to stop: those that need not stop at the section pass; see `stop_or_pass` of
@@ -301,16 +301,16 @@ inline void take_stops(const structure_machine &m, const size &z, mask there, bo
   for (int i = 0; i < z.coordinates; i++)
     passing = passing & (magnitude(g.s.q[i]) <= m.domain);
   passing = complete ? passing : mask{};
-  vec captor = any(passing) ? captors(z, batch, g.s.q, g.s.v) : vec{};
-  passing = passing & ((captor < 0.5) | (g.c.leaves < 0.5));
+  vec reached = any(passing) ? attractors_reached(z, batch, g.s.q, g.s.v) : vec{};
+  passing = passing & ((reached < 0.5) | (g.c.leaves < 0.5));
   put(g.c.flights, there, g.c.flights + moves);
   put(g.s.time, there, pick(section, vec{}, g.c.until));
   put(g.s.left, there, 0);
   put(g.s.burst, there, 0);
   put(g.s.start, section, g.s.start - m.period);
   put(g.c.elapsed, passing, g.c.elapsed + m.period);
-  put(g.c.captor, passing, captor);
-  put(g.c.settled, passing, pick(captor < 0.5, -1, pick(g.c.settled < 0.0, g.c.elapsed, g.c.settled)));
+  put(g.c.reached, passing, reached);
+  put(g.c.settled, passing, pick(reached < 0.5, -1, pick(g.c.settled < 0.0, g.c.elapsed, g.c.settled)));
   put(g.c.sections, passing, g.c.sections - 1.0);
   put(g.c.status, there & ~passing, lane_stopped);
 }

@@ -71,7 +71,7 @@ contains
     flies = flies .and. flow%structure%mode(key + 1)%known > 0
   end function structure_flies
 
-  !> The lanes can be captured by attractor number `attractor` near its `point` of the section (places, speeds): where the square
+  !> The lanes can be converged by attractor number `attractor` near its `point` of the section (places, speeds): where the square
   !> of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`. The section's
   !> coordinates lie along directions of its own, at right angles; places share a scale, and so do speeds.
   pure subroutine add_structure_region(moving, batch, attractor, point, scale, metric, reach)

@@ -12,17 +12,17 @@ namespace {
 enum { most_approaches = 20 };
 
 // A least gap is good to this share of itself; a step shorter than this share of a panel is the last; a rate
-// that has fallen to this share is none.
+// that has dropped to this share is none.
 const double miss_share = 1e-10, last_step = 1e-12, rest_share = 1e-12;
 
 // A gap and its first three derivatives at the time t since the start of the flight.
-struct gap_course {
+struct gap_derivatives {
   vec t, gap, rate, curl, bend;
 };
 
 // The gap of joint j on `side` at the time t.
 template <class size>
-inline gap_course gap_at(const structure_machine &m, const size &z, const structure_group &g, int j, int side,
+inline gap_derivatives gap_at(const structure_machine &m, const size &z, const structure_group &g, int j, int side,
                          vec t) {
   structure_bases b;
   outlook o;
@@ -33,7 +33,7 @@ inline gap_course gap_at(const structure_machine &m, const size &z, const struct
           away * o.f3[j]};
 }
 
-inline void put(gap_course &to, mask where, const gap_course &from) {
+inline void put(gap_derivatives &to, mask where, const gap_derivatives &from) {
   put(to.t, where, from.t);
   put(to.gap, where, from.gap);
   put(to.rate, where, from.rate);
@@ -43,14 +43,14 @@ inline void put(gap_course &to, mask where, const gap_course &from) {
 
 // Between two instants at which the rate of a gap, or its curvature, has opposite signs: where it is zero.
 template <bool of_rate, class size>
-inline gap_course turning_gap(const structure_machine &m, const size &z, const structure_group &g, mask asked,
-                              int j, int side, gap_course low, gap_course high) {
+inline gap_derivatives turning_gap(const structure_machine &m, const size &z, const structure_group &g, mask asked,
+                              int j, int side, gap_derivatives low, gap_derivatives high) {
   const vec y0 = of_rate ? low.rate : low.curl, y1 = of_rate ? high.rate : high.curl;
   vec share = y0 / (y0 - y1), from = low.t, to = high.t;
   vec t = from + (to - from) * pick(share < 0.05, 0.05, pick(share > 0.95, 0.95, share));
-  gap_course at = low;
+  gap_derivatives at = low;
   for (int round = 0; round < most_approaches && any(asked); round++) {
-    gap_course now = gap_at(m, z, g, j, side, t);
+    gap_derivatives now = gap_at(m, z, g, j, side, t);
     put(at, asked, now);
     if (of_rate)
       asked = asked & (magnitude(now.rate) * (to - from) > miss_share * magnitude(now.gap));
@@ -67,14 +67,14 @@ inline gap_course turning_gap(const structure_machine &m, const size &z, const s
 }
 
 // A rate that is none: a slide that ends there has left rounding.
-inline vec at_rest(const gap_course &from, const gap_course &to) {
+inline vec at_rest(const gap_derivatives &from, const gap_derivatives &to) {
   return rest_share * (magnitude(from.rate) + (to.t - from.t) * magnitude(from.curl));
 }
 
 // Notes the gaps of the lanes `asked` that stop closing between two instants.
 template <class size>
 inline void note_least(const structure_machine &m, const size &z, mask asked, int j, int side,
-                       const gap_course &from, const gap_course &to, structure_group &g) {
+                       const gap_derivatives &from, const gap_derivatives &to, structure_group &g) {
   // Where friction holds what the contact is between, rates are rounding.
   const double none = m.joint[j].tie * m.drive_frequency;
   mask turns = asked & (from.rate < -none) & (to.rate >= -at_rest(from, to));
@@ -99,12 +99,12 @@ inline void note_misses(const structure_machine &m, const size &z, mask passed, 
         continue;
       const vec limit = side > 0 ? g.high[j] : g.low[j];
       const double away = -side;
-      gap_course from = {start, away * (here.f[j] - limit), away * here.f1[j], away * here.f2[j],
+      gap_derivatives from = {start, away * (here.f[j] - limit), away * here.f1[j], away * here.f2[j],
                          away * here.f3[j]};
-      gap_course to = {end, away * (far.f[j] - limit), away * far.f1[j], away * far.f2[j], away * far.f3[j]};
+      gap_derivatives to = {end, away * (far.f[j] - limit), away * far.f1[j], away * far.f2[j], away * far.f3[j]};
       mask open = passed & (g.s.phase[j] == 0.0);
       mask bends = open & (from.curl * to.curl < 0.0) & ((from.rate < 0.0) | (to.rate >= -at_rest(from, to)));
-      gap_course middle = to;
+      gap_derivatives middle = to;
       if (any(bends))
         put(middle, bends, turning_gap<false>(m, z, g, bends, j, side, from, to));
       note_least(m, z, open, j, side, from, middle, g);

@@ -16,7 +16,7 @@ const double unlimited = 1e300;
 
 // What the caller tells the lanes, and what they count for it; members of `lane_fields`.
 struct structure_control {
-  vec status, until, sections, budget, leaves, elapsed, captor, settled, flights, impacts, speed_sum,
+  vec status, until, sections, budget, leaves, elapsed, reached, settled, flights, impacts, speed_sum,
       last_speed, margin;
 
   template <class each> void exchange(lane_fields<double[lanes]> &f, int first, each move) {
@@ -26,7 +26,7 @@ struct structure_control {
     move(f.budget + first, budget);
     move(f.leaves + first, leaves);
     move(f.elapsed + first, elapsed);
-    move(f.captor + first, captor);
+    move(f.reached + first, reached);
     move(f.settled + first, settled);
     move(f.flights + first, flights);
     move(f.impacts + first, impacts);

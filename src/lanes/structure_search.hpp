@@ -46,10 +46,10 @@ LANE_LEAF mask stays_positive(vec span, vec w0, vec rate0, vec curl0, vec w1, ve
   return positive;
 }
 
-// Do all functions stay within their limits between two times? `fallen`: some are beyond them at the end.
+// Do all functions stay within their limits between two times? `triggered`: some are beyond them at the end.
 template <bool halves, class size>
 inline mask stays_within(const structure_machine &m, const size &z, const structure_group &g, mask asked,
-                         const outlook &here, const outlook &far, vec span, mask &fallen) {
+                         const outlook &here, const outlook &far, vec span, mask &triggered) {
   vec cube = span * span * span, power = cube * cube * (1.0 / 14400);
   mask within = asked;
   for (int j = 0; j < functions_of(z, g); j++) {
@@ -57,12 +57,12 @@ inline mask stays_within(const structure_machine &m, const size &z, const struct
     // Where nothing waits the last functions are nothing.
     mask idle = j < z.joints ? mask{} : g.low[j] == -unlimited;
     if (has_limit(m, z, g, asked, j, -1)) {
-      fallen = fallen | ((far.f[j] < g.low[j]) & ~idle);
+      triggered = triggered | ((far.f[j] < g.low[j]) & ~idle);
       within = within & (idle | stays_positive<halves>(span, here.f[j] - g.low[j], here.f1[j], here.f2[j],
                                                        far.f[j] - g.low[j], far.f1[j], far.f2[j], error));
     }
     if (has_limit(m, z, g, asked, j, 1)) {
-      fallen = fallen | (far.f[j] > g.high[j]);
+      triggered = triggered | (far.f[j] > g.high[j]);
       within = within & stays_positive<halves>(span, g.high[j] - here.f[j], -here.f1[j], -here.f2[j],
                                                g.high[j] - far.f[j], -far.f1[j], -far.f2[j], error);
     }
@@ -74,9 +74,9 @@ inline mask stays_within(const structure_machine &m, const size &z, const struct
 template <class size>
 inline mask proven_within(const structure_machine &m, const size &z, const structure_group &g, mask asked,
                           const outlook &here, const outlook &far, vec span) {
-  mask fallen = {}, none = {};
-  mask within = stays_within<false>(m, z, g, asked, here, far, span, fallen);
-  mask doubtful = asked & ~within & ~fallen;
+  mask triggered = {}, none = {};
+  mask within = stays_within<false>(m, z, g, asked, here, far, span, triggered);
+  mask doubtful = asked & ~within & ~triggered;
   if (any(doubtful))
     within = within | stays_within<true>(m, z, g, doubtful, here, far, span, none);
   return within;
@@ -88,15 +88,15 @@ struct structure_target {
 };
 
 // A function and three derivatives of it.
-struct guard_course {
+struct guard_derivatives {
   vec w = {}, w1 = {}, w2 = {}, w3 = {};
 };
 
 // -side (f - limit) of the targets: positive before the event.
 template <class size>
-inline guard_course course_of(const size &z, const structure_group &g, const structure_target &target,
+inline guard_derivatives derivatives_of(const size &z, const structure_group &g, const structure_target &target,
                               const outlook &o) {
-  guard_course c;
+  guard_derivatives c;
   for (int j = 0; j < functions_of(z, g); j++) {
     mask is = target.joint == double(j + 1);
     put(c.w, is, -target.side * (o.f[j] - pick(target.side > 0.0, g.high[j], g.low[j])));
@@ -115,33 +115,33 @@ inline void make_zero(const size &z, const structure_group &g, const structure_t
     put(o.f[j], where & (target.joint == double(j + 1)), pick(target.side > 0.0, g.high[j], g.low[j]));
 }
 
-// Of the guards that have fallen at the end of a panel, the one that a straight line lets fall first; none:
+// of the guards triggered at the end of a panel, the one that a straight line lets fall first; none:
 // joint 0. The target of `zero`, which lies exactly there, is no other.
 template <class size>
-inline structure_target earliest_fallen(const structure_machine &m, const size &z, const structure_group &g,
+inline structure_target earliest_triggered(const structure_machine &m, const size &z, const structure_group &g,
                                         const outlook &here, const outlook &far) {
   structure_target target = {0, 0};
   // The share is a ratio.
-  vec least_fall = 2, least_span = 1;
+  vec least_value = 2, least_span = 1;
   for (int j = 0; j < functions_of(z, g); j++)
     for (int side = -1; side <= 1; side += 2) {
       if (!has_limit(m, z, g, ~mask{}, j, side))
         continue;
       vec w0 = side > 0 ? g.high[j] - here.f[j] : here.f[j] - g.low[j];
       vec w1 = side > 0 ? g.high[j] - far.f[j] : far.f[j] - g.low[j];
-      mask first = (w1 < 0.0) & (w0 * least_span < least_fall * (w0 - w1));
+      mask first = (w1 < 0.0) & (w0 * least_span < least_value * (w0 - w1));
       if (j >= z.joints)
         first = first & (g.low[j] != -unlimited);
       put(target.joint, first, j + 1);
       put(target.side, first, side);
-      put(least_fall, first, w0);
+      put(least_value, first, w0);
       put(least_span, first, w0 - w1);
     }
   return target;
 }
 
 // Share of a panel of length h at which the polynomial of degree 7 through both ends of a function falls.
-inline vec falls_at(vec h, const guard_course &a, const guard_course &b) {
+inline vec zero_at(vec h, const guard_derivatives &a, const guard_derivatives &b) {
   vec square = h * h, a1 = h * a.w1, a2 = 0.5 * square * a.w2, a3 = (1.0 / 6) * square * h * a.w3;
   vec d0 = b.w - (a.w + a1 + a2 + a3), d1 = h * b.w1 - (a1 + 2 * a2 + 3 * a3),
       d2 = square * b.w2 - (2 * a2 + 6 * a3), d3 = (1.0 / 6) * square * h * b.w3 - a3;
@@ -263,7 +263,7 @@ inline void walk(const structure_machine &m, const size &z, mask walking, mask &
 // Newton's step from `step` to the zero of Taylor's polynomial of the targets.
 template <class size>
 inline vec zero_nearby(const size &z, const structure_group &g, const structure_target &target,
-                       const guard_course &c, const far_outlook &far, vec step) {
+                       const guard_derivatives &c, const far_outlook &far, vec step) {
   vec w4 = {}, w5 = {};
   for (int j = 0; j < functions_of(z, g); j++) {
     mask is = target.joint == double(j + 1);
@@ -281,15 +281,15 @@ template <class size>
 inline mask polish(const structure_machine &m, const size &z, mask asked, structure_walk &p,
                    structure_group &g) {
   vec low = p.t, high = p.end;
-  guard_course a = course_of(z, g, p.target, p.here), c = course_of(z, g, p.target, p.far);
-  vec s = p.t + (p.end - p.t) * falls_at(p.end - p.t, a, c);
+  guard_derivatives a = derivatives_of(z, g, p.target, p.here), c = derivatives_of(z, g, p.target, p.far);
+  vec s = p.t + (p.end - p.t) * zero_at(p.end - p.t, a, c);
   for (int round = 0; round < most_polishings && any(asked); round++) {
     structure_bases b;
     outlook o;
     far_outlook far;
     bases_at(m, z, g, s, b);
     functions_at(m, z, g, b, o, &far);
-    c = course_of(z, g, p.target, o);
+    c = derivatives_of(z, g, p.target, o);
     vec w = c.w, w1 = c.w1, w2 = c.w2;
     put(low, w > 0.0, s);
     high = pick(w > 0.0, high, s);
@@ -372,10 +372,10 @@ inline mask find_first(const structure_machine &m, const size &z, mask seek, str
   mask sought = seek, walking = seek, lost = {};
   while (any(sought)) {
     walk(m, z, walking, sought, p, g);
-    structure_target fallen = earliest_fallen(m, z, g, p.here, p.far);
-    mask aims = sought & (fallen.joint > 0.0), failed = {};
-    put(p.target.joint, aims, fallen.joint);
-    put(p.target.side, aims, fallen.side);
+    structure_target triggered = earliest_triggered(m, z, g, p.here, p.far);
+    mask aims = sought & (triggered.joint > 0.0), failed = {};
+    put(p.target.joint, aims, triggered.joint);
+    put(p.target.side, aims, triggered.side);
     if (any(aims)) {
       p.at_zero = p.at_zero & ~aims;
       failed = polish(m, z, aims, p, g);

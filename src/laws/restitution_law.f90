@@ -105,7 +105,7 @@ contains
   end function formula_damping
 
   !> e of the law K p + D p' at zeta = D/(2 sqrt(K m)). With `tension` the body leaves at p = 0 (0 if it never does),
-  !> without where the force has fallen to zero.
+  !> without where the force has dropped to zero.
   pure elemental real(wp) function kelvin_voigt_restitution(zeta, tension) result(e)
     real(wp), intent(in) :: zeta
     logical, intent(in) :: tension

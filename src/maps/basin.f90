@@ -6,7 +6,7 @@ module basin
   use attractors, only: attractor_t
   use discover, only: discover_attractors
   use errors, only: error_t, fail
-  use fleet, only: prepare_flow
+  use lane_slots, only: prepare_flow
   use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
   use kinds, only: int64, wp
   use match, only: carry_labels, number_new, remember
@@ -16,13 +16,13 @@ module basin
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
-  use trajectories, only: block_size, describe_all, journey_t, run_on_device
+  use trajectories, only: block_size, describe_all, ensemble_t, run_on_device
   use work_watch, only: watch_t
-  use trajectory, only: fit_window, outcome_t, run_trajectory, span_t
+  use single_trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   implicit none
   private
 
-  public :: open_slice, open_journey, points_at_a_time, search_starts, label_slices, basin_points
+  public :: open_slice, open_ensemble, points_at_a_time, search_starts, label_slices, basin_points
 
   !> The attractors of one slice.
   type, public :: catalogue_t
@@ -32,7 +32,7 @@ module basin
   !> The slice that was last looked at.
   type, public :: slice_cache_t
     integer(int64) :: slice = -1
-    type(journey_t) :: journey
+    type(ensemble_t) :: ensemble
   end type slice_cache_t
 
 contains
@@ -53,20 +53,20 @@ contains
   end subroutine open_slice
 
   !> The machine of a slice, ready for whole trajectories.
-  subroutine open_journey(grid, span, slice, describe, journey, error)
+  subroutine open_ensemble(grid, span, slice, describe, ensemble, error)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer(int64), intent(in) :: slice
     integer, intent(in) :: describe
-    type(journey_t), intent(out) :: journey
+    type(ensemble_t), intent(out) :: ensemble
     type(error_t), allocatable, intent(out) :: error
-    call open_slice(grid, span, slice, journey%moving, error)
+    call open_slice(grid, span, slice, ensemble%moving, error)
     if (allocated(error)) return
-    journey%span = span
-    call fit_window(journey%moving%machine%period, journey%span)
-    journey%describe = describe
-    call prepare_flow(journey%moving, journey%flow)
-  end subroutine open_journey
+    ensemble%span = span
+    call fit_window(ensemble%moving%machine%period, ensemble%span)
+    ensemble%describe = describe
+    call prepare_flow(ensemble%moving, ensemble%flow)
+  end subroutine open_ensemble
 
   !> Points worth asking `basin_points` for at a time, from that at `index` on: its slice speaks for those that follow.
   subroutine points_at_a_time(grid, span, index, cache, points, error)
@@ -78,7 +78,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     points = 1
     call turn_to(grid, span, point_slice(grid, index), cache, error)
-    if (.not. allocated(error)) points = block_size(cache%journey)
+    if (.not. allocated(error)) points = block_size(cache%ensemble)
   end subroutine points_at_a_time
 
   !> Makes the cache hold the machine of a slice.
@@ -90,7 +90,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (slice == cache%slice) return
     cache%slice = -1
-    call open_journey(grid, span, slice, describe_all, cache%journey, error)
+    call open_ensemble(grid, span, slice, describe_all, cache%ensemble, error)
     if (.not. allocated(error)) cache%slice = slice
   end subroutine turn_to
 
@@ -171,21 +171,21 @@ contains
       associate (members => pack([(i, i=1, size(slices))], left .and. slices == slices(first)))
         left(members) = .false.
         if (size(catalogues) > 0) then
-          call slice_points(grid, cache%journey, catalogues(slices(first) + 1)%attractors, index, members, values, done, error, &
+          call slice_points(grid, cache%ensemble, catalogues(slices(first) + 1)%attractors, index, members, values, done, error, &
                             watch)
           if (present(whole)) whole = done
           if (allocated(error) .or. .not. done) return
         else
-          call lone_points(grid, max_period, cache%journey, index, members, values)
+          call lone_points(grid, max_period, cache%ensemble, index, members, values)
         end if
       end associate
     end do
   end subroutine basin_points
 
   !> Points of one slice with a catalogue.
-  subroutine slice_points(grid, journey, catalogue, index, members, values, whole, error, watch)
+  subroutine slice_points(grid, ensemble, catalogue, index, members, values, whole, error, watch)
     type(grid_t), intent(in) :: grid
-    type(journey_t), intent(in) :: journey
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
@@ -199,7 +199,7 @@ contains
     do i = 1, size(members)
       starts(:, i) = point_start(grid, index(:, members(i)))
     end do
-    call run_on_device(journey, catalogue, starts, outcomes, whole, error, watch)
+    call run_on_device(ensemble, catalogue, starts, outcomes, whole, error, watch)
     if (allocated(error) .or. .not. whole) return
     do i = 1, size(members)
       values(members(i), :) = outcome_values(outcomes(i))
@@ -207,10 +207,10 @@ contains
   end subroutine slice_points
 
   !> Points that are their own slices: each discovers its attractor.
-  subroutine lone_points(grid, max_period, journey, index, members, values)
+  subroutine lone_points(grid, max_period, ensemble, index, members, values)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: max_period
-    type(journey_t), intent(in) :: journey
+    type(ensemble_t), intent(in) :: ensemble
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
     type(attractor_t), allocatable :: own(:)
@@ -220,8 +220,8 @@ contains
     do i = 1, size(members)
       start = point_start(grid, index(:, members(i)))
       if (allocated(own)) deallocate (own)
-      call discover_attractors(journey%moving, journey%span, reshape(start, [size(start), 1]), max_period, own)
-      call run_trajectory(journey%moving, own, journey%span, start(1), start(2), start(3), outcome, others=start(4:))
+      call discover_attractors(ensemble%moving, ensemble%span, reshape(start, [size(start), 1]), max_period, own)
+      call run_trajectory(ensemble%moving, own, ensemble%span, start(1), start(2), start(3), outcome, others=start(4:))
       values(members(i), :) = outcome_values(outcome)
     end do
   end subroutine lone_points

@@ -7,8 +7,8 @@ module bisection
   use attractors, only: attractor_t
   use kinds, only: wp
   use start_label, only: label_not_known, label_of
-  use trajectories, only: journey_t, run_trajectories
-  use trajectory, only: outcome_t
+  use trajectories, only: ensemble_t, run_trajectories
+  use single_trajectory, only: outcome_t
   implicit none
   private
 
@@ -17,7 +17,7 @@ module bisection
   !> Intervals that one edge may fall into: beyond, of an interval with a third label in it the upper part is not followed, and the
   !> next interval begins with another label than the one below ends with.
   integer, parameter :: most_intervals = 6
-  !> Starts that are not captured in time lie between two basins in a sliver; one narrower than this share of its edge is taken
+  !> Starts that are not converged in time lie between two basins in a sliver; one narrower than this share of its edge is taken
   !> for the boundary itself.
   real(wp), parameter :: sliver = 1e-3_wp
 
@@ -33,15 +33,15 @@ module bisection
 contains
 
   !> Labels of `starts` (columns as `point_start` of module `grid` has them).
-  pure subroutine label_starts(journey, catalogue, starts, labels)
-    type(journey_t), intent(in) :: journey
+  pure subroutine label_starts(ensemble, catalogue, starts, labels)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(out) :: labels(:)
     type(outcome_t), allocatable :: outcomes(:)
     integer :: i
     allocate (outcomes(size(starts, 2)))
-    call run_trajectories(journey, catalogue, starts, outcomes)
+    call run_trajectories(ensemble, catalogue, starts, outcomes)
     do i = 1, size(labels)
       labels(i) = label_of(outcomes(i))
     end do
@@ -49,8 +49,8 @@ contains
 
   !> Halves every interval once that is wider than `tolerance` (a share, one of each edge); edge e leads from the start
   !> `from(:, e)` to `to(:, e)`. `left` intervals are not done yet.
-  pure subroutine halve_intervals(journey, catalogue, from, to, tolerance, intervals, left)
-    type(journey_t), intent(in) :: journey
+  pure subroutine halve_intervals(ensemble, catalogue, from, to, tolerance, intervals, left)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: from(:, :), to(:, :), tolerance(:)
     type(interval_t), allocatable, intent(inout) :: intervals(:)
@@ -69,7 +69,7 @@ contains
         starts(:, k) = from(:, one%edge) + middle(k)*(to(:, one%edge) - from(:, one%edge))
       end associate
     end do
-    call label_starts(journey, catalogue, starts, labels)
+    call label_starts(ensemble, catalogue, starts, labels)
     number = 0
     do k = 1, size(intervals)
       number(intervals(k)%edge) = number(intervals(k)%edge) + 1

@@ -5,7 +5,7 @@
 !> C interface and the merging of shares take it from here.
 module point_columns
   use kinds, only: wp
-  use trajectory, only: outcome_t
+  use single_trajectory, only: outcome_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -41,7 +41,7 @@ module point_columns
 
 contains
 
-  !> The values of a point, in the order of the table: settling time not a number where it was not captured, grazing margin
+  !> The values of a point, in the order of the table: settling time not a number where it was not converged, grazing margin
   !> infinite where no barrier was missed.
   pure function outcome_values(outcome) result(values)
     type(outcome_t), intent(in) :: outcome

@@ -12,7 +12,7 @@ module settling
   use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use strobe, only: advance_strobe_period, begin_tally, coordinates_of, scales_of, section_point, strobe_t, turn_of
+  use section, only: advance_section_period, begin_tally, coordinates_of, scales_of, section_point, section_state_t, turn_of
   use turn_section, only: has_no_clock
   implicit none
   private
@@ -38,7 +38,7 @@ module settling
     !> Has not settled, but is near a cycle: a slow transient, no chaos.
     logical :: near_cycle = .false.
     !> Where the search ended, on the section: on the cycle if the motion has settled, a whole number of cycles from the start.
-    type(strobe_t) :: state
+    type(section_state_t) :: state
     !> Of one cycle, or of the last periods of a motion that has not settled; without the largest velocity.
     type(features_t) :: features
     !> See `mark_of`.
@@ -54,7 +54,7 @@ contains
   !> with at most `longest` turns.
   pure subroutine settle(moving, start, longest, patience, settled)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: start
+    type(section_state_t), intent(in) :: start
     integer, intent(in) :: longest, patience
     type(settled_t), intent(out) :: settled
     type(motion_t) :: turning
@@ -70,7 +70,7 @@ contains
   !> The same with the section as it is.
   pure subroutine settle_on_section(moving, start, longest, patience, settled)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: start
+    type(section_state_t), intent(in) :: start
     integer, intent(in) :: longest, patience
     type(settled_t), intent(out) :: settled
     real(wp) :: points(most_coordinates, 2*longest), misses(longest), before(longest), miss, least
@@ -135,7 +135,7 @@ contains
     integer :: i
     call begin_tally(moving, settled%state, tally)
     do i = 1, size(points, 2)
-      call advance_strobe_period(moving, settled%state, tally, settled%reason)
+      call advance_section_period(moving, settled%state, tally, settled%reason)
       if (settled%reason /= 0) return
       points(:, i) = section_point(moving, settled%state)
     end do
@@ -150,7 +150,7 @@ contains
     call begin_tally(moving, settled%state, tally)
     settled%duration = 0
     do i = 1, periods
-      call advance_strobe_period(moving, settled%state, tally, settled%reason)
+      call advance_section_period(moving, settled%state, tally, settled%reason)
       if (settled%reason /= 0) return
       settled%duration = settled%duration + settled%state%lasted
     end do

@@ -7,7 +7,7 @@ module span_check
   use kinds, only: wp
   use status, only: exit_bad_case
   use text, only: to_text
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   implicit none
   private
 

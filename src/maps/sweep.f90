@@ -15,8 +15,8 @@ module sweep
   use settling, only: mark_of, settle, settled_t
   use span_check, only: check_periods
   use status, only: reason_time_over
-  use strobe, only: advance_strobe_period, advance_to_section, begin_tally, resume_strobe, strobe_t
-  use trajectory, only: span_t
+  use section, only: advance_section_period, advance_to_section, begin_tally, resume_section, section_state_t
+  use single_trajectory, only: span_t
   use turn_section, only: has_no_clock
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
@@ -30,7 +30,7 @@ module sweep
     type(features_t) :: features
     !> Last section points, rows x [m] and v [m/s]; not numbers after a hold that was given up, like the features.
     real(wp), allocatable :: samples(:, :)
-    type(strobe_t) :: state
+    type(section_state_t) :: state
     !> See `mark_of`.
     integer :: mark = 0
     !> Where the motion would end if the hold went on.
@@ -48,7 +48,7 @@ contains
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: value, crank_angle
-    type(strobe_t), intent(in) :: state
+    type(section_state_t), intent(in) :: state
     integer, intent(in) :: samples, longest
     type(hold_t), intent(out) :: held
     type(error_t), allocatable, intent(out) :: error
@@ -61,14 +61,14 @@ contains
     in_window = max(1, ceiling(span%window/moving%machine%period))
     periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)
     allocate (held%samples(2, samples), source=ieee_value(1.0_wp, ieee_quiet_nan))
-    held%state = resume_strobe(moving, state, crank_angle)
+    held%state = resume_section(moving, state, crank_angle)
     call begin_tally(moving, held%state, tally)
     do i = 1, periods
       if (i == periods - in_window + 1) then
         tally%wants_v_max = .true.
         call begin_tally(moving, held%state, tally)
       end if
-      call advance_strobe_period(moving, held%state, tally, held%reason)
+      call advance_section_period(moving, held%state, tally, held%reason)
       if (held%reason /= 0) then
         held%samples = ieee_value(1.0_wp, ieee_quiet_nan)
         held%features = no_features()
@@ -96,9 +96,9 @@ contains
   !> Where a machine without a clock turns round next, rows x [m] and v [m/s]; the state as it is, where it does not.
   pure subroutine sample_turns(moving, state, samples)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: state
+    type(section_state_t), intent(in) :: state
     real(wp), intent(out) :: samples(:, :)
-    type(strobe_t) :: later
+    type(section_state_t) :: later
     type(tally_t) :: unused
     integer :: i, reason
     samples = spread([state%state%x, state%state%v], 2, size(samples, 2))

@@ -13,9 +13,9 @@ module sweep_limits
   use motion, only: motion_t
   use settling, only: settle, settled_t
   use status, only: reason_time_over
-  use strobe, only: coordinates_of, resume_strobe, strobe_at, strobe_t
+  use section, only: coordinates_of, resume_section, section_at, section_state_t
   use sweep, only: hold_parameter, hold_t
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -44,13 +44,13 @@ contains
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: value, beyond, tolerance
-    type(strobe_t), intent(in) :: state
+    type(section_state_t), intent(in) :: state
     integer, intent(in) :: mark
     integer, intent(inout) :: next
     real(wp), intent(out) :: bracket(2)
     type(error_t), allocatable, intent(out) :: error
     type(hold_t) :: held
-    type(strobe_t) :: last
+    type(section_state_t) :: last
     real(wp) :: near, far, middle
     near = value
     far = beyond
@@ -72,15 +72,15 @@ contains
     bracket = [min(near, far), max(near, far)]
   end subroutine observe_limit
 
-  !> Follows the motion with `mark` whose mark has changed behind the last of the values in `course` that `settled` tells
+  !> Follows the motion with `mark` whose mark has changed behind the last of the values in `trajectory` that `settled` tells
   !> of, where the state was `state`, from the last of them at which it had settled. A motion may have left its branch long
   !> before its mark shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
-  subroutine branch_end(grid, path, course, settled, state, mark, longest, tolerance, bracket, outcome, error)
+  subroutine branch_end(grid, path, trajectory, settled, state, mark, longest, tolerance, bracket, outcome, error)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path
-    real(wp), intent(in) :: course(:), tolerance
+    real(wp), intent(in) :: trajectory(:), tolerance
     type(settled_t), intent(in) :: settled(:)
-    type(strobe_t), intent(in) :: state
+    type(section_state_t), intent(in) :: state
     integer, intent(in) :: mark, longest
     real(wp), intent(out) :: bracket(2)
     integer, intent(out) :: outcome
@@ -93,7 +93,7 @@ contains
     there = settled(from)
     if (there%period == 0) then
       there%state = state
-      call settle_at(grid, path, course(from), there, longest, patience, next, error)
+      call settle_at(grid, path, trajectory(from), there, longest, patience, next, error)
       if (.not. allocated(error)) there = next
     end if
     if (allocated(error)) return
@@ -103,7 +103,8 @@ contains
       if (from == 0) return
       there = settled(from)
     end do
-    call follow_limit(grid, path, course(from), course(size(course)), abs(course(from + 1) - course(from)), there, longest, &
+    call follow_limit(grid, path, trajectory(from), trajectory(size(trajectory)), abs(trajectory(from + 1) - trajectory(from)), &
+      there, longest, &
                       tolerance, bracket, outcome, error)
   end subroutine branch_end
 
@@ -207,18 +208,18 @@ contains
     type(settled_t), intent(in), optional :: before
     real(wp), intent(in), optional :: ahead
     type(motion_t) :: moving
-    type(strobe_t) :: start
+    type(section_state_t) :: start
     real(wp) :: here(2), behind(2)
     call machine_with(grid, path, value, moving, error)
     if (allocated(error)) return
-    start = resume_strobe(moving, from%state, 0.0_wp)
+    start = resume_section(moving, from%state, 0.0_wp)
     if (present(ahead) .and. .not. has_driver(moving) .and. coordinates_of(moving) == 2) then
       if (before%period == from%period) then
         here = [from%state%state%x, from%state%state%v]
         behind = point_near([before%state%state%x, before%state%state%v], here, moving%machine%turn)
         here = here + ahead*(here - behind)
         here(1) = min(max(here(1), moving%machine%contact%lower), moving%machine%contact%upper)
-        start = strobe_at(moving, here)
+        start = section_at(moving, here)
       end if
     end if
     call settle(moving, start, longest, patience, settled)

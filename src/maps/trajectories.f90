@@ -6,14 +6,15 @@
 module trajectories
   use attractors, only: attractor_t
   use errors, only: error_t
-  use fleet, only: add_capture, fleet_t, flies_in_lane, fly_fleet, open_fleet, put_into_lane, take_from_lane
+  use lane_slots, only: add_capture, lane_slots_t, flies_in_lane, advance_lanes, open_lanes, put_into_lane, take_from_lane
   use kinds, only: wp
   use lane_gpu, only: await_half, gpu_half_t, gpu_threads, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
   use motion, only: motion_t
   use status, only: reason_left_domain
   use structure_types, only: structure_batch_t
-  use trajectory, only: begin_course, conclude, course_t, ends_captured, go_past_event, go_to_stop, outcome_t, pass_stop, &
+  use single_trajectory, only: begin_trajectory, conclude, trajectory_state_t, ends_converged, go_past_event, go_to_stop, &
+    outcome_t, pass_stop, &
     phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
   use, intrinsic :: iso_fortran_env, only: int64
@@ -22,37 +23,37 @@ module trajectories
 
   public :: run_trajectories, run_on_device, block_size
 
-  !> What is asked of the statistics window of a motion that is not captured.
+  !> What is asked of the statistics window of a motion that is not converged.
   integer, parameter, public :: describe_regime = 1, describe_all = 2
 
   !> All that trajectories have in common.
-  type, public :: journey_t
+  type, public :: ensemble_t
     type(motion_t) :: moving
     type(lane_flow_t) :: flow
     type(span_t) :: span
     !> With `describe_regime` the extremes, which take a search in every flight, are not asked for.
     integer :: describe = describe_all
-  end type journey_t
+  end type ensemble_t
 
   !> Starts that a GPU is given at a time, where a tile has so many: its pool is refilled many times.
   integer, parameter :: gpu_block = 2**22
 
-  !> Batches of a GPU that are attended to between two looks at the watch.
+  !> Batches of a GPU that are serviced to between two looks at the watch.
   integer, parameter :: batches_per_look = 256
 
   !> The trajectory in a lane: number of its start among those of its thread (0 = none), whether the extremes of its window went
   !> unseen, and the slips that were counted up to its last stop.
-  type :: passenger_t
+  type :: slot_t
     integer :: start = 0
-    type(course_t) :: course
+    type(trajectory_state_t) :: trajectory
     logical :: unseen = .false.
     integer(int64) :: slips = 0
-  end type passenger_t
+  end type slot_t
 
   !> Batches that are worth a thread.
   integer, parameter :: fewest_batches = 64
 
-  !> What one thread attends to: batches of a half and starts, from and to; the number among these of the start that comes next;
+  !> What one thread services to: batches of a half and starts, from and to; the number among these of the start that comes next;
   !> whether any of its lanes is to fly.
   type :: part_t
     integer :: batches(2) = [1, 0], starts(2) = [1, 0], next = 1
@@ -61,10 +62,10 @@ module trajectories
 
 contains
 
-  !> `run_trajectories` on the GPU of the journey, if it has one; the watch is looked at on the way. Code 75 if that fails; then,
+  !> `run_trajectories` on the GPU of the ensemble, if it has one; the watch is looked at on the way. Code 75 if that fails; then,
   !> and where `whole` is false because the watch said stop, there are no outcomes.
-  subroutine run_on_device(journey, catalogue, starts, outcomes, whole, error, watch)
-    type(journey_t), intent(in) :: journey
+  subroutine run_on_device(ensemble, catalogue, starts, outcomes, whole, error, watch)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(out) :: outcomes(:)
@@ -72,69 +73,69 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
     whole = .true.
-    if (journey%flow%available .and. journey%flow%gpu >= 0) then
-      call run_on_gpu(journey, catalogue, starts, outcomes, whole, error, watch)
+    if (ensemble%flow%available .and. ensemble%flow%gpu >= 0) then
+      call run_on_gpu(ensemble, catalogue, starts, outcomes, whole, error, watch)
     else
-      call run_trajectories(journey, catalogue, starts, outcomes)
+      call run_trajectories(ensemble, catalogue, starts, outcomes)
     end if
   end subroutine run_on_device
 
-  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_strobe` takes; one column each), by this
+  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_section` takes; one column each), by this
   !> processor.
-  pure subroutine run_trajectories(journey, catalogue, starts, outcomes)
-    type(journey_t), intent(in) :: journey
+  pure subroutine run_trajectories(ensemble, catalogue, starts, outcomes)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(out) :: outcomes(:)
-    type(passenger_t) :: passengers(lane_count)
-    type(fleet_t) :: lanes
+    type(slot_t) :: slots(lane_count)
+    type(lane_slots_t) :: lanes
     integer :: i, next
-    if (.not. journey%flow%available) then
+    if (.not. ensemble%flow%available) then
       do i = 1, size(starts, 2)
-        call run_trajectory(journey%moving, catalogue, journey%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i), &
+        call run_trajectory(ensemble%moving, catalogue, ensemble%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i), &
                             others=starts(4:, i))
       end do
       return
     end if
-    call open_fleet(journey%moving, lanes)
-    call set_regions(journey%moving, catalogue, lanes)
+    call open_lanes(ensemble%moving, lanes)
+    call set_regions(ensemble%moving, catalogue, lanes)
     next = 1
-    call board_all(journey, catalogue, starts, next, passengers, lanes%batch, lanes%structures, outcomes)
-    do while (any(passengers%start > 0))
-      call fly_fleet(journey%flow, lanes)
-      call attend_all(journey, catalogue, starts, next, passengers, lanes%batch, lanes%structures, outcomes)
+    call load_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%structures, outcomes)
+    do while (any(slots%start > 0))
+      call advance_lanes(ensemble%flow, lanes)
+      call service_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%structures, outcomes)
     end do
   end subroutine run_trajectories
 
-  !> A GPU's lanes: while one half of them flies, the threads attend to the other. The watch is looked at whenever a
+  !> A GPU's lanes: while one half of them flies, the threads service to the other. The watch is looked at whenever a
   !> half has come back and every few of its batches, until all outcomes are known.
-  subroutine run_on_gpu(journey, catalogue, starts, outcomes, whole, error, watch)
-    type(journey_t), intent(in) :: journey
+  subroutine run_on_gpu(ensemble, catalogue, starts, outcomes, whole, error, watch)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(inout) :: outcomes(:)
     logical, intent(inout) :: whole
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
-    type(passenger_t), allocatable :: passengers(:, :, :)
+    type(slot_t), allocatable :: slots(:, :, :)
     type(part_t), allocatable :: parts(:)
     type(gpu_half_t) :: halves(2)
-    type(fleet_t) :: lanes
+    type(lane_slots_t) :: lanes
     integer :: half, batches
     logical :: away(2), stop_now
     stop_now = .false.
-    call open_gpu(journey%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
+    call open_gpu(ensemble%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
     if (allocated(error)) return
-    call open_fleet(journey%moving, lanes)
-    call set_regions(journey%moving, catalogue, lanes)
+    call open_lanes(ensemble%moving, lanes)
+    call set_regions(ensemble%moving, catalogue, lanes)
     batches = size(halves(1)%batches)
-    allocate (passengers(lane_count, batches, 2))
+    allocate (slots(lane_count, batches, 2))
     call share_out(batches, size(starts, 2), parts)
     do half = 1, 2
-      call attend_half(journey, catalogue, starts, .true., parts, passengers(:, :, half), halves(half)%batches, outcomes, &
+      call service_half(ensemble, catalogue, starts, .true., parts, slots(:, :, half), halves(half)%batches, outcomes, &
                        stop_now, watch)
       away(half) = any(parts%away) .and. .not. stop_now
-      if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
+      if (away(half)) call send_half(half, batches, ensemble%flow%machine, lanes%regions, error)
       if (allocated(error)) return
     end do
     half = 1
@@ -143,10 +144,10 @@ contains
         call await_half(half, error)
         if (allocated(error)) return
         ! A half that is away when the run is to stop is awaited all the same: the GPU writes into its batches.
-        call attend_half(journey, catalogue, starts, .false., parts, passengers(:, :, half), halves(half)%batches, outcomes, &
+        call service_half(ensemble, catalogue, starts, .false., parts, slots(:, :, half), halves(half)%batches, outcomes, &
                          stop_now, watch)
         away(half) = any(parts%away) .and. .not. stop_now
-        if (away(half)) call send_half(half, batches, journey%flow%machine, lanes%regions, error)
+        if (away(half)) call send_half(half, batches, ensemble%flow%machine, lanes%regions, error)
         if (allocated(error)) return
       end if
       half = 3 - half
@@ -169,13 +170,13 @@ contains
 
   !> Half of the lanes, on the host: their first starts if they are `fresh`, else what is due after they have flown. The first
   !> thread, which is the caller, looks at the watch.
-  subroutine attend_half(journey, catalogue, starts, fresh, parts, passengers, batches, outcomes, stop_now, watch)
-    type(journey_t), intent(in) :: journey
+  subroutine service_half(ensemble, catalogue, starts, fresh, parts, slots, batches, outcomes, stop_now, watch)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     logical, intent(in) :: fresh
     type(part_t), intent(inout) :: parts(:)
-    type(passenger_t), intent(inout) :: passengers(:, :)
+    type(slot_t), intent(inout) :: slots(:, :)
     type(lane_batch_t), intent(inout) :: batches(:)
     type(outcome_t), intent(inout) :: outcomes(:)
     logical, intent(inout) :: stop_now
@@ -183,18 +184,18 @@ contains
     integer :: i
     !$omp parallel do schedule(static, 1) num_threads(size(parts)) if (size(parts) > 1)
     do i = 1, size(parts)
-      call attend_part(journey, catalogue, starts, fresh, i == 1, parts(i), passengers, batches, outcomes, stop_now, watch)
+      call service_part(ensemble, catalogue, starts, fresh, i == 1, parts(i), slots, batches, outcomes, stop_now, watch)
     end do
-  end subroutine attend_half
+  end subroutine service_half
 
   !> What one thread does of that. No thread touches what belongs to another, but `stop_now`.
-  subroutine attend_part(journey, catalogue, starts, fresh, looks, part, passengers, batches, outcomes, stop_now, watch)
-    type(journey_t), intent(in) :: journey
+  subroutine service_part(ensemble, catalogue, starts, fresh, looks, part, slots, batches, outcomes, stop_now, watch)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     logical, intent(in) :: fresh, looks
     type(part_t), intent(inout) :: part
-    type(passenger_t), intent(inout) :: passengers(:, :)
+    type(slot_t), intent(inout) :: slots(:, :)
     type(lane_batch_t), intent(inout) :: batches(:)
     type(outcome_t), intent(inout) :: outcomes(:)
     logical, intent(inout) :: stop_now
@@ -215,94 +216,94 @@ contains
         if (enough) return
         if (fresh) then
           batches(k) = lane_batch_t()
-          call board_all(journey, catalogue, starts(:, first:last), part%next, passengers(:, k), batches(k), none, &
+          call load_all(ensemble, catalogue, starts(:, first:last), part%next, slots(:, k), batches(k), none, &
                          outcomes(first:last))
         else
-          call attend_all(journey, catalogue, starts(:, first:last), part%next, passengers(:, k), batches(k), none, &
+          call service_all(ensemble, catalogue, starts(:, first:last), part%next, slots(:, k), batches(k), none, &
                           outcomes(first:last))
         end if
-        part%away = part%away .or. any(passengers(:, k)%start > 0)
+        part%away = part%away .or. any(slots(:, k)%start > 0)
       end do
     end associate
-  end subroutine attend_part
+  end subroutine service_part
 
   !> The first starts of a batch.
-  pure subroutine board_all(journey, catalogue, starts, next, passengers, batch, structures, outcomes)
-    type(journey_t), intent(in) :: journey
+  pure subroutine load_all(ensemble, catalogue, starts, next, slots, batch, structures, outcomes)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(inout) :: next
-    type(passenger_t), intent(inout) :: passengers(:)
+    type(slot_t), intent(inout) :: slots(:)
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcomes(:)
     integer :: lane
     do lane = 1, lane_count
-      call board(journey, catalogue, starts, lane, next, passengers(lane), batch, structures, outcomes)
+      call load_slot(ensemble, catalogue, starts, lane, next, slots(lane), batch, structures, outcomes)
     end do
-  end subroutine board_all
+  end subroutine load_all
 
   !> The lanes of a batch that has been flown: those that have stopped or are left, and the next starts.
-  pure subroutine attend_all(journey, catalogue, starts, next, passengers, batch, structures, outcomes)
-    type(journey_t), intent(in) :: journey
+  pure subroutine service_all(ensemble, catalogue, starts, next, slots, batch, structures, outcomes)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(inout) :: next
-    type(passenger_t), intent(inout) :: passengers(:)
+    type(slot_t), intent(inout) :: slots(:)
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcomes(:)
     integer :: lane
     do lane = 1, lane_count
-      if (passengers(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
-      call attend(journey, catalogue, starts(:, passengers(lane)%start), lane, passengers(lane), batch, structures, &
-                  outcomes(passengers(lane)%start))
-      if (passengers(lane)%course%phase == phase_over) call board(journey, catalogue, starts, lane, next, passengers(lane), &
+      if (slots(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
+      call service(ensemble, catalogue, starts(:, slots(lane)%start), lane, slots(lane), batch, structures, &
+                  outcomes(slots(lane)%start))
+      if (slots(lane)%trajectory%phase == phase_over) call load_slot(ensemble, catalogue, starts, lane, next, slots(lane), &
                                                                   batch, structures, outcomes)
     end do
-  end subroutine attend_all
+  end subroutine service_all
 
   !> Trajectories worth asking for at a time: enough to keep the lanes full, or one by one.
-  pure integer function block_size(journey)
-    type(journey_t), intent(in) :: journey
-    block_size = merge(4*lane_count, 1, journey%flow%available)
-    if (journey%flow%available .and. journey%flow%gpu >= 0) block_size = gpu_block
+  pure integer function block_size(ensemble)
+    type(ensemble_t), intent(in) :: ensemble
+    block_size = merge(4*lane_count, 1, ensemble%flow%available)
+    if (ensemble%flow%available .and. ensemble%flow%gpu >= 0) block_size = gpu_block
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
-  pure subroutine board(journey, catalogue, starts, lane, next, passenger, batch, structures, outcomes)
-    type(journey_t), intent(in) :: journey
+  pure subroutine load_slot(ensemble, catalogue, starts, lane, next, slot, batch, structures, outcomes)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: lane
     integer, intent(inout) :: next
-    type(passenger_t), intent(inout) :: passenger
+    type(slot_t), intent(inout) :: slot
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcomes(:)
     do while (next <= size(starts, 2))
-      passenger%start = next
-      passenger%unseen = .false.
+      slot%start = next
+      slot%unseen = .false.
       associate (start => starts(:, next), outcome => outcomes(next))
         next = next + 1
-        call begin_course(journey%moving, journey%span, start, passenger%course)
-        call go_on(journey, catalogue, start, passenger, outcome)
+        call begin_trajectory(ensemble%moving, ensemble%span, start, slot%trajectory)
+        call go_on(ensemble, catalogue, start, slot, outcome)
       end associate
-      if (passenger%course%phase /= phase_over) then
-        call put_into_lane(journey%moving, journey%flow, lane, passenger%course, .true., batch, structures)
-        call send_on(journey, catalogue, passenger%course, outcomes(passenger%start), lane, batch)
+      if (slot%trajectory%phase /= phase_over) then
+        call put_into_lane(ensemble%moving, ensemble%flow, lane, slot%trajectory, .true., batch, structures)
+        call send_on(ensemble, catalogue, slot%trajectory, outcomes(slot%start), lane, batch)
         return
       end if
     end do
-    passenger%start = 0
+    slot%start = 0
     batch%status(lane) = lane_idle
-  end subroutine board
+  end subroutine load_slot
 
-  !> Tells the lanes what they can be captured by: what moves, by a cycle.
+  !> Tells the lanes what they can be converged by: what moves, by a cycle.
   pure subroutine set_regions(moving, catalogue, lanes)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
-    type(fleet_t), intent(inout) :: lanes
+    type(lane_slots_t), intent(inout) :: lanes
     integer :: k, i
     do k = 1, size(catalogue)
       associate (a => catalogue(k))
@@ -316,108 +317,108 @@ contains
   end subroutine set_regions
 
   !> Tells a lane where to stop: at every section where a motion may have settled in a family of which lanes do not know.
-  pure subroutine send_on(journey, catalogue, course, outcome, lane, batch)
-    type(journey_t), intent(in) :: journey
+  pure subroutine send_on(ensemble, catalogue, trajectory, outcome, lane, batch)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
-    type(course_t), intent(in) :: course
+    type(trajectory_state_t), intent(in) :: trajectory
     type(outcome_t), intent(in) :: outcome
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
-    batch%until(lane) = course%until
-    batch%sections(lane) = sections_ahead(journey%moving, journey%span, course)
-    if (course%phase == phase_extension .and. any(catalogue%any_place)) batch%sections(lane) = 0
-    batch%budget(lane) = real(journey%moving%options%event_budget - course%tally%events, wp)
-    batch%leaves(lane) = merge(1, 0, ends_captured(journey%span, course))
-    batch%elapsed(lane) = course%elapsed
-    batch%captor(lane) = course%captured
+    batch%until(lane) = trajectory%until
+    batch%sections(lane) = sections_ahead(ensemble%moving, ensemble%span, trajectory)
+    if (trajectory%phase == phase_extension .and. any(catalogue%any_place)) batch%sections(lane) = 0
+    batch%budget(lane) = real(ensemble%moving%options%event_budget - trajectory%tally%events, wp)
+    batch%leaves(lane) = merge(1, 0, ends_converged(ensemble%span, trajectory))
+    batch%elapsed(lane) = trajectory%elapsed
+    batch%reached(lane) = trajectory%converged
     batch%settled(lane) = outcome%settle_time
   end subroutine send_on
 
   !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
-  pure subroutine attend(journey, catalogue, start, lane, passenger, batch, structures, outcome)
-    type(journey_t), intent(in) :: journey
+  pure subroutine service(ensemble, catalogue, start, lane, slot, batch, structures, outcome)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: start(:)
     integer, intent(in) :: lane
-    type(passenger_t), intent(inout) :: passenger
+    type(slot_t), intent(inout) :: slot
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped, left, taken
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
-    associate (course => passenger%course)
-      course%elapsed = batch%elapsed(lane)
-      course%captured = nint(batch%captor(lane))
+    associate (trajectory => slot%trajectory)
+      trajectory%elapsed = batch%elapsed(lane)
+      trajectory%converged = nint(batch%reached(lane))
       outcome%settle_time = batch%settled(lane)
-      call take_from_lane(journey%moving, lane, batch, structures, course%strobe_t, course%tally)
-      if (.not. (left .or. abs(course%state%x) <= journey%moving%options%domain)) course%reason = reason_left_domain
+      call take_from_lane(ensemble%moving, lane, batch, structures, trajectory%section_state_t, trajectory%tally)
+      if (.not. (left .or. abs(trajectory%state%x) <= ensemble%moving%options%domain)) trajectory%reason = reason_left_domain
       taken = .false.
-      if (left .and. course%reason == 0) then
-        if (journey%flow%resumes) call go_past_events(journey, course, taken)
-        if (course%reason == 0 .and. .not. taken) call go_to_stop(journey%moving, course, slipped)
+      if (left .and. trajectory%reason == 0) then
+        if (ensemble%flow%resumes) call go_past_events(ensemble, trajectory, taken)
+        if (trajectory%reason == 0 .and. .not. taken) call go_to_stop(ensemble%moving, trajectory, slipped)
       end if
-      if (.not. taken) call pass_stop(journey%moving, catalogue, journey%span, course%tally%slips > passenger%slips, &
-                                      course, outcome)
-      if (.not. taken) passenger%slips = course%tally%slips
-      if (.not. taken .and. (left .or. .not. flies(journey, course))) then
-        call go_on(journey, catalogue, start, passenger, outcome)
-        taken = course%phase /= phase_over
+      if (.not. taken) call pass_stop(ensemble%moving, catalogue, ensemble%span, trajectory%tally%slips > slot%slips, &
+                                      trajectory, outcome)
+      if (.not. taken) slot%slips = trajectory%tally%slips
+      if (.not. taken .and. (left .or. .not. flies(ensemble, trajectory))) then
+        call go_on(ensemble, catalogue, start, slot, outcome)
+        taken = trajectory%phase /= phase_over
         if (.not. taken) return
       end if
-      passenger%unseen = passenger%unseen .or. course%phase == phase_window
+      slot%unseen = slot%unseen .or. trajectory%phase == phase_window
       batch%status(lane) = lane_flying
-      if (taken) call put_into_lane(journey%moving, journey%flow, lane, course, .false., batch, structures)
-      call send_on(journey, catalogue, course, outcome, lane, batch)
+      if (taken) call put_into_lane(ensemble%moving, ensemble%flow, lane, trajectory, .false., batch, structures)
+      call send_on(ensemble, catalogue, trajectory, outcome, lane, batch)
     end associate
-  end subroutine attend
+  end subroutine service
 
   !> Goes past an event, a structure past several, to one after which a lane can take the trajectory, if that comes before the
   !> next stop.
-  pure subroutine go_past_events(journey, course, taken)
-    type(journey_t), intent(in) :: journey
-    type(course_t), intent(inout) :: course
+  pure subroutine go_past_events(ensemble, trajectory, taken)
+    type(ensemble_t), intent(in) :: ensemble
+    type(trajectory_state_t), intent(inout) :: trajectory
     logical, intent(out) :: taken
     taken = .false.
-    do while (.not. taken .and. course%state%time < course%until)
-      call go_past_event(journey%moving, journey%flow%slowest, course)
-      if (course%reason /= 0) return
-      taken = course%state%time < course%until .and. flies(journey, course)
-      if (.not. allocated(journey%flow%structure)) exit
+    do while (.not. taken .and. trajectory%state%time < trajectory%until)
+      call go_past_event(ensemble%moving, ensemble%flow%slowest, trajectory)
+      if (trajectory%reason /= 0) return
+      taken = trajectory%state%time < trajectory%until .and. flies(ensemble, trajectory)
+      if (.not. allocated(ensemble%flow%structure)) exit
     end do
   end subroutine go_past_events
 
   !> Goes on in the event loop until a lane can take the trajectory, or to its end.
-  pure subroutine go_on(journey, catalogue, start, passenger, outcome)
-    type(journey_t), intent(in) :: journey
+  pure subroutine go_on(ensemble, catalogue, start, slot, outcome)
+    type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: start(:)
-    type(passenger_t), intent(inout) :: passenger
+    type(slot_t), intent(inout) :: slot
     type(outcome_t), intent(inout) :: outcome
     logical :: slipped
-    associate (course => passenger%course)
-      do while (course%phase /= phase_over .and. .not. flies(journey, course))
-        call go_to_stop(journey%moving, course, slipped)
-        call pass_stop(journey%moving, catalogue, journey%span, slipped, course, outcome)
+    associate (trajectory => slot%trajectory)
+      do while (trajectory%phase /= phase_over .and. .not. flies(ensemble, trajectory))
+        call go_to_stop(ensemble%moving, trajectory, slipped)
+        call pass_stop(ensemble%moving, catalogue, ensemble%span, slipped, trajectory, outcome)
       end do
-      passenger%unseen = passenger%unseen .or. course%phase == phase_window
-      passenger%slips = course%tally%slips
-      if (course%phase /= phase_over) return
-      if (passenger%unseen .and. course%reason == 0 .and. course%captured == 0 .and. journey%describe == describe_all) then
-        ! It was captured when its window began, and lost: once more, in the event loop.
-        call run_trajectory(journey%moving, catalogue, journey%span, start(1), start(2), start(3), outcome, &
+      slot%unseen = slot%unseen .or. trajectory%phase == phase_window
+      slot%slips = trajectory%tally%slips
+      if (trajectory%phase /= phase_over) return
+      if (slot%unseen .and. trajectory%reason == 0 .and. trajectory%converged == 0 .and. ensemble%describe == describe_all) then
+        ! It was converged when its window began, and lost: once more, in the event loop.
+        call run_trajectory(ensemble%moving, catalogue, ensemble%span, start(1), start(2), start(3), outcome, &
                             others=start(4:))
       else
-        call conclude(journey%moving, catalogue, course, outcome)
+        call conclude(ensemble%moving, catalogue, trajectory, outcome)
       end if
     end associate
   end subroutine go_on
 
-  !> Whether a lane can take a course, and nobody needs the extremes of its window.
-  pure logical function flies(journey, course)
-    type(journey_t), intent(in) :: journey
-    type(course_t), intent(in) :: course
-    flies = flies_in_lane(journey%moving, journey%flow, course%strobe_t) .and. course%phase /= phase_over .and. &
-      (course%phase /= phase_window .or. course%captured > 0 .or. journey%describe == describe_regime)
+  !> Whether a lane can take a trajectory, and nobody needs the extremes of its window.
+  pure logical function flies(ensemble, trajectory)
+    type(ensemble_t), intent(in) :: ensemble
+    type(trajectory_state_t), intent(in) :: trajectory
+    flies = flies_in_lane(ensemble%moving, ensemble%flow, trajectory%section_state_t) .and. trajectory%phase /= phase_over .and. &
+      (trajectory%phase /= phase_window .or. trajectory%converged > 0 .or. ensemble%describe == describe_regime)
   end function flies
 
 end module trajectories

@@ -7,7 +7,7 @@
 !>             with the smallest restitution of those that touch each other: never a gain of energy;
 !>   sequence  one after the other, the fastest first, until none closes.
 module blow
-  use boxed_forces, only: solve_boxed
+  use bounded_lcp, only: solve_bounded_lcp
   use contact_law, only: restitution_at
   use multibody, only: joint_contact, multibody_t, most_joints, together_sequence
   use multibody_state, only: joint_motion, multibody_state_t, rounding_of_speed
@@ -15,9 +15,9 @@ module blow
   implicit none
   private
 
-  public :: strike, speeds_after
+  public :: apply_impact, speeds_after
 
-  !> A sequence of impacts ends as one without rebound when its speeds have fallen to this share of the first, or after
+  !> A sequence of impacts ends as one without rebound when its speeds have dropped to this share of the first, or after
   !> so many.
   real(wp), parameter :: spent = 1e-9_wp
   integer, parameter :: longest_sequence = 10000
@@ -27,7 +27,7 @@ contains
   !> Changes the speeds by an impact of the contacts with `side` +1, -1 (at their upper or lower stop), 0 not touching.
   !> `plastic` takes every restitution as zero. `speed_before` are the opening speeds of the contacts, `lost` the kinetic
   !> energy lost [J].
-  pure subroutine strike(machine, state, turning, side, plastic, speed_before, lost, ok)
+  pure subroutine apply_impact(machine, state, turning, side, plastic, speed_before, lost, ok)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
@@ -70,7 +70,7 @@ contains
     lost = -sum(kick*matmul(machine%mass, state%v(:n) + kick/2))
     state%v(:n) = state%v(:n) + kick
     call still(machine, turning, list(:count_touching), impulse(:count_touching), state)
-  end subroutine strike
+  end subroutine apply_impact
 
   !> Takes from the speeds what the rounding of the impulses has left of those of contacts in `list` that have none. Impulses that
   !> go through a row leave bodies at rest with no speed that would tell what rounding is.
@@ -101,7 +101,7 @@ contains
     if (.not. blurred) return
     none = huge(1.0_wp)
     side = 0
-    call solve_boxed(g, left, -none, none, moves, 0.0_wp, side, r, y, ok)
+    call solve_bounded_lcp(g, left, -none, none, moves, 0.0_wp, side, r, y, ok)
     state%v(:machine%n) = state%v(:machine%n) + matmul(kick, r)
   end subroutine still
 
@@ -147,7 +147,7 @@ contains
     none = huge(1.0_wp)
     fixed = .false.
     side = merge(0, -1, gamma < 0)
-    call solve_boxed(g, (1 + e)*gamma, zero, none, fixed, 8*epsilon(1.0_wp)*maxval(abs(gamma)), side, impulse, y, ok)
+    call solve_bounded_lcp(g, (1 + e)*gamma, zero, none, fixed, 8*epsilon(1.0_wp)*maxval(abs(gamma)), side, impulse, y, ok)
     impulse = max(impulse, 0.0_wp)
   end subroutine together
 

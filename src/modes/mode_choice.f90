@@ -4,13 +4,14 @@
 !> Which joints stick and which contacts stay closed: of all that may, at once, by the accelerations and forces at an instant.
 !> With a break-away level equal to that of sliding it is a convex problem, whose accelerations are unique (Gauss'
 !> principle). Where the level at rest is higher, all joints that it cannot hold go together, with the force of sliding.
-!> Ties are settled by the same problem for the next derivative, twice; what is still tied sticks, or stays closed, unless its guard
-!> has just fallen.
+!> Ties are settled by the same problem for the next derivative, twice; what is still degenerate sticks, or stays closed, unless
+!> its guard has just triggered.
 module mode_choice
   use multibody, only: joint_contact, multibody_t, most_joints
   use multibody_state, only: free_force, is_held, joint_force, joint_motion, multibody_state_t
   use kinds, only: wp
-  use mode_question, only: ask, drift_of, is_tied, keep_loaded, narrow, question_t, second_rate, set_mobility, settle_ties, &
+  use mode_lcp, only: add_constraint, drift_of, is_degenerate, keep_loaded, restrict_bounds, mode_lcp_t, second_rate, &
+    set_mobility, resolve_degeneracy, &
     sizes, solve
   implicit none
   private
@@ -19,7 +20,7 @@ module mode_choice
 
   !> Rounding of forces and accelerations, as a share of their sizes.
   real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
-  !> A force whose guard has fallen is at its limit if it is this near, as a share of its size.
+  !> A force with a triggered guard is at its limit if it is this near, as a share of its size.
   real(wp), parameter :: near_level = sqrt(epsilon(1.0_wp))
 
 contains
@@ -120,27 +121,27 @@ contains
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: a(:)
     real(wp), intent(out), optional :: jerk(:)
-    type(question_t) :: question
+    type(mode_lcp_t) :: lcp
     real(wp) :: force(machine%n), rate(machine%n)
     integer :: j
     call free_force(machine, state, turning, force)
     do j = 1, size(machine%joints)
-      if (is_held(machine%joints(j), state%phase(j))) call ask(question, j, -huge(1.0_wp), huge(1.0_wp))
+      if (is_held(machine%joints(j), state%phase(j))) call add_constraint(lcp, j, -huge(1.0_wp), huge(1.0_wp))
     end do
-    call set_mobility(machine, question)
-    call hold_against(machine, question, state, turning, 2, force)
+    call set_mobility(machine, lcp)
+    call hold_against(machine, lcp, state, turning, 2, force)
     a = matmul(machine%mobility, force)
     if (.not. present(jerk)) return
     call free_force(machine, state, turning, force, a, rate)
-    call hold_against(machine, question, state, turning, 3, rate)
+    call hold_against(machine, lcp, state, turning, 3, rate)
     jerk = matmul(machine%mobility, rate)
   end subroutine accelerations_of
 
   !> Adds to forces (or their rates) those of the constraints, so that derivative number `order` of their joint coordinates
   !> is zero.
-  pure subroutine hold_against(machine, question, state, turning, order, force)
+  pure subroutine hold_against(machine, lcp, state, turning, order, force)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(in) :: question
+    type(mode_lcp_t), intent(in) :: lcp
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
@@ -148,21 +149,21 @@ contains
     real(wp), dimension(most_joints) :: r, y, drift
     integer :: side(most_joints)
     logical :: ok
-    call drift_of(machine, question, state, turning, order, force, drift)
+    call drift_of(machine, lcp, state, turning, order, force, drift)
     side = 0
-    call solve(question, drift, 0.0_wp, side, r, y, ok)
-    call add_forces(machine, question, r, force)
+    call solve(lcp, drift, 0.0_wp, side, r, y, ok)
+    call add_forces(machine, lcp, r, force)
   end subroutine hold_against
 
-  !> Adds the forces `r` of the joints in question [N], or their rates, to those on the coordinates.
-  pure subroutine add_forces(machine, question, r, force)
+  !> Adds the forces `r` of the joints in lcp [N], or their rates, to those on the coordinates.
+  pure subroutine add_forces(machine, lcp, r, force)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(in) :: question
+    type(mode_lcp_t), intent(in) :: lcp
     real(wp), intent(in) :: r(:)
     real(wp), intent(inout) :: force(:)
     integer :: i
-    do i = 1, question%count
-      force = force + r(i)*machine%joints(question%joint(i))%row
+    do i = 1, lcp%count
+      force = force + r(i)*machine%joints(lcp%joint(i))%row
     end do
   end subroutine add_forces
 
@@ -176,63 +177,63 @@ contains
     integer, intent(in) :: touching(:), before(:)
     integer, intent(out) :: verdict(:)
     logical, intent(out) :: ok
-    type(question_t) :: question
+    type(mode_lcp_t) :: lcp
     type(multibody_state_t) :: trial
     real(wp), dimension(machine%n) :: force, rate, a, jerk, next
     real(wp), dimension(most_joints) :: r, y, drift, size_of_y, blur
     integer :: side(most_joints)
     verdict = 0
     trial = state
-    call ask_all(machine, at_rest, touching, before, question, trial%phase, side)
+    call ask_all(machine, at_rest, touching, before, lcp, trial%phase, side)
     ok = .true.
-    if (question%count == 0) return
-    call set_mobility(machine, question)
+    if (lcp%count == 0) return
+    call set_mobility(machine, lcp)
     call free_force(machine, trial, turning, force)
-    associate (n => question%count)
-      call drift_of(machine, question, trial, turning, 2, force, drift)
-      size_of_y = sizes(machine, question, trial, turning, 2, force)
-      call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
+    associate (n => lcp%count)
+      call drift_of(machine, lcp, trial, turning, 2, force, drift)
+      size_of_y = sizes(machine, lcp, trial, turning, 2, force)
+      call solve(lcp, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
       blur = rounding*size_of_y
-      where (near(question%joint(:n))) blur(:n) = near_level*size_of_y(:n)
-      call keep_loaded(question, y, side, blur)
-      call classify(machine, question, side, verdict)
-      if (.not. is_tied(question, r, y, side, blur)) return
-      ! The next derivative decides among those that are tied.
+      where (near(lcp%joint(:n))) blur(:n) = near_level*size_of_y(:n)
+      call keep_loaded(lcp, y, side, blur)
+      call classify(machine, lcp, side, verdict)
+      if (.not. is_degenerate(lcp, r, y, side, blur)) return
+      ! The next derivative decides among those that are degenerate.
       next = force
-      call add_forces(machine, question, r, next)
+      call add_forces(machine, lcp, r, next)
       a = matmul(machine%mobility, next)
       call free_force(machine, trial, turning, force, a, rate)
-      call narrow(question, r, y, side, blur)
-      call drift_of(machine, question, trial, turning, 3, rate, drift)
-      size_of_y = sizes(machine, question, trial, turning, 3, abs(force)*machine%frequency + abs(rate))
-      call solve(question, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
+      call restrict_bounds(lcp, r, y, side, blur)
+      call drift_of(machine, lcp, trial, turning, 3, rate, drift)
+      size_of_y = sizes(machine, lcp, trial, turning, 3, abs(force)*machine%frequency + abs(rate))
+      call solve(lcp, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
-      call keep_loaded(question, y, side, 64*rounding*size_of_y)
-      call classify(machine, question, side, verdict)
-      if (.not. is_tied(question, r, y, side, 64*rounding*size_of_y)) return
+      call keep_loaded(lcp, y, side, 64*rounding*size_of_y)
+      call classify(machine, lcp, side, verdict)
+      if (.not. is_degenerate(lcp, r, y, side, 64*rounding*size_of_y)) return
       next = rate
-      call add_forces(machine, question, r, next)
+      call add_forces(machine, lcp, r, next)
       jerk = matmul(machine%mobility, next)
       call second_rate(machine, trial, turning, a, jerk, rate)
-      call narrow(question, r, y, side, 64*rounding*size_of_y)
-      call drift_of(machine, question, trial, turning, 4, rate, drift)
-      size_of_y = sizes(machine, question, trial, turning, 4, abs(force)*machine%frequency**2 + abs(rate))
-      call solve(question, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
+      call restrict_bounds(lcp, r, y, side, 64*rounding*size_of_y)
+      call drift_of(machine, lcp, trial, turning, 4, rate, drift)
+      size_of_y = sizes(machine, lcp, trial, turning, 4, abs(force)*machine%frequency**2 + abs(rate))
+      call solve(lcp, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
       if (.not. ok) return
-      call keep_loaded(question, y, side, 4096*rounding*size_of_y)
-      call settle_ties(machine, question, r, y, near, 4096*rounding*size_of_y, side)
-      call classify(machine, question, side, verdict)
+      call keep_loaded(lcp, y, side, 4096*rounding*size_of_y)
+      call resolve_degeneracy(machine, lcp, r, y, near, 4096*rounding*size_of_y, side)
+      call classify(machine, lcp, side, verdict)
     end associate
   end subroutine answer
 
   !> Asks for the forces of all joints at rest and of all contacts that touch, which are held in `phase`; `side` is where the
   !> search for the answer begins: friction that slid before is first tried at the limit that it came from.
-  pure subroutine ask_all(machine, at_rest, touching, before, question, phase, side)
+  pure subroutine ask_all(machine, at_rest, touching, before, lcp, phase, side)
     type(multibody_t), intent(in) :: machine
     logical, intent(in) :: at_rest(:)
     integer, intent(in) :: touching(:), before(:)
-    type(question_t), intent(inout) :: question
+    type(mode_lcp_t), intent(inout) :: lcp
     integer, intent(inout) :: phase(:)
     integer, intent(out) :: side(:)
     integer :: j
@@ -240,14 +241,14 @@ contains
     do j = 1, size(machine%joints)
       if (at_rest(j)) then
         associate (level => machine%joints(j)%friction%break_away)
-          call ask(question, j, -level, level)
+          call add_constraint(lcp, j, -level, level)
         end associate
         phase(j) = 0
-        side(question%count) = -before(j)
+        side(lcp%count) = -before(j)
       else if (touching(j) /= 0) then
         ! Stops without room hold either way.
         associate (clamps => .not. machine%joints(j)%upper > machine%joints(j)%lower)
-          call ask(question, j, merge(-huge(1.0_wp), 0.0_wp, touching(j) > 0 .or. clamps), &
+          call add_constraint(lcp, j, merge(-huge(1.0_wp), 0.0_wp, touching(j) > 0 .or. clamps), &
                    merge(huge(1.0_wp), 0.0_wp, touching(j) < 0 .or. clamps))
         end associate
         phase(j) = touching(j)
@@ -255,17 +256,17 @@ contains
     end do
   end subroutine ask_all
 
-  pure subroutine classify(machine, question, side, verdict)
+  pure subroutine classify(machine, lcp, side, verdict)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(in) :: question
+    type(mode_lcp_t), intent(in) :: lcp
     integer, intent(in) :: side(:)
     integer, intent(inout) :: verdict(:)
     integer :: i
-    do i = 1, question%count
-      if (machine%joints(question%joint(i))%kind == joint_contact) then
-        verdict(question%joint(i)) = merge(0, 1, side(i) == 0)
+    do i = 1, lcp%count
+      if (machine%joints(lcp%joint(i))%kind == joint_contact) then
+        verdict(lcp%joint(i)) = merge(0, 1, side(i) == 0)
       else
-        verdict(question%joint(i)) = -side(i)
+        verdict(lcp%joint(i)) = -side(i)
       end if
     end do
   end subroutine classify
@@ -277,40 +278,40 @@ contains
     type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     logical, intent(in), optional :: speeds
-    type(question_t) :: question
+    type(mode_lcp_t) :: lcp
     real(wp), dimension(most_joints) :: miss, gap, r, y
     real(wp) :: s, u
     integer :: side(most_joints), i, j
     logical :: ok
     do j = 1, size(machine%joints)
-      if (is_held(machine%joints(j), state%phase(j))) call ask(question, j, -huge(1.0_wp), huge(1.0_wp))
+      if (is_held(machine%joints(j), state%phase(j))) call add_constraint(lcp, j, -huge(1.0_wp), huge(1.0_wp))
     end do
-    if (question%count == 0) return
-    call set_mobility(machine, question)
+    if (lcp%count == 0) return
+    call set_mobility(machine, lcp)
     gap = 0
-    do i = 1, question%count
-      j = question%joint(i)
+    do i = 1, lcp%count
+      j = lcp%joint(i)
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       miss(i) = u
       if (machine%joints(j)%kind /= joint_contact) cycle
       gap(i) = s - merge(machine%joints(j)%upper, machine%joints(j)%lower, state%phase(j) > 0)
     end do
-    associate (n => question%count)
+    associate (n => lcp%count)
       side = 0
       if (present(speeds)) miss = merge(miss, 0.0_wp, speeds)
-      call solve(question, miss, 0.0_wp, side, r, y, ok)
+      call solve(lcp, miss, 0.0_wp, side, r, y, ok)
       do i = 1, n
-        state%v(:machine%n) = state%v(:machine%n) + r(i)*matmul(machine%mobility, machine%joints(question%joint(i))%row)
+        state%v(:machine%n) = state%v(:machine%n) + r(i)*matmul(machine%mobility, machine%joints(lcp%joint(i))%row)
       end do
       if (.not. any(abs(gap(:n)) > 0)) return
       do i = 1, n
-        if (machine%joints(question%joint(i))%kind == joint_contact) cycle
-        question%fixed(i) = .true.
+        if (machine%joints(lcp%joint(i))%kind == joint_contact) cycle
+        lcp%fixed(i) = .true.
       end do
       side = 0
-      call solve(question, gap, 0.0_wp, side, r, y, ok)
+      call solve(lcp, gap, 0.0_wp, side, r, y, ok)
       do i = 1, n
-        state%q(:machine%n) = state%q(:machine%n) + r(i)*matmul(machine%mobility, machine%joints(question%joint(i))%row)
+        state%q(:machine%n) = state%q(:machine%n) + r(i)*matmul(machine%mobility, machine%joints(lcp%joint(i))%row)
       end do
     end associate
   end subroutine project

@@ -23,9 +23,9 @@ module multibody_flight
 
 contains
 
-  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `fallen` those that fell together at
+  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `triggered` those that fell together at
   !> the end, none if the time is over. `steps` counts, and bounds, the work; `reason` says why a flight was given up, 0.
-  pure subroutine fly(machine, flow, options, state, until, list, count_guards, fallen, watch, steps, reason, log)
+  pure subroutine fly(machine, flow, options, state, until, list, count_guards, triggered, watch, steps, reason, log)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(options_t), intent(in) :: options
@@ -33,7 +33,7 @@ contains
     real(wp), intent(in) :: until
     type(joint_guard_t), intent(inout) :: list(most_guards)
     integer, intent(out) :: count_guards, reason
-    logical, intent(out) :: fallen(most_guards)
+    logical, intent(out) :: triggered(most_guards)
     type(watch_t), intent(inout) :: watch
     integer(int64), intent(inout) :: steps
     type(log_t), intent(inout), optional :: log
@@ -46,12 +46,12 @@ contains
       start = state
       ! Stretches of a series, of which a stiff structure has many.
       if (.not. flow%modal .and. flow%rate*(until - state%time) > options%step_budget) then
-        fallen = .false.
+        triggered = .false.
         count_guards = 0
         reason = reason_step_budget
         return
       end if
-      call fly_linear(machine, flow, state, until, list, count_guards, fallen, path, watch)
+      call fly_linear(machine, flow, state, until, list, count_guards, triggered, path, watch)
       if (present(log)) call log_flight(machine, flow, path, start, state%time - start%time, log)
       steps = steps + watch%evaluations
       watch%evaluations = 0
@@ -65,7 +65,7 @@ contains
       count_guards = flight%count_guards
       do
         start = state
-        call step_flight(machine, flight, state, until, path, fallen, ended, failed, watch)
+        call step_flight(machine, flight, state, until, path, triggered, ended, failed, watch)
         if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
         steps = steps + 1
         if (failed) reason = reason_step_failed

@@ -17,7 +17,7 @@ module multibody_log
   use two_bodies, only: contact_at, driver_now, mode_of_two
   implicit none
   private
-  public :: energy_of_multibody, watched_state, log_flight, log_event, log_sample, record_change, book_change
+  public :: energy_of_multibody, watched_state, log_flight, log_event, log_sample, record_change, balance_change
 
   !> Gauss-Legendre nodes on (0, 1) and weights.
   real(wp), parameter :: node(4) = [0.069431844202973712388026755553595_wp, 0.33000947820757186759866712044838_wp, &
@@ -100,13 +100,13 @@ contains
     do while (log%sample_interval > 0)
       if (.not. sample_due(log, path%start + duration)) exit
       next = max(before, sample_time(log) - path%start)
-      call book_flight(machine, flow, path, start, before, next, log)
+      call balance_flight(machine, flow, path, start, before, next, log)
       call path_at(machine, flow, path, next, state%q, state%v)
       state%time = path%start + next
       call log_sample(machine, state, log)
       before = next
     end do
-    call book_flight(machine, flow, path, start, before, duration, log)
+    call balance_flight(machine, flow, path, start, before, duration, log)
   end subroutine log_flight
 
   !> Largest force and penetration of a soft stop along a flight.
@@ -179,17 +179,17 @@ contains
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
     type(log_t), intent(inout) :: log
-    log%book%at_end = energy_of_multibody(machine, state)
+    log%balance%at_end = energy_of_multibody(machine, state)
     if (allocated(machine%driver)) then
-      call record_sample(log, watched_state(machine, state), driver_now(machine, state), log%book)
+      call record_sample(log, watched_state(machine, state), driver_now(machine, state), log%balance)
     else
-      call record_sample(log, watched_state(machine, state), book=log%book)
+      call record_sample(log, watched_state(machine, state), balance=log%balance)
     end if
     call put_column(log%sample_coordinates, log%samples, [state%q(:machine%n), state%v(:machine%n)])
   end subroutine log_sample
 
   !> Adds up the powers from `first` to `last` [s after the start of the path], by panels for what is still fast there.
-  pure subroutine book_flight(machine, flow, path, start, first, last, log)
+  pure subroutine balance_flight(machine, flow, path, start, first, last, log)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
@@ -210,16 +210,16 @@ contains
           call path_at(machine, flow, path, t, state%q, state%v)
           state%time = path%start + t
           call powers(machine, flow, state, friction, damping, contact, work)
-          log%book%friction = log%book%friction + weight(k)*length*friction
-          log%book%damping = log%book%damping + weight(k)*length*damping
-          log%book%contact = log%book%contact + weight(k)*length*contact
+          log%balance%friction = log%balance%friction + weight(k)*length*friction
+          log%balance%damping = log%balance%damping + weight(k)*length*damping
+          log%balance%contact = log%balance%contact + weight(k)*length*contact
           log%contact_work = log%contact_work + weight(k)*length*contact
-          log%book%work = log%book%work + weight(k)*length*work
+          log%balance%work = log%balance%work + weight(k)*length*work
         end do
       end do
       from = until
     end do
-  end subroutine book_flight
+  end subroutine balance_flight
 
   !> An interval from `first` [s after the start of the path] to `last` at most, `until` the fastest part has decayed; its panels.
   pure subroutine next_stretch(machine, flow, path, first, last, until, panels)
@@ -318,7 +318,7 @@ contains
   end function damping_of_contact
 
   !> What a transition took from the energy: of contacts, but for sliders that let go. A stop that moves does work.
-  pure subroutine book_change(machine, before, after, log)
+  pure subroutine balance_change(machine, before, after, log)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
@@ -326,13 +326,13 @@ contains
     lost = energy_of_multibody(machine, before) - energy_of_multibody(machine, after)
     if (any(machine%joints%kind == joint_elastic .and. before%phase(:size(machine%joints)) /= after%phase(:size(machine%joints)))) &
       then
-      log%book%friction = log%book%friction + lost
+      log%balance%friction = log%balance%friction + lost
     else
       work = work_of_stops(machine, before, after)
-      log%book%contact = log%book%contact + lost + work
-      log%book%work = log%book%work + work
+      log%balance%contact = log%balance%contact + lost + work
+      log%balance%work = log%balance%work + work
     end if
-  end subroutine book_change
+  end subroutine balance_change
 
   !> Work that stops which move have done in an impact [J]: the impulses of all contacts at their stops give the change of the
   !> speeds.

@@ -15,7 +15,7 @@ module multibody_motion
   use linear_flight, only: watch_t
   use mode_flow, only: build_flow, mode_flow_t
   use motion_state, only: append_word, log_t, tally_t, word_period
-  use stall_watch, only: goes_round, note_flight, note_hold, stall_watch_t
+  use progress_watch, only: goes_round, note_flight, note_hold, progress_watch_t
   use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
     reason_step_failed, reason_time_over
   use timed_actions, only: act, acts_on_time, next_action
@@ -85,7 +85,7 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
   !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains,
-  !> and goes on with a burst; what stalls is counted from the call.
+  !> and goes on with a burst; what idle_steps is counted from the call.
   pure subroutine advance_multibody(moving, state, time_end, tally, reason, log, transitions, one_event)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state
@@ -100,9 +100,9 @@ contains
     type(joint_guard_t) :: list(most_guards)
     type(watch_t) :: watch
     real(wp) :: before, until, from
-    type(stall_watch_t) :: stalls
+    type(progress_watch_t) :: idle_steps
     integer :: key
-    logical :: fallen(most_guards), turned, counts_on, timed, slips, held
+    logical :: triggered(most_guards), turned, counts_on, timed, slips, held
     reason = 0
     counts_on = .false.
     if (present(one_event)) counts_on = one_event
@@ -119,7 +119,7 @@ contains
       do while (state%time < time_end .and. .not. state%at_section)
         tally%events = tally%events + 1
         if (tally%events > moving%options%event_budget) reason = reason_event_budget
-        if (goes_round(stalls)) reason = reason_mode_cycle
+        if (goes_round(idle_steps)) reason = reason_mode_cycle
         if (reason /= 0) exit
         before = state%time
         until = time_end
@@ -133,22 +133,22 @@ contains
         end if
         key = key_of(machine, state%phase)
         slips = moves(moving, state, key)
-        call fly_in_mode(moving, key, spare, state, until, list, fallen, watch, tally%steps, reason, log)
+        call fly_in_mode(moving, key, spare, state, until, list, triggered, watch, tally%steps, reason, log)
         if (reason /= 0) exit
         if (slips .and. state%time > before) tally%slips = tally%slips + 1
         if (state%time > before) state%left = 0
-        call note_flight(stalls, machine, before, state, held)
+        call note_flight(idle_steps, machine, before, state, held)
         if (.not. state%time - before < burst_gap*machine%period) state%burst = 0
-        turned = any(fallen .and. list%meaning == turns_round)
-        fallen = fallen .and. list%meaning /= turns_round
-        if (any(fallen)) then
-          call change_mode(moving, state, list, fallen, held, tally, reason, log, transitions)
-          if (held) call note_hold(stalls, machine, state%time)
+        turned = any(triggered .and. list%meaning == turns_round)
+        triggered = triggered .and. list%meaning /= turns_round
+        if (any(triggered)) then
+          call change_mode(moving, state, list, triggered, held, tally, reason, log, transitions)
+          if (held) call note_hold(idle_steps, machine, state%time)
         end if
         if (present(transitions)) start = state
         if (moving%section > 0) call follow_section(moving, turned, state)
         if (state%at_section .and. present(transitions)) call note_transition(transitions, transition_t(start, state, &
-                                                                       moving%section, turns_round, .not. any(fallen)))
+                                                                       moving%section, turns_round, .not. any(triggered)))
         call check_limits(moving, state, watch, tally, reason)
         if (.not. present(one_event) .or. reason /= 0) cycle
         if (one_event .and. state%time - before > shortest_pause*burst_gap*machine%period) exit
@@ -161,14 +161,14 @@ contains
   end subroutine advance_multibody
 
   !> One flight in the mode `key`, by the flow that is ready for it or else by `spare`, which is made for it.
-  pure subroutine fly_in_mode(moving, key, spare, state, until, list, fallen, watch, steps, reason, log)
+  pure subroutine fly_in_mode(moving, key, spare, state, until, list, triggered, watch, steps, reason, log)
     type(multibody_motion_t), intent(in) :: moving
     integer, intent(in) :: key
     type(mode_flow_t), intent(inout) :: spare
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(joint_guard_t), intent(inout) :: list(most_guards)
-    logical, intent(out) :: fallen(most_guards)
+    logical, intent(out) :: triggered(most_guards)
     type(watch_t), intent(inout) :: watch
     integer(int64), intent(inout) :: steps
     integer, intent(out) :: reason
@@ -177,10 +177,10 @@ contains
     at = ready(moving, key)
     associate (machine => moving%machine, options => moving%options)
       if (at > 0) then
-        call fly(machine, moving%flows(at), options, state, until, list, count_guards, fallen, watch, steps, reason, log)
+        call fly(machine, moving%flows(at), options, state, until, list, count_guards, triggered, watch, steps, reason, log)
       else
         if (spare%key /= key) call build_flow(machine, key, with_matrix(moving), spare)
-        call fly(machine, spare, options, state, until, list, count_guards, fallen, watch, steps, reason, log)
+        call fly(machine, spare, options, state, until, list, count_guards, triggered, watch, steps, reason, log)
       end if
     end associate
   end subroutine fly_in_mode
@@ -199,12 +199,12 @@ contains
     if (present(log) .and. ok) call log_action(moving, start, state, log)
   end subroutine act_and_log
 
-  !> The transition at guards that have `fallen`; phases are `held` for an instant where the motion has stalled.
-  pure subroutine change_mode(moving, state, list, fallen, held, tally, reason, log, transitions)
+  !> The transition at guards that have `triggered`; phases are `held` for an instant where the motion has without_progress.
+  pure subroutine change_mode(moving, state, list, triggered, held, tally, reason, log, transitions)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state
     type(joint_guard_t), intent(in) :: list(:)
-    logical, intent(in) :: fallen(:), held
+    logical, intent(in) :: triggered(:), held
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
@@ -212,10 +212,10 @@ contains
     type(multibody_state_t) :: start
     logical :: ok
     start = state
-    call transition(moving, state, list, fallen, held, tally, ok)
+    call transition(moving, state, list, triggered, held, tally, ok)
     if (.not. ok) reason = reason_step_failed
-    if (present(log) .and. ok) call log_transition(moving, start, state, list, fallen, log)
-    if (present(transitions)) call keep(start, state, list, fallen, held, transitions)
+    if (present(log) .and. ok) call log_transition(moving, start, state, list, triggered, log)
+    if (present(transitions)) call keep(start, state, list, triggered, held, transitions)
   end subroutine change_mode
 
   !> Budgets and the domain. Numbers that end in a flight on which what is watched was outside ended there.
@@ -233,15 +233,15 @@ contains
   end subroutine check_limits
 
   !> Notes a transition; what was `held` for an instant, or several at once, is not certain.
-  pure subroutine keep(before, after, list, fallen, held, transitions)
+  pure subroutine keep(before, after, list, triggered, held, transitions)
     type(multibody_state_t), intent(in) :: before, after
     type(joint_guard_t), intent(in) :: list(:)
-    logical, intent(in) :: fallen(:), held
+    logical, intent(in) :: triggered(:), held
     type(transitions_t), intent(inout) :: transitions
     integer :: g
-    g = findloc(fallen, .true., 1)
+    g = findloc(triggered, .true., 1)
     call note_transition(transitions, transition_t(before, after, list(g)%joint, list(g)%meaning, &
-                                                   count(fallen) == 1 .and. .not. held))
+                                                   count(triggered) == 1 .and. .not. held))
   end subroutine keep
 
   !> The watched coordinate has `turned` round, or an impact may have turned it: the section is behind it then, not reached.

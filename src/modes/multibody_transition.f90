@@ -3,7 +3,7 @@
 
 !> What follows a triggered guard of a multibody structure: impacts, sticking and sliding, the completion of chatter.
 module multibody_transition
-  use blow, only: strike
+  use blow, only: apply_impact
   use chatter, only: look_ahead
   use guards, only: force_ends, force_returns, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, &
     slides_down, slides_up
@@ -13,7 +13,7 @@ module multibody_transition
   use kinds, only: int64, wp
   use mode_choice, only: accelerations_of, choose_mode, project
   use motion_state, only: append_word, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_stick, word_upper
-  use touching_contacts, only: add_near, add_tied, close_gaps
+  use touching_contacts, only: add_near, add_degenerate, close_gaps
   use two_bodies, only: slides_on
   implicit none
   private
@@ -56,12 +56,12 @@ contains
     end associate
   end subroutine settle
 
-  !> What the guards that have fallen bring about. `stalled`: what cannot be decided is held for an instant.
-  pure subroutine transition(moving, state, list, fallen, stalled, tally, ok)
+  !> What triggered guards bring about. `without_progress`: what cannot be decided is held for an instant.
+  pure subroutine transition(moving, state, list, triggered, without_progress, tally, ok)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state
     type(joint_guard_t), intent(in) :: list(:)
-    logical, intent(in) :: fallen(:), stalled
+    logical, intent(in) :: triggered(:), without_progress
     type(tally_t), intent(inout) :: tally
     logical, intent(out) :: ok
     complex(wp) :: turning(moving%harmonics)
@@ -78,28 +78,28 @@ contains
       at_rest = .false.
       touching = 0
       hit = 0
-      call change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
+      call change_phases(machine, turning, list, triggered, state, tally, at_rest, touching, hit)
       do j = 1, size(machine%joints)
         if (machine%joints(j)%kind == joint_contact .and. state%phase(j) /= 0) touching(j) = state%phase(j)
       end do
       ok = .true.
       if (any(hit /= 0)) then
         call judge_burst(machine, hit, turning, state, plastic)
-        call add_tied(machine, state, turning, hit, touching)
+        call add_degenerate(machine, state, turning, hit, touching)
         if (plastic) call add_near(machine, state, turning, touching)
-        call strike(machine, state, turning, touching, plastic, speed, lost, ok)
+        call apply_impact(machine, state, turning, touching, plastic, speed, lost, ok)
         do j = 1, size(machine%joints)
           if (hit(j) /= 0) call count_impact(tally, hit(j), abs(speed(j)))
         end do
       end if
       call judge_friction(machine, start, turning, any(hit /= 0), state, at_rest)
-      if (stalled) then
+      if (without_progress) then
         call hold(moving, state, turning, at_rest, touching)
         return
       end if
       ! Impacts change the forces.
       do j = 1, size(list)
-        if (.not. fallen(j) .or. any(hit /= 0)) cycle
+        if (.not. triggered(j) .or. any(hit /= 0)) cycle
         if (any(list(j)%meaning == [slides_up, slides_down, lets_go])) at_level(list(j)%joint) = .true.
       end do
       if (ok) call settle(moving, state, turning, at_rest, touching, ok, at_level)
@@ -151,12 +151,12 @@ contains
     end do
   end subroutine count_sticks
 
-  !> What each fallen guard says of its own joint: its phase, or that it is at rest, touches, is hit.
-  pure subroutine change_phases(machine, turning, list, fallen, state, tally, at_rest, touching, hit)
+  !> What each triggered guard says of its own joint: its phase, or that it is at rest, touches, is hit.
+  pure subroutine change_phases(machine, turning, list, triggered, state, tally, at_rest, touching, hit)
     type(multibody_t), intent(in) :: machine
     complex(wp), intent(in) :: turning(:)
     type(joint_guard_t), intent(in) :: list(:)
-    logical, intent(in) :: fallen(:)
+    logical, intent(in) :: triggered(:)
     type(multibody_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     logical, intent(inout) :: at_rest(:)
@@ -164,7 +164,7 @@ contains
     real(wp) :: s, u
     integer :: g, j
     do g = 1, size(list)
-      if (.not. fallen(g)) cycle
+      if (.not. triggered(g)) cycle
       j = list(g)%joint
       select case (list(g)%meaning)
       case (slide_ends)
@@ -283,7 +283,7 @@ contains
       call look_ahead(moving, state, turning, j, hit(j), at_rest, along, ok)
       if (.not. ok) return
       closed = before
-      call strike(machine, closed, turning, touching, .true., speed, lost, ok)
+      call apply_impact(machine, closed, turning, touching, .true., speed, lost, ok)
       if (.not. ok) return
       do i = 1, size(machine%joints)
         if (machine%joints(i)%kind == joint_friction) closed%phase(i) = merge(0, state%phase(i), along(i))

@@ -18,7 +18,7 @@ module section_directions
 contains
 
   !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. Where
-  !> fewer count between the stops, those that count only for the stops come first. What is tied to what tells them, not how
+  !> fewer count between the stops, those that count only for the stops come first. What is degenerate to what tells them, not how
   !> strongly: machines of one build have the same.
   pure subroutine directions_of(machine, directions, count_directions)
     type(multibody_t), intent(in) :: machine

@@ -3,11 +3,11 @@
 
 !> What happens to a multibody structure at times of its own: the samples of a controller, impulses on bodies.
 module timed_actions
-  use blow, only: strike
+  use blow, only: apply_impact
   use control, only: error_of
   use multibody, only: joint_contact, joint_friction, joint_section, multibody_t, most_joints
   use multibody_flows, only: multibody_motion_t
-  use multibody_log, only: book_change, energy_of_multibody, record_change
+  use multibody_log, only: balance_change, energy_of_multibody, record_change
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use multibody_transition, only: judge_friction, settle
   use kinds, only: wp
@@ -121,13 +121,13 @@ contains
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
         strikes = strikes .or. touching(j)*u > machine%negligible_speed
       end do
-      if (strikes) call strike(machine, state, turning, touching, .false., speed, lost, ok)
+      if (strikes) call apply_impact(machine, state, turning, touching, .false., speed, lost, ok)
       at_rest = .false.
       call judge_friction(machine, before, turning, .true., state, at_rest)
       if (ok) call settle(moving, state, turning, at_rest, touching, ok)
       if (.not. present(log) .or. .not. ok) return
-      log%book%work = log%book%work + energy_of_multibody(machine, pushed) - energy_of_multibody(machine, before)
-      call book_change(machine, pushed, state, log)
+      log%balance%work = log%balance%work + energy_of_multibody(machine, pushed) - energy_of_multibody(machine, before)
+      call balance_change(machine, pushed, state, log)
       call record_change(machine, event_blow, before, state, log)
       ! In the place of a joint stands the number after the last.
       call put_column(log%event_joint, log%events, &

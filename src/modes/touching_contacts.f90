@@ -10,7 +10,7 @@ module touching_contacts
   implicit none
   private
 
-  public :: add_tied, add_near, close_gaps
+  public :: add_degenerate, add_near, close_gaps
 
   !> Impacts farther apart than this share of a period are not at once.
   real(wp), parameter :: longest_tie = 1e-11_wp
@@ -20,7 +20,7 @@ contains
   !> Contacts that close, or have opened, within the rounding of places and of the clock take part in an impact: they touch. The
   !> rounding of places on their way through zero is that of their swing, and a slow impact, of those that are `hit`, has no sharper
   !> time.
-  pure subroutine add_tied(machine, state, turning, hit, touching)
+  pure subroutine add_degenerate(machine, state, turning, hit, touching)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
@@ -52,7 +52,7 @@ contains
     where (touching /= 0) state%phase = touching
     call project(machine, state, turning, speeds=.false.)
     state%phase = phase
-  end subroutine add_tied
+  end subroutine add_degenerate
 
   !> Contacts that are all but closed take part in the end of a chatter of several.
   pure subroutine add_near(machine, state, turning, touching)

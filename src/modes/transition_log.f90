@@ -7,7 +7,7 @@ module transition_log
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
   use multibody, only: joint_contact, joint_friction, joint_soft, multibody_t
   use multibody_flows, only: multibody_motion_t
-  use multibody_log, only: book_change, log_event
+  use multibody_log, only: balance_change, log_event
   use multibody_state, only: multibody_state_t, turning_at
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
@@ -23,11 +23,11 @@ module transition_log
 contains
 
   !> Events and losses of a transition. Friction sticks or is released as it stops to move or begins to, whatever its force.
-  pure subroutine log_transition(moving, before, after, list, fallen, log)
+  pure subroutine log_transition(moving, before, after, list, triggered, log)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(in) :: before, after
     type(joint_guard_t), intent(in) :: list(:)
-    logical, intent(in) :: fallen(:)
+    logical, intent(in) :: triggered(:)
     type(log_t), intent(inout) :: log
     type(multibody_state_t) :: struck
     complex(wp) :: turning(moving%harmonics)
@@ -37,13 +37,13 @@ contains
     associate (machine => moving%machine)
       struck = after
       struck%time = before%time
-      call book_change(machine, before, struck, log)
+      call balance_change(machine, before, struck, log)
       turning = turning_at(machine%frequency, before%time, moving%harmonics)
       stood = stand_still(machine, before, turning)
       stands = stand_still(machine, struck, turning)
       told = .false.
       do g = 1, size(list)
-        if (.not. fallen(g)) cycle
+        if (.not. triggered(g)) cycle
         j = list(g)%joint
         select case (list(g)%meaning)
         case (slide_ends)

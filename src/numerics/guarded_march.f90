@@ -8,7 +8,7 @@
 module guarded_march
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use kinds, only: wp
-  use polynomial, only: degree, first_fall, interpolate, value_at
+  use polynomial, only: degree, first_zero, interpolate, value_at
   implicit none
   private
 
@@ -64,16 +64,16 @@ contains
     call set_out(size(y), march, system, tolerance, scale, longest, time, y)
   end subroutine begin_march
 
-  !> One step, to `time_end` [s] at most. `fallen` is the guard that fell first, and the state then is that at its fall;
+  !> One step, to `time_end` [s] at most. `triggered` is the guard that fell first, and the state then is that at its fall;
   !> or one of `march_goes_on`, `march_time_over`, `march_failed`.
-  pure subroutine take_step(march, system, guards, time_end, fallen)
+  pure subroutine take_step(march, system, guards, time_end, triggered)
     type(march_t), intent(inout) :: march
     class(system_t), intent(in) :: system
     type(guard_t), intent(in) :: guards(:)
     real(wp), intent(in) :: time_end
-    integer, intent(out) :: fallen
-    call step_on(march%n, march, system, guards, time_end, fallen)
-    if (fallen > 0) march%slopes(:march%n, 1) = system%slope(march%time, march%y(:march%n))
+    integer, intent(out) :: triggered
+    call step_on(march%n, march, system, guards, time_end, triggered)
+    if (triggered > 0) march%slopes(:march%n, 1) = system%slope(march%time, march%y(:march%n))
   end subroutine take_step
 
   pure subroutine find_slope(system, context, n, time, y, slope)

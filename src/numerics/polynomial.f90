@@ -9,7 +9,7 @@ module polynomial
   implicit none
   private
 
-  public :: first_fall, interpolate, maximum_until, value_at
+  public :: first_zero, interpolate, maximum_until, value_at
 
   integer, parameter, public :: degree = 7
   !> Halvings until an interval is a point to rounding.
@@ -27,9 +27,9 @@ contains
     end do
   end function value_at
 
-  !> First t in (0, 1] where a polynomial that is positive (or leaves zero upwards) at 0 has fallen to zero;
+  !> First t in (0, 1] where a polynomial that is positive (or leaves zero upwards) at 0 has dropped to zero;
   !> 2 if it stays positive.
-  pure real(wp) function first_fall(p) result(t)
+  pure real(wp) function first_zero(p) result(t)
     real(wp), intent(in) :: p(0:degree)
     real(wp) :: b(0:degree, deepest + 1), right(0:degree), from(deepest + 1), width(deepest + 1)
     integer :: top, changes
@@ -45,11 +45,11 @@ contains
         ! Positive throughout, or rising from zero at the start.
         top = top - 1
       else if (low .or. changes == 0) then
-        ! Already fallen where the interval begins.
+        ! Already triggered where the interval begins.
         t = from(top)
         return
       else if ((changes == 1 .and. b(0, top) >= 0) .or. top > deepest) then
-        t = fall_between(p, from(top), from(top) + width(top))
+        t = zero_between(p, from(top), from(top) + width(top))
         return
       else
         width(top) = width(top)/2
@@ -63,10 +63,10 @@ contains
       end if
     end do
     t = 2
-  end function first_fall
+  end function first_zero
 
   !> The one fall in [low, high], by bisection that ends in Newton's step.
-  pure real(wp) function fall_between(p, low, high) result(t)
+  pure real(wp) function zero_between(p, low, high) result(t)
     real(wp), intent(in) :: p(0:degree), low, high
     real(wp) :: a, b
     integer :: i
@@ -81,7 +81,7 @@ contains
       end if
     end do
     t = b
-  end function fall_between
+  end function zero_between
 
   !> Largest value on [0, last], to a relative 1e-14 of the spread, by branch and bound.
   pure real(wp) function maximum_until(p, last) result(best)

@@ -18,7 +18,7 @@ module series_zero
 
 contains
 
-  !> First fraction in (0, 1] at which a series that is positive at 0, or leaves zero upwards there, has fallen to zero;
+  !> First fraction in (0, 1] at which a series that is positive at 0, or leaves zero upwards there, has dropped to zero;
   !> 2 if it stays positive or is zero throughout, 0 if it falls at once. Nothing can hide: the steps are certified by
   !> bounds on the second and third derivative over the stretch, and from zero also by the first term of the series.
   pure real(wp) function first_zero(p) result(t)

@@ -10,7 +10,8 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
-    place_of, take_turns, move_turn, append_word, open_log, record_event, put_in_order, record_sample, put_sample_book, put_column
+    place_of, take_turns, move_turn, append_word, open_log, record_event, put_in_order, record_sample, put_sample_balance, &
+    put_column
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -81,13 +82,13 @@ module motion_state
   end type tally_t
 
   !> Where the energy went since the start [J]: lost to dry friction, to viscous damping, to contacts; put in by the drive.
-  type, public :: book_t
+  type, public :: energy_balance_t
     real(wp) :: friction = 0, damping = 0, contact = 0, work = 0
     !> Energy of the machine then and now.
     real(wp) :: at_start = 0, at_end = 0
     !> Whether anybody will read it.
     logical :: kept = .true.
-  end type book_t
+  end type energy_balance_t
 
   !> Every event and samples, equidistant or at chosen instants, in absolute time. Storage grows as needed.
   type, public :: log_t
@@ -109,9 +110,9 @@ module motion_state
     real(wp) :: peak_force = 0, peak_penetration = 0, contact_work = 0
     !> Position and velocity of the driving body of two, at events and at samples.
     real(wp), allocatable :: event_driver(:, :), sample_driver(:, :)
-    !> Where the energy went until now, and until each sample: rows as in `book_t`, `at_end` being the energy then.
-    type(book_t) :: book
-    real(wp), allocatable :: sample_book(:, :)
+    !> Where the energy went until now, and until each sample: rows as in `energy_balance_t`, `at_end` being the energy then.
+    type(energy_balance_t) :: balance
+    real(wp), allocatable :: sample_balance(:, :)
     !> Speed at which the last contact with a soft barrier began, at samples; one row.
     real(wp), allocatable :: sample_touch(:, :)
     !> Of several bodies: coordinates and speeds at samples; number, coordinate, and speed before and after of the joint of an
@@ -154,10 +155,10 @@ contains
     end do
   end function samples_before
 
-  !> What is missing in a book [J].
-  pure elemental real(wp) function closing_error(book)
-    type(book_t), intent(in) :: book
-    closing_error = book%at_start + book%work - book%friction - book%damping - book%contact - book%at_end
+  !> What is missing in a balance [J].
+  pure elemental real(wp) function closing_error(balance)
+    type(energy_balance_t), intent(in) :: balance
+    closing_error = balance%at_start + balance%work - balance%friction - balance%damping - balance%contact - balance%at_end
   end function closing_error
 
   !> Whether a mode is a stick phase. Two bodies stick where the one does not slide over the other: not where the driven one
@@ -248,7 +249,7 @@ contains
     real(wp), intent(in) :: interval
     log%sample_interval = interval
     allocate (log%event_kind(256), log%event_data(4, 256), log%sample_mode(4096), log%sample_data(3, 4096))
-    allocate (log%event_driver(2, 256), log%sample_driver(2, 256), log%sample_book(5, 256), log%sample_touch(1, 256))
+    allocate (log%event_driver(2, 256), log%sample_driver(2, 256), log%sample_balance(5, 256), log%sample_touch(1, 256))
   end subroutine open_log
 
   !> Writes an event down: state just before it and the velocity just after; `driver` is x, v of the driving body of two.
@@ -295,20 +296,20 @@ contains
     if (k <= size(columns, 2)) columns(:, k - 1:k) = columns(:, k:k - 1:-1)
   end subroutine swap_columns
 
-  !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two, `book` the energy.
-  pure subroutine record_sample(log, state, driver, book)
+  !> Writes one sample down and moves on to the next; `driver` is x, v of the driving body of two, `balance` the energy.
+  pure subroutine record_sample(log, state, driver, balance)
     type(log_t), intent(inout) :: log
     type(state_t), intent(in) :: state
     real(wp), intent(in), optional :: driver(2)
-    type(book_t), intent(in), optional :: book
+    type(energy_balance_t), intent(in), optional :: balance
     call make_room(log, log%samples + 1)
     log%samples = log%samples + 1
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
     log%sample_data(:, log%samples) = [log%origin + state%time, place_of(state), state%v]
-    if (log%book%kept) call put_column(log%sample_touch, log%samples, [state%touch_speed])
+    if (log%balance%kept) call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
-    if (present(book)) call put_sample_book(log, log%samples, book)
+    if (present(balance)) call put_sample_balance(log, log%samples, balance)
   end subroutine record_sample
 
   !> Room for `count` samples.
@@ -327,12 +328,12 @@ contains
   end subroutine make_room
 
   !> Writes down where the energy went until sample number `sample`, in order.
-  pure subroutine put_sample_book(log, sample, book)
+  pure subroutine put_sample_balance(log, sample, balance)
     type(log_t), intent(inout) :: log
     integer, intent(in) :: sample
-    type(book_t), intent(in) :: book
-    call put_column(log%sample_book, sample, [book%friction, book%damping, book%contact, book%work, book%at_end])
-  end subroutine put_sample_book
+    type(energy_balance_t), intent(in) :: balance
+    call put_column(log%sample_balance, sample, [balance%friction, balance%damping, balance%contact, balance%work, balance%at_end])
+  end subroutine put_sample_balance
 
   !> Puts values into column `column`, the one after the last.
   pure subroutine put_column(columns, column, values)

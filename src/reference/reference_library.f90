@@ -12,7 +12,7 @@ module reference_library
   use law_table, only: law_choice, law_choice_t, laws
   use motion, only: motion_t
   use motion_state, only: options_t
-  use trajectory, only: outcome_t, run_trajectory, span_t
+  use single_trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
   private
 

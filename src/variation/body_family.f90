@@ -191,7 +191,7 @@ contains
     integer :: i, reason, last_mode
     image = point
     call open_log(log, 0.0_wp)
-    log%book%kept = .false.
+    log%balance%kept = .false.
     start = start_state(body%moving, point(1), point(2), 0.0_wp)
     mode = mode_of_body(body, start)
     state = start

@@ -243,7 +243,7 @@ contains
     type(march_t) :: steps
     type(guard_t) :: cut(most_cuts)
     real(wp) :: scale(6), time, span, all(6)
-    integer :: fallen, i, n, mode, count_cuts
+    integer :: triggered, i, n, mode, count_cuts
     span = t1 - t
     if (.not. abs(span) > 0) return
     n = merge(6, 2, present(flight))
@@ -255,26 +255,26 @@ contains
     if (span < 0) system%mode = -mode
     system%pushing = pushes(system%machine, mode, y)
     time = 0
-    fallen = cut_off
+    triggered = cut_off
     do i = 1, most_steps
-      if (fallen > 0) then
+      if (triggered > 0) then
         call list_cuts(system, mode, exit, time, all(1:2), cut, count_cuts)
         call begin_march(steps, system, moving%options%tolerance, scale(:n), abs(span), time, all(:n))
       end if
-      call take_step(steps, system, cut(:count_cuts), abs(span), fallen)
+      call take_step(steps, system, cut(:count_cuts), abs(span), triggered)
       time = steps%time
       all(:n) = steps%y(:n)
-      if (fallen == march_time_over .or. fallen == march_failed .or. fallen == exits) then
+      if (triggered == march_time_over .or. triggered == march_failed .or. triggered == exits) then
         exit
-      else if (fallen == cut_off) then
+      else if (triggered == cut_off) then
         system%pushing = .not. system%pushing
       end if
     end do
     t = t1
-    if (fallen == exits) t = t + sign(time, span) - span
+    if (triggered == exits) t = t + sign(time, span) - span
     y = all(1:2)
     if (present(flight)) flight = matmul(reshape(all(3:6), [2, 2]), flight)
-    if (fallen /= march_time_over .and. fallen /= exits) y = huge(1.0_wp)
+    if (triggered /= march_time_over .and. triggered /= exits) y = huge(1.0_wp)
     if (.not. y(1) < huge(1.0_wp)) t = t1
     system%mode = mode
   end subroutine march

@@ -18,7 +18,7 @@ module hybrid_machine
     integer :: kind = 0
     !> Direction of the motion or side of the contact, +1 or -1, and of several joints which one.
     integer :: side = 0, joint = 0
-    !> Of a structure: which guard of the joint has fallen.
+    !> Of a structure: the triggered guard of the joint.
     integer :: guard = 0
     !> Mode of the flights before and after, as the machine numbers them.
     integer :: before = 0, after = 0

@@ -19,7 +19,7 @@ module machine_family
   use one_body, only: one_body_t
   use pair, only: is_pair
   use structure, only: coordinates_of, structure_t
-  use strobe, only: start_strobe, strobe_t
+  use section, only: start_section, section_state_t
   use structure_family, only: map_of_structure, state_at_start, structure_neighbourhood, structure_of_family
   use structure_walk, only: advance_section, advance_to_section, fly_structure, start_of_structure
   use variations, only: neighbourhood_t
@@ -27,7 +27,7 @@ module machine_family
   private
 
   public :: has_several, machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, &
-    section_sizes, nearest_copy, within_stops, watched_rows, starts_of_section, strobe_of_section, begin_walk, walk_on
+    section_sizes, nearest_copy, within_stops, watched_rows, starts_of_section, section_of_section, begin_walk, walk_on
 
   !> A motion that goes from section to section.
   type, public :: walk_t
@@ -73,7 +73,7 @@ contains
     end if
   end subroutine machine_neighbourhood
 
-  !> Flies a machine from a start as `start_strobe` has it to its first section: where it then is, and the events on the way.
+  !> Flies a machine from a start as `start_section` has it to its first section: where it then is, and the events on the way.
   !> `ok` is false for a start beyond a stop, and if the trajectory had to be given up.
   pure subroutine fly_to_section(machine, start, point, events, ok)
     class(hybrid_t), intent(in) :: machine
@@ -93,7 +93,7 @@ contains
     select type (machine)
     type is (one_body_t)
       call open_log(log, 0.0_wp)
-      log%book%kept = .false.
+      log%balance%kept = .false.
       before = start_state(machine%moving, start(1), start(2), start(3))
       state = before
       call advance_period(machine%moving, state, tally, reason, log)
@@ -116,21 +116,21 @@ contains
   end subroutine fly_to_section
 
   !> The state of a trajectory of the same machine on the section. `ok` is false for a point beyond a stop.
-  pure subroutine strobe_of_section(machine, moving, point, strobe, ok)
+  pure subroutine section_of_section(machine, moving, point, section, ok)
     class(hybrid_t), intent(in) :: machine
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
-    type(strobe_t), intent(out) :: strobe
+    type(section_state_t), intent(out) :: section
     logical, intent(out) :: ok
     ok = .true.
     select type (machine)
     type is (structure_t)
-      call start_of_structure(machine, point, strobe%multibody, ok)
-      if (ok) strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      call start_of_structure(machine, point, section%multibody, ok)
+      if (ok) section%state = watched_state(moving%multibody%machine, section%multibody)
     class default
-      strobe = start_strobe(moving, [point, 0.0_wp])
+      section = start_section(moving, [point, 0.0_wp])
     end select
-  end subroutine strobe_of_section
+  end subroutine section_of_section
 
   !> A motion from a point of the section. `ok` is false for one beyond a stop.
   pure subroutine begin_walk(machine, point, walk, ok)

@@ -13,7 +13,7 @@ module structure
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
-  use structure_impact, only: carried_by, strike_with_slopes
+  use structure_impact, only: carried_by, apply_impact_with_slopes
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -361,7 +361,7 @@ contains
         side(event%joint) = event%side
         phase = phases_in(machine, event%after)
         turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
-        call strike_with_slopes(machine, state_in(self, event%before, t, y), turning, side, phase(event%joint) /= 0, &
+        call apply_impact_with_slopes(machine, state_in(self, event%before, t, y), turning, side, phase(event%joint) /= 0, &
                                 speeds, by_speeds, at_speeds)
         after(p + 1:n) = matmul(speeds, e)
         struck(p + 1:n, p + 1:n) = matmul(transpose(e), matmul(by_speeds, e))

@@ -105,7 +105,7 @@ contains
     end if
   end subroutine refuse_two_bodies
 
-  !> The state at a start as `start_strobe` has it.
+  !> The state at a start as `start_section` has it.
   pure type(multibody_state_t) function state_at_start(structure, start) result(state)
     type(structure_t), intent(in) :: structure
     real(wp), intent(in) :: start(:)

@@ -13,7 +13,7 @@ module structure_impact
   implicit none
   private
 
-  public :: carried_by, strike_with_slopes
+  public :: carried_by, apply_impact_with_slopes
 
   !> Steps of the differences of impacts, as a share of the speeds, and how far their halves may differ.
   real(wp), parameter :: step = merge(3e-4_wp, 1e-6_wp, epsilon(1.0_wp) > 1e-20_wp), bent = 1e-2_wp
@@ -61,7 +61,7 @@ contains
 
   !> Speeds after an impact of the contacts with `side` +1, -1 (0: not touching), see module `blow`, and their derivatives by the
   !> speeds before and by the time. Not a number where the impact is not smooth.
-  pure subroutine strike_with_slopes(machine, state, turning, side, plastic, v, by_speed, by_time)
+  pure subroutine apply_impact_with_slopes(machine, state, turning, side, plastic, v, by_speed, by_time)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
@@ -98,7 +98,7 @@ contains
         end associate
       end do
     end do
-  end subroutine strike_with_slopes
+  end subroutine apply_impact_with_slopes
 
   !> Impulses of the contacts in `list` for their opening speeds `gamma` [m/s], and the derivatives of these, not a number where an
   !> impulse is not smooth. One alone goes on smoothly where the contact opens already, beyond a graze: it pulls there.

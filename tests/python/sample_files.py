@@ -115,7 +115,7 @@ def write_sweep(path: Path, ratios: np.ndarray, starts: int = 6, samples: int = 
         ):
             _variable(file, name, data, dims, unit)
         wave = 0.05 * np.cos(np.pi * np.arange(samples)) * (impact & (ratios > 1.2))[..., None]
-        for name, unit in (("strobe_x", "m"), ("strobe_v", "m/s")):
+        for name, unit in (("section_x", "m"), ("section_v", "m/s")):
             _variable(file, name, 0.5 * x_max[..., None] + wave, [*dims, "sample"], unit)
         upper = np.where(branch, 0.8, np.minimum(quiet, 0.79)[:, None])
         lower = -np.where(branch, 0.3 * ratios[:, None], 0.8 * np.minimum(quiet, 0.6)[:, None])

@@ -40,7 +40,7 @@ def test_runs_and_branches_are_all_drawn(tmp_path: Path) -> None:
 def test_a_one_way_sweep_has_one_run(tmp_path: Path) -> None:
     path = write_sweep(tmp_path / "s.h5", np.linspace(0.7, 1.8, 23))
     with h5py.File(path, "r+") as file:
-        for name in ("x_max", "x_min", "mean_impact_speed", "strobe_x"):
+        for name in ("x_max", "x_min", "mean_impact_speed", "section_x"):
             file[name][1] = np.nan
     for make in (sweep.amplitude_diagram, sweep.bifurcation_diagram):
         texts = legend_texts(drawn(path, make))
@@ -256,7 +256,7 @@ def test_errors_are_one_line_and_a_code(
 def test_a_file_without_what_a_figure_needs_is_named(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     sweep_file, motion_file = WRITERS["sweep"](tmp_path / "s.h5"), WRITERS["trajectory"](tmp_path / "t.h5")
     with h5py.File(sweep_file, "r+") as file:
-        del file["strobe_x"]
+        del file["section_x"]
     with h5py.File(motion_file, "r+") as file:
         del file.attrs["window"]
     assert cli.main([str(sweep_file), str(motion_file)]) == 65
@@ -365,7 +365,7 @@ def test_points_at_several_ratios_have_none_in_the_caption(tmp_path: Path) -> No
 def test_holds_that_failed_are_not_drawn(tmp_path: Path) -> None:
     path = write_sweep(tmp_path / "s.h5", np.linspace(0.7, 1.8, 23))
     with h5py.File(path, "r+") as file:
-        for name in ("x_max", "x_min", "mean_impact_speed", "strobe_x"):
+        for name in ("x_max", "x_min", "mean_impact_speed", "section_x"):
             file[name][0, 5] = np.nan
         file["reason"][0, 5] = 5
     figure = drawn(path, sweep.amplitude_diagram)

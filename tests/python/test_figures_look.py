@@ -313,11 +313,11 @@ def test_runs_that_agree_are_drawn_as_one(tmp_path: Path) -> None:
     with style.context(), open_result(path) as result:
         figure = sweep.bifurcation_diagram(result, "title")
         drawn_points = sum(len(points.get_offsets()) for points in figure.axes[0].collections)
-        strobe = result["strobe_x"].values
-        agree = sweep._runs_agree(strobe)
+        section = result["section_x"].values
+        agree = sweep._runs_agree(section)
     assert agree.any()
     assert not agree.all()
-    assert drawn_points == strobe[0].size + strobe[0][~agree].size
+    assert drawn_points == section[0].size + section[0][~agree].size
     assert legend_texts(figure)[:3] == ["run-up", "run-down", "both alike"]
 
 

@@ -17,7 +17,7 @@ from separatrix.open import open_result
 
 NO_STARTS = ["sweep", "case.toml", "--set", "sweep.starts=[0, 0]"]
 FLOATS = ("x_max", "x_min", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period")
-STROBES = ("strobe_x", "strobe_v")
+SECTION = ("section_x", "section_v")
 
 
 def options(*settings: str) -> list[str]:
@@ -82,7 +82,7 @@ def one_way(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(("way", "ran"), [("up", 0), ("down", 1)])
 def test_a_direction_that_was_not_run_is_nan(one_way, way, ran):
     with h5py.File(one_way / f"{way}.h5") as file, h5py.File(one_way / "both.h5") as both:
-        for name in (*FLOATS, *STROBES):
+        for name in (*FLOATS, *SECTION):
             np.testing.assert_array_equal(file[name][ran], both[name][ran], name)
             assert np.isnan(file[name][1 - ran]).all(), name
             assert np.isfinite(file[name][ran]).all(), name

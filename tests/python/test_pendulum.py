@@ -129,7 +129,7 @@ def test_a_sweep_counts_the_turns(run, source_dir, separatrix, tmp_path):
     with h5py.File(out) as file:
         assert (np.abs(file["rotation_number"][:]) == 1).all()
         assert (file["period"][:] == 1).all()
-        assert (np.abs(file["strobe_x"][:]) <= np.pi).all()
+        assert (np.abs(file["section_x"][:]) <= np.pi).all()
 
 
 STOPS = """

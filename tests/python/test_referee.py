@@ -58,7 +58,7 @@ def test_it_agrees_with_itself_in_other_steps_and_more_digits(referee, libraries
     )
     for case in cases:
         ends = [
-            referee.strobes(library, referee.machine_of(case, step), -1.0, 0.3, 30)[-1]
+            referee.sections(library, referee.machine_of(case, step), -1.0, 0.3, 30)[-1]
             for library in libraries
             for step in (0.8, 0.31)
         ]

@@ -87,11 +87,11 @@ def test_quickstart_does_nothing_on_an_option(source_dir, option, code):
 
 
 def test_only_the_integrator_asks_what_kind_of_machine_it_moves(source_dir):
-    """`strobe` is the interface to any machine; variations, lanes, segments of coordinates have their own."""
+    """`section` is the interface to any machine; variations, lanes, segments of coordinates have their own."""
     asks = re.compile(r"%\s*(pair|multibody)\b")
     sources = (source_dir / "src").glob("*/*.f90")
     asking = ("integrator", "variation", "modes")
-    knowing = ("fleet.f90", "coordinate_segments.f90")
+    knowing = ("lane_slots.f90", "coordinate_segments.f90")
     above = [p for p in sources if p.parent.name not in asking and p.name not in knowing]
     assert len(above) > 150
     assert [p.name for p in above if asks.search(p.read_text())] == []

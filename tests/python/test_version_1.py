@@ -52,6 +52,7 @@ def test_python_opens_and_draws_it(old, kind):
             assert margins.isna().sum() == 1
             assert (margins.dropna() < 1).all()
         if kind == "sweep":
+            assert result["section_x"].dims[-1] == "sample"
             assert list(sx.table(result, "limits")["settled"].values) == [*["bracketed"] * 3, "not_known"]
         if kind == "boundary":
             assert result["sets_part"].max() > 1
@@ -62,6 +63,8 @@ def test_the_viewer_opens_it(old, kind):
     described = ResultFile(old / f"{kind}.h5").describe()
     assert described["kind"] == ("basin" if kind == "refined" else kind)
     assert described["machine"]["contact"]["law"] == "newton"
+    if kind == "sweep":
+        assert {"section_x", "section_v"} <= set(ResultFile(old / "sweep.h5").series()[1])
 
 
 @pytest.mark.parametrize("kind", KINDS)

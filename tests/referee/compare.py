@@ -222,7 +222,7 @@ def compare_sweep(court: Court, path: Path, case: dict, kinds: Counter) -> tuple
     runs, many = Verdicts(), Verdicts()
     with h5py.File(court.run("sweep", path)) as file:
         values = file[name.replace(".", "_")][()]
-        ends = np.stack([file["strobe_x"][:, :, -1], file["strobe_v"][:, :, -1]], axis=-1)
+        ends = np.stack([file["section_x"][:, :, -1], file["section_v"][:, :, -1]], axis=-1)
         held = [file[key][()] for key in ("period", "impacts_per_period")]
         starts = np.stack([file["start_x0"][()], file["start_v0"][()]], axis=1)
         found = [file[f"branch_{key}"][()] for key in ("attractor", "period", "impacts_per_period")]
@@ -256,7 +256,7 @@ def compare_points(court: Court, path: Path, case: dict) -> tuple[Verdicts, floa
     ways = ((court.extended, 0.0), (court.double, 0.0), (court.extended, BESIDE))
     worst = 0.0
     for k, (x, v) in enumerate(starts):
-        flown = [referee.strobes(library, machine, x + aside, v, PERIODS)[-1] for library, aside in ways]
+        flown = [referee.sections(library, machine, x + aside, v, PERIODS)[-1] for library, aside in ways]
         scale = size_of(np.array([[x, v], flown[0][:2]]))
         # how far the last digits alone move the end
         noise = max(float(np.max(apart(machine, item[:2], flown[0][:2]) / scale)) for item in flown)

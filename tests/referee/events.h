@@ -98,7 +98,7 @@ static void rest(body *b, real h) {
     for (int j = 0; j <= ORDER; j++)
       guard[j] = -side * force[j];
     guard[0] += m->static_friction;
-    const real s = first_fall(guard, ORDER, h);
+    const real s = first_zero(guard, ORDER, h);
     if (s >= 0 && (soonest < 0 || s < soonest)) {
       soonest = s;
       direction = side;
@@ -149,7 +149,7 @@ static void note_margin(body *b, const real *x, real h) {
       v[j] = side * (j + 1) * x[j + 1];
     if (!(v[0] > 0))
       continue;
-    const real s = first_fall(v, ORDER - 1, h);
+    const real s = first_zero(v, ORDER - 1, h);
     if (s < 0)
       continue;
     const real gap = side > 0 ? m->upper - value(x, ORDER, s) : value(x, ORDER, s) - m->lower;
@@ -178,7 +178,7 @@ static void flight(body *b, real h) {
     if (guard[0] < 0 && inside * side * b->v < 0) {
       guard[0] = 0; /* the rounding of a step that ended on the wall */
     }
-    const real s = first_fall(guard, ORDER, h);
+    const real s = first_zero(guard, ORDER, h);
     if (s >= 0 && (soonest < 0 || s < soonest)) {
       soonest = s;
       kind = side;
@@ -187,7 +187,7 @@ static void flight(body *b, real h) {
   if (friction) {
     for (int j = 0; j < ORDER; j++)
       guard[j] = b->sign * (j + 1) * x[j + 1];
-    const real s = first_fall(guard, ORDER - 1, h);
+    const real s = first_zero(guard, ORDER - 1, h);
     if (s >= 0 && (soonest < 0 || s < soonest)) {
       soonest = s;
       kind = 2;

@@ -80,7 +80,7 @@ static real search(const real *c, int n, real a, real b, int depth) {
 
 /* The first s in (0, h] where the polynomial falls through zero, -1 if there is none. Roots at 0 itself do
  * not count. */
-static real first_fall(const real *c, int n, real h) {
+static real first_zero(const real *c, int n, real h) {
   while (n > 0 && c[0] == 0) {
     c++;
     n--;

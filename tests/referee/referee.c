@@ -33,8 +33,8 @@ typedef struct {
   bool failed;
 } outcome;
 
-/* Strobes of one motion: rows x, v, impacts so far, chatters so far, turned into doubles. */
-void referee_strobes(const machine *m, double x, double v, long periods, double *rows) {
+/* Sections of one motion: rows x, v, impacts so far, chatters so far, turned into doubles. */
+void referee_sections(const machine *m, double x, double v, long periods, double *rows) {
   body b = started(m, x, v);
   for (long n = 0; n < periods; n++) {
     one_period(&b);

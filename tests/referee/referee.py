@@ -199,10 +199,10 @@ def _outcome(item: _Outcome) -> Outcome:
     )
 
 
-def strobes(library: ctypes.CDLL, machine: Machine, x: float, v: float, periods: int) -> np.ndarray:
+def sections(library: ctypes.CDLL, machine: Machine, x: float, v: float, periods: int) -> np.ndarray:
     """Rows x, v, impacts, chatters at the end of each drive period of one motion."""
     rows = np.empty((periods, 4))
-    library.referee_strobes(
+    library.referee_sections(
         ctypes.byref(machine),
         ctypes.c_double(x),
         ctypes.c_double(v),

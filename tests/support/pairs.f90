@@ -14,7 +14,7 @@ module pairs
   use machines, only: laws_from
   use motion, only: motion_t
   use motion_state, only: log_t, options_t, tally_t
-  use strobe, only: advance_strobe, advance_strobe_period, driver_now, energy_now, strobe_t
+  use section, only: advance_section, advance_section_period, driver_now, energy_now, section_state_t
   use two_bodies, only: contact_at
   implicit none
   private
@@ -24,7 +24,7 @@ module pairs
   integer, parameter, public :: at_x1 = 1, at_v1 = 2, at_x2 = 3, at_v2 = 4
 
   !> Where both bodies are, in which mode, and whether a stop is pressed (+1 the upper, -1 the lower one) and how deep.
-  type, extends(strobe_t), public :: pair_state_t
+  type, extends(section_state_t), public :: pair_state_t
     real(wp) :: y(4) = 0, penetration = 0
     integer :: mode = 0, pressed = 0
   end type pair_state_t
@@ -88,7 +88,7 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    call advance_strobe(moving, state, time_end, tally, reason, log)
+    call advance_section(moving, state, time_end, tally, reason, log)
     call look(moving, state)
   end subroutine advance_pair
 
@@ -98,7 +98,7 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    call advance_strobe_period(moving, state, tally, reason, log)
+    call advance_section_period(moving, state, tally, reason, log)
     call look(moving, state)
   end subroutine advance_pair_period
 

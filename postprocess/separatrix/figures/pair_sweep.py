@@ -30,16 +30,16 @@ def regimes(result: xr.Dataset, name: str, title: str, look: Look = DEFAULT) -> 
         if not np.any(result["reason"].isel(direction=place).values):
             continue
         largest = result["v_max"].isel(direction=place).values
-        strobe = result["strobe_v"].isel(direction=place).transpose(name, "sample").values
+        section = result["section_v"].isel(direction=place).transpose(name, "sample").values
         marks = {"linestyle": "", "marker": "o", "color": _COLOURS[int(code)], "markeredgewidth": 0.6}
         shape = {"markersize": 3.4, "markerfacecolor": "none"} if code == 0 else {"markersize": 1.5}
         top.plot(values, largest, **marks, **shape)
         bottom.plot(
-            np.repeat(values, strobe.shape[1]),
-            strobe.ravel(),
+            np.repeat(values, section.shape[1]),
+            section.ravel(),
             **marks,
             **shape,
-            rasterized=strobe.size > 2000,
+            rasterized=section.size > 2000,
         )
         handles.append(Line2D([], [], **marks, **shape, label=_NAMES[int(code)]))
     edges = spans(result, name)

@@ -68,18 +68,18 @@ def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) ->
     page = Page(look, (style.DOUBLE_COLUMN, 105.0), 2, sharex=True, height_ratios=(3, 2))
     top, bottom = page.axes
     values = result[name].values
-    strobe = result["strobe_x"].transpose("direction", name, "sample").values
+    section = result["section_x"].transpose("direction", name, "sample").values
     speed = result["mean_impact_speed"].transpose("direction", name).values
     runs = _directions(result)
-    agree = _runs_agree(strobe) if len(runs) == 2 else np.zeros(values.size, bool)
+    agree = _runs_agree(section) if len(runs) == 2 else np.zeros(values.size, bool)
     colours = {code: (style.RUN_UP, style.RUN_DOWN)[code] for _, code in runs}
     for place, code in runs:
-        _thin_points(top, values, strobe[place], ~agree, colours[code])
+        _thin_points(top, values, section[place], ~agree, colours[code])
         _thin_points(bottom, values, speed[place][:, np.newaxis], ~agree, colours[code])
-    _thin_points(top, values, strobe[0], agree, style.BOTH_RUNS)
+    _thin_points(top, values, section[0], agree, style.BOTH_RUNS)
     _thin_points(bottom, values, speed[0][:, np.newaxis], agree, style.BOTH_RUNS)
     _draw_barriers(top, result)
-    top.set_ylabel(f"position $x$ ({unit(result['strobe_x'])})\nonce per drive period")
+    top.set_ylabel(f"position $x$ ({unit(result['section_x'])})\nonce per drive period")
     bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
     bottom.set_xlabel(axis_label(result[name]))
     bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
@@ -112,11 +112,11 @@ def _thin_points(ax: Axes, values: np.ndarray, points: np.ndarray, chosen: np.nd
     ax.scatter(along[chosen], points[chosen], s=size, c=colour, linewidths=0, rasterized=rasterized, zorder=3)
 
 
-def _runs_agree(strobe: np.ndarray) -> np.ndarray:
+def _runs_agree(section: np.ndarray) -> np.ndarray:
     """Where both runs show the same motion: extremes of the points that differ by at most 5 % of all."""
-    finite = np.isfinite(strobe)
-    room = 0.05 * (np.ptp(strobe[finite]) if finite.any() else 0.0)
-    low, high = strobe.min(axis=2), strobe.max(axis=2)
+    finite = np.isfinite(section)
+    room = 0.05 * (np.ptp(section[finite]) if finite.any() else 0.0)
+    low, high = section.min(axis=2), section.max(axis=2)
     with np.errstate(invalid="ignore"):
         return (np.abs(low[0] - low[1]) <= room) & (np.abs(high[0] - high[1]) <= room)
 

@@ -11,7 +11,7 @@ import numpy as np
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.palette import of_attractors
 from separatrix.trial import CASE_GIVEN, try_first
-from separatrix.variables import FORMAT_VERSION
+from separatrix.variables import FORMAT_VERSION, RENAMED
 from separatrix.view.packing import clean
 from separatrix.words import decode_word
 
@@ -190,7 +190,8 @@ class ResultFile:
         found = dict(self.file.items())
         if "saddles" in found:
             found |= {f"saddles_{name}": item for name, item in self.file["saddles"].items()}
-        for name, item in found.items():
+        for written, item in found.items():
+            name = RENAMED.get(written, written)
             if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiu" or not item.ndim:
                 continue
             header[name] = {"label": _text(item, "long_name", name), "unit": _unit(item)}

@@ -12,7 +12,7 @@ module reference
   use law_table, only: find_law, law_choice_t
   use motion_state, only: options_t
   use status, only: exit_internal, exit_no_input
-  use trajectory, only: span_t
+  use single_trajectory, only: span_t
   implicit none
   private
 
@@ -89,7 +89,7 @@ contains
     end do
     status = separatrix_reference_run(size(rows), rows, lengths, values, options%flight, &
       int(options%event_budget, int64), [reference_tolerance, options%domain, span%duration, span%window, &
-      span%extension, merge(1.0_wp, 0.0_wp, span%stop_when_captured)], size(catalogue), packed, &
+      span%extension, merge(1.0_wp, 0.0_wp, span%stop_when_converged)], size(catalogue), packed, &
       size(starts, 2), starts, out)
     if (status /= 0) call fail(error, exit_internal, 'the reference library could not build the machine')
     results = out

@@ -156,7 +156,7 @@ def sweep(program: Path, case: Path, ratios: list[float], output: Path) -> dict[
         name = next(one for one in result["x_max"].dims if one != "direction")
         return {
             "ratio": result[name].values,
-            "strobe": result["strobe_x"].transpose("direction", name, "sample").values,
+            "section": result["section_x"].transpose("direction", name, "sample").values,
             "speed": result["mean_impact_speed"].transpose("direction", name).values,
         }
 
@@ -178,8 +178,8 @@ def bifurcation(
         top, bottom = axes[:, column]
         colour = BEFORE if stage == "before" else AFTER
         for direction, size, face in ((0, 3.2, "none"), (1, 1.4, colour)):
-            strobe = found["strobe"][direction]
-            along = np.broadcast_to(frequency[:, None], strobe.shape)
+            section = found["section"][direction]
+            along = np.broadcast_to(frequency[:, None], section.shape)
             look = {
                 "linestyle": "",
                 "marker": "o",
@@ -188,7 +188,7 @@ def bifurcation(
                 "markerfacecolor": face,
             }
             look |= {"markeredgewidth": 0.4, "rasterized": True}
-            top.plot(along.ravel(), strobe.ravel(), **look)
+            top.plot(along.ravel(), section.ravel(), **look)
             bottom.plot(frequency, found["speed"][direction], **look)
         for ax in (top, bottom):
             for name, drive in marks.items():

@@ -22,7 +22,7 @@ export class Diagram {
   }
 
   text(name) {
-    return { strobe_x: "stroboscopic x", strobe_v: "stroboscopic v", x_max: "largest and smallest x" }[name] || (this.answer.variables[name] || {}).label || words(name);
+    return { section_x: "stroboscopic x", section_v: "stroboscopic v", x_max: "largest and smallest x" }[name] || (this.answer.variables[name] || {}).label || words(name);
   }
 
   /** Shows which value the map is for; null if for none. */

@@ -11,7 +11,7 @@ export class SweepPanel extends Diagram {
   constructor(file, answer, links) {
     const { arrays, shapes } = answer;
     const key = Object.keys(arrays).find((name) => shapes[name].length === 1 && shapes.amplitude && shapes[name][0] === shapes.amplitude[1] && answer.variables[name] && name !== "amplitude");
-    const names = ["strobe_x", "strobe_v", "x_max", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period"].filter((name) => name in arrays);
+    const names = ["section_x", "section_v", "x_max", "amplitude", "v_max", "mean_impact_speed", "impacts_per_period"].filter((name) => name in arrays);
     super({ file, answer, key, kind: "Sweep", names, note: "orange: run-up, blue: run-down, grey: many starts; click: this value in the map", links });
   }
 
@@ -21,7 +21,7 @@ export class SweepPanel extends Diagram {
     if (!this.canvas.isConnected) return;
     const [context, width, height] = prepare(this.canvas);
     const { arrays, shapes, variables, limits } = this.answer, name = this.select.value;
-    const many = name.startsWith("strobe") ? [] : [`branch_${name}`, name === "x_max" ? "branch_x_min" : ""].filter((one) => one in arrays);
+    const many = name.startsWith("section") ? [] : [`branch_${name}`, name === "x_max" ? "branch_x_min" : ""].filter((one) => one in arrays);
     const runs = name === "x_max" ? ["x_max", "x_min"] : [name];
     const unit = variables[name].unit ? ` (${variables[name].unit})` : "";
     const plot = new Plot(context, width, height, extent(this.values), extent(...runs.map((one) => arrays[one]), ...many.map((one) => arrays[one])),

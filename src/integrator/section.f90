@@ -5,10 +5,10 @@
 !> coordinates that fix it there. Which of the two a machine is, is asked here, in `machine_facts` and in the
 !> other modules of this folder; nowhere above it. With `by_event` the section is where the motion of a machine without a clock
 !> turns round, see `turn_section`.
-module strobe
+module section
   use body_section, only: body_at, body_point, coordinates_of_body, resumed_body, scales_of_body, start_of_body
   use contact_law, only: beyond_barrier
-  use energy, only: energy_of_body, record_with_book
+  use energy, only: energy_of_body, record_with_balance
   use multibody_log, only: energy_of_multibody, log_sample, watched_state
   use multibody_motion, only: advance_multibody, advance_multibody_period, start_multibody
   use multibody_section, only: coordinates_of_multibody, fits_section, free_multibody, multibody_at, multibody_point, keeps_clear, &
@@ -27,17 +27,18 @@ module strobe
   implicit none
   private
 
-  public :: strobe_t, coordinates_of, has_section, section_obstacle, start_strobe, start_is_allowed, resume_strobe, strobe_at, &
-    section_point, section_state, scales_of, without_stops, stays_clear, speed_number, advance_strobe, advance_strobe_period, &
+  public :: section_state_t, coordinates_of, has_section, section_obstacle, start_section, start_is_allowed, resume_section, &
+    section_at, &
+    section_point, section_state, scales_of, without_stops, stays_clear, speed_number, advance_section, advance_section_period, &
     advance_past_event, begin_tally, driver_now, energy_now, record_end, advance_to_section, copy_of, turn_point, turn_of
 
   !> `state` is that of the body, or of the watched one of several.
-  type :: strobe_t
+  type :: section_state_t
     type(state_t) :: state
     type(multibody_state_t) :: multibody
     !> Time from the last section to this one [s].
     real(wp) :: lasted = 0
-  end type strobe_t
+  end type section_state_t
 
 contains
 
@@ -60,14 +61,14 @@ contains
 
   !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of one body the tally
   !> knows by how much it missed them.
-  pure logical function stays_clear(moving, strobe, tally, periods, distance)
+  pure logical function stays_clear(moving, section, tally, periods, distance)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     type(tally_t), intent(in) :: tally
     integer, intent(in) :: periods
     real(wp), intent(in) :: distance
     if (allocated(moving%multibody)) then
-      stays_clear = keeps_clear(moving%multibody, strobe%multibody, periods, distance)
+      stays_clear = keeps_clear(moving%multibody, section%multibody, periods, distance)
     else
       stays_clear = distance < tally%grazing_margin
     end if
@@ -113,27 +114,27 @@ contains
 
   !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
   !> are places and velocities of the coordinates of several bodies, in the place of those that the machine says.
-  pure function start_strobe(moving, start) result(strobe)
+  pure function start_section(moving, start) result(section)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     if (allocated(moving%multibody)) then
-      strobe%multibody = start_of_multibody(moving%multibody, start(1), start(2), start(3), start(4:))
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      section%multibody = start_of_multibody(moving%multibody, start(1), start(2), start(3), start(4:))
+      section%state = watched_state(moving%multibody%machine, section%multibody)
     else
-      strobe%state = start_of_body(moving, start)
+      section%state = start_of_body(moving, start)
     end if
-  end function start_strobe
+  end function start_section
 
-  !> Whether no body starts beyond a rigid stop: x [m], v [m/s], crank angle [rad], and what may follow as in `start_strobe`.
+  !> Whether no body starts beyond a rigid stop: x [m], v [m/s], crank angle [rad], and what may follow as in `start_section`.
   pure logical function start_is_allowed(moving, start)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     if (allocated(moving%multibody)) then
-      strobe = start_strobe(moving, start)
-      start_is_allowed = .not. any(strobe%multibody%q /= strobe%multibody%q)
-      if (start_is_allowed .and. has_driver(moving)) start_is_allowed = keeps_within(moving%multibody%machine, strobe%multibody)
+      section = start_section(moving, start)
+      start_is_allowed = .not. any(section%multibody%q /= section%multibody%q)
+      if (start_is_allowed .and. has_driver(moving)) start_is_allowed = keeps_within(moving%multibody%machine, section%multibody)
     else
       start_is_allowed = .not. beyond_barrier(moving%machine%contact, start(1))
     end if
@@ -141,71 +142,71 @@ contains
 
   !> The state of one machine given to another, on the section with the crank at an angle [rad]; a driving body whose motion
   !> is given has that of the new one. What was never moved starts as the new machine says.
-  pure function resume_strobe(moving, before, angle) result(strobe)
+  pure function resume_section(moving, before, angle) result(section)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: before
+    type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     if (allocated(moving%multibody) .and. before%multibody%time >= 0) then
-      strobe = resume_multibody(moving, before, angle)
+      section = resume_multibody(moving, before, angle)
       return
     end if
-    strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
+    section = start_section(moving, [before%state%x, before%state%v, angle])
     if (allocated(moving%multibody) .or. before%state%mode == 0) return
-    strobe%state = resumed_body(moving, before%state, angle)
-  end function resume_strobe
+    section%state = resumed_body(moving, before%state, angle)
+  end function resume_section
 
   !> The same of several bodies: all keep their places and velocities.
-  pure function resume_multibody(moving, before, angle) result(strobe)
+  pure function resume_multibody(moving, before, angle) result(section)
     type(motion_t), intent(in) :: moving
-    type(strobe_t), intent(in) :: before
+    type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     logical :: ok
     type(multibody_state_t) :: from
     from = before%multibody
     associate (n => moving%multibody%machine%n)
       if (has_driver(moving)) from%q(:n) = from%q(:n) - moving%multibody%machine%driver%running*from%clock
-      call start_multibody(moving%multibody, from%q(:n), from%v(:n), angle, strobe%multibody, ok)
+      call start_multibody(moving%multibody, from%q(:n), from%v(:n), angle, section%multibody, ok)
     end associate
-    strobe%multibody%slider = before%multibody%slider
-    strobe%multibody%integral = before%multibody%integral
-    strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
-    if (.not. ok) strobe = start_strobe(moving, [before%state%x, before%state%v, angle])
+    section%multibody%slider = before%multibody%slider
+    section%multibody%integral = before%multibody%integral
+    section%state = watched_state(moving%multibody%machine, section%multibody)
+    if (.not. ok) section = start_section(moving, [before%state%x, before%state%v, angle])
   end function resume_multibody
 
   !> The state on the section with the coordinates `point`; what they leave open is zero.
-  pure function strobe_at(moving, point) result(strobe)
+  pure function section_at(moving, point) result(section)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
-    type(strobe_t) :: strobe
+    type(section_state_t) :: section
     if (allocated(moving%multibody)) then
       if (moving%by_event) then
-        strobe%multibody = multibody_at_turn(moving%multibody, point)
+        section%multibody = multibody_at_turn(moving%multibody, point)
       else
-        strobe%multibody = multibody_at(moving%multibody, point)
+        section%multibody = multibody_at(moving%multibody, point)
       end if
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      section%state = watched_state(moving%multibody%machine, section%multibody)
     else if (moving%by_event) then
-      strobe%state = body_at_turn(moving, point(1))
+      section%state = body_at_turn(moving, point(1))
     else
-      strobe%state = body_at(moving, point)
+      section%state = body_at(moving, point)
     end if
-  end function strobe_at
+  end function section_at
 
   !> Coordinates of a state on the section, zeros after the last.
-  pure function section_point(moving, strobe) result(point)
+  pure function section_point(moving, section) result(point)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     real(wp) :: point(most_coordinates)
     point = 0
     if (moving%by_event) then
-      point = turn_point(moving, strobe)
+      point = turn_point(moving, section)
     else if (allocated(moving%multibody)) then
-      point = multibody_point(moving%multibody, strobe%multibody)
+      point = multibody_point(moving%multibody, section%multibody)
     else
       associate (n => coordinates_of_body(moving))
-        point(:n) = body_point(moving, strobe%state)
+        point(:n) = body_point(moving, section%state)
       end associate
     end if
   end function section_point
@@ -215,9 +216,9 @@ contains
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     real(wp) :: state(4)
-    type(strobe_t) :: strobe
-    strobe = strobe_at(moving, point)
-    state = [strobe%state%x, strobe%state%v, driver_now(moving, strobe)]
+    type(section_state_t) :: section
+    section = section_at(moving, point)
+    state = [section%state%x, section%state%v, driver_now(moving, section)]
   end function section_state
 
   !> Sizes of the coordinates in a motion over `half_range` [m] of the position.
@@ -242,133 +243,133 @@ contains
   end function turn_of
 
   !> Moves to `time_end` [s after the section, at most one period]; `reason` as in `advance`.
-  pure subroutine advance_strobe(moving, strobe, time_end, tally, reason, log)
+  pure subroutine advance_section(moving, section, time_end, tally, reason, log)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(inout) :: strobe
+    class(section_state_t), intent(inout) :: section
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
     if (allocated(moving%multibody)) then
-      call advance_multibody(moving%multibody, strobe%multibody, time_end, tally, reason, log)
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      call advance_multibody(moving%multibody, section%multibody, time_end, tally, reason, log)
+      section%state = watched_state(moving%multibody%machine, section%multibody)
     else
-      call advance(moving, strobe%state, time_end, tally, reason, log)
+      call advance(moving, section%state, time_end, tally, reason, log)
     end if
-  end subroutine advance_strobe
+  end subroutine advance_section
 
   !> Moves past one event, if that comes before `time_end`; one body past a turn to a slip at `speed` [m/s] or faster.
-  pure subroutine advance_past_event(moving, strobe, speed, time_end, tally, reason)
+  pure subroutine advance_past_event(moving, section, speed, time_end, tally, reason)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(inout) :: strobe
+    class(section_state_t), intent(inout) :: section
     real(wp), intent(in) :: speed, time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     if (allocated(moving%multibody)) then
-      call advance_multibody(moving%multibody, strobe%multibody, time_end, tally, reason, one_event=.true.)
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      call advance_multibody(moving%multibody, section%multibody, time_end, tally, reason, one_event=.true.)
+      section%state = watched_state(moving%multibody%machine, section%multibody)
     else
-      call advance(moving, strobe%state, time_end, tally, reason, slip_speed=speed)
+      call advance(moving, section%state, time_end, tally, reason, slip_speed=speed)
     end if
   end subroutine advance_past_event
 
   !> Moves to the next section and starts the clock anew.
-  pure subroutine advance_strobe_period(moving, strobe, tally, reason, log)
+  pure subroutine advance_section_period(moving, section, tally, reason, log)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(inout) :: strobe
+    class(section_state_t), intent(inout) :: section
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
     if (moving%by_event) then
-      call advance_to_section(moving, strobe, tally, reason)
+      call advance_to_section(moving, section, tally, reason)
       return
     end if
-    strobe%lasted = moving%machine%period
+    section%lasted = moving%machine%period
     if (allocated(moving%multibody)) then
-      call advance_multibody_period(moving%multibody, strobe%multibody, tally, reason, log)
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      call advance_multibody_period(moving%multibody, section%multibody, tally, reason, log)
+      section%state = watched_state(moving%multibody%machine, section%multibody)
     else
-      call advance_period(moving, strobe%state, tally, reason, log)
-      call take_turns(moving%machine%turn, strobe%state, tally)
+      call advance_period(moving, section%state, tally, reason, log)
+      call take_turns(moving%machine%turn, section%state, tally)
     end if
-  end subroutine advance_strobe_period
+  end subroutine advance_section_period
 
   !> Moves a machine without a clock to where it turns round; `reason` is `reason_time_over` if it does not.
-  pure subroutine advance_to_section(moving, strobe, tally, reason)
+  pure subroutine advance_to_section(moving, section, tally, reason)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(inout) :: strobe
+    class(section_state_t), intent(inout) :: section
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     if (allocated(moving%multibody)) then
-      call advance_multibody_to_turn(moving%multibody, strobe%multibody, strobe%lasted, tally, reason)
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      call advance_multibody_to_turn(moving%multibody, section%multibody, section%lasted, tally, reason)
+      section%state = watched_state(moving%multibody%machine, section%multibody)
     else
-      call advance_body_to_turn(moving, strobe%state, strobe%lasted, tally, reason)
+      call advance_body_to_turn(moving, section%state, section%lasted, tally, reason)
     end if
   end subroutine advance_to_section
 
   !> A copy of a state, to be moved on its own.
-  pure type(strobe_t) function copy_of(strobe) result(copy)
-    class(strobe_t), intent(in) :: strobe
-    copy%state = strobe%state
-    copy%multibody = strobe%multibody
-    copy%lasted = strobe%lasted
+  pure type(section_state_t) function copy_of(section) result(copy)
+    class(section_state_t), intent(in) :: section
+    copy%state = section%state
+    copy%multibody = section%multibody
+    copy%lasted = section%lasted
   end function copy_of
 
   !> Coordinates of a state there, zeros after the last.
-  pure function turn_point(moving, strobe) result(point)
+  pure function turn_point(moving, section) result(point)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     real(wp) :: point(most_coordinates)
     point = 0
     if (allocated(moving%multibody)) then
-      point = multibody_turn_point(moving%multibody, strobe%multibody)
+      point = multibody_turn_point(moving%multibody, section%multibody)
     else
-      point(1) = body_turn_point(moving, strobe%state)
+      point(1) = body_turn_point(moving, section%state)
     end if
   end function turn_point
 
   !> Begins the counts of a motion anew where it is now.
-  pure subroutine begin_tally(moving, strobe, tally)
+  pure subroutine begin_tally(moving, section, tally)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     type(tally_t), intent(inout) :: tally
-    call reset_tally(tally, strobe%state, has_driver(moving))
+    call reset_tally(tally, section%state, has_driver(moving))
   end subroutine begin_tally
 
   !> Position and velocity of the driving body of two [m, m/s], zeros without one.
-  pure function driver_now(moving, strobe) result(driver)
+  pure function driver_now(moving, section) result(driver)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     real(wp) :: driver(2)
     driver = 0
-    if (has_driver(moving)) driver = driver_of(moving%multibody%machine, strobe%multibody)
+    if (has_driver(moving)) driver = driver_of(moving%multibody%machine, section%multibody)
   end function driver_now
 
   !> Energy of the machine [J].
-  pure real(wp) function energy_now(moving, strobe) result(energy)
+  pure real(wp) function energy_now(moving, section) result(energy)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     if (allocated(moving%multibody)) then
-      energy = energy_of_multibody(moving%multibody%machine, strobe%multibody)
+      energy = energy_of_multibody(moving%multibody%machine, section%multibody)
     else
-      energy = energy_of_body(moving%machine, strobe%state)
+      energy = energy_of_body(moving%machine, section%state)
     end if
   end function energy_now
 
-  !> Closes the book of a log, with a last sample if it has any.
-  pure subroutine record_end(moving, strobe, sampled, log)
+  !> Closes the balance of a log, with a last sample if it has any.
+  pure subroutine record_end(moving, section, sampled, log)
     type(motion_t), intent(in) :: moving
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     logical, intent(in) :: sampled
     type(log_t), intent(inout) :: log
-    log%book%at_end = energy_now(moving, strobe)
+    log%balance%at_end = energy_now(moving, section)
     if (.not. sampled) return
     if (allocated(moving%multibody)) then
-      call log_sample(moving%multibody%machine, strobe%multibody, log)
+      call log_sample(moving%multibody%machine, section%multibody, log)
     else
-      call record_with_book(moving%machine, strobe%state, log)
+      call record_with_balance(moving%machine, section%state, log)
     end if
   end subroutine record_end
 
-end module strobe
+end module section

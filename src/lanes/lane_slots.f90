@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The lanes of a machine, of one body or of several with joints: what can be in them, what comes out of them.
-module fleet
+module lane_slots
   use multibody_log, only: watched_state
   use kinds, only: wp
   use lane_preparation, only: prepare_lanes
@@ -11,7 +11,7 @@ module fleet
   use machine_facts, only: is_one_body
   use motion, only: motion_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
-  use strobe, only: coordinates_of, strobe_t
+  use section, only: coordinates_of, section_state_t
   use structure_lanes, only: add_structure_region, fly_structure_lanes, occupy_structure_lane, structure_flies, &
     structure_lane_state, take_structure_counts
   use structure_preparation, only: prepare_structure_lanes
@@ -19,15 +19,15 @@ module fleet
   implicit none
   private
 
-  public :: prepare_flow, open_fleet, add_capture, flies_in_lane, put_into_lane, take_from_lane, fly_fleet
+  public :: prepare_flow, open_lanes, add_capture, flies_in_lane, put_into_lane, take_from_lane, advance_lanes
 
   !> Every lane is controlled by `batch`; the motion of several bodies is in `structures`.
-  type, public :: fleet_t
+  type, public :: lane_slots_t
     type(lane_batch_t) :: batch
-    !> What one body can be captured by.
+    !> What one body can be converged by.
     type(regions_t) :: regions
     type(structure_batch_t), allocatable :: structures
-  end type fleet_t
+  end type lane_slots_t
 
 contains
 
@@ -42,17 +42,17 @@ contains
   end subroutine prepare_flow
 
   !> Empty lanes for a machine.
-  pure subroutine open_fleet(moving, fleet)
+  pure subroutine open_lanes(moving, lane_slots)
     type(motion_t), intent(in) :: moving
-    type(fleet_t), intent(out) :: fleet
-    if (allocated(moving%multibody)) allocate (fleet%structures)
-  end subroutine open_fleet
+    type(lane_slots_t), intent(out) :: lane_slots
+    if (allocated(moving%multibody)) allocate (lane_slots%structures)
+  end subroutine open_lanes
 
-  !> The lanes can be captured by attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What
+  !> The lanes can be converged by attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What
   !> does not fit makes every lane stop at every section.
-  pure subroutine add_capture(moving, fleet, attractor, point, scale, metric, reach)
+  pure subroutine add_capture(moving, lane_slots, attractor, point, scale, metric, reach)
     type(motion_t), intent(in) :: moving
-    type(fleet_t), intent(inout) :: fleet
+    type(lane_slots_t), intent(inout) :: lane_slots
     integer, intent(in) :: attractor
     real(wp), intent(in) :: point(:), scale(:), metric(:), reach
     integer :: n
@@ -61,73 +61,73 @@ contains
     if (allocated(moving%multibody)) n = 2*moving%multibody%machine%n
     fits = size(point) == n .and. coordinates_of(moving) == n
     if (.not. fits) then
-      fleet%regions%complete = 0
-      if (allocated(fleet%structures)) fleet%structures%complete = 0
+      lane_slots%regions%complete = 0
+      if (allocated(lane_slots%structures)) lane_slots%structures%complete = 0
     else if (allocated(moving%multibody)) then
-      call add_structure_region(moving%multibody, fleet%structures, attractor, point, scale, metric, reach)
+      call add_structure_region(moving%multibody, lane_slots%structures, attractor, point, scale, metric, reach)
     else
-      call add_region(fleet%regions, attractor, point, scale, metric(:3), reach)
+      call add_region(lane_slots%regions, attractor, point, scale, metric(:3), reach)
     end if
   end subroutine add_capture
 
   !> Whether a lane can take a motion: one body that slips fast enough, a structure in a mode that lanes know.
-  pure logical function flies_in_lane(moving, flow, strobe) result(flies)
+  pure logical function flies_in_lane(moving, flow, section) result(flies)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(in) :: flow
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     if (allocated(moving%multibody)) then
-      flies = structure_flies(flow, moving%multibody, strobe%multibody)
+      flies = structure_flies(flow, moving%multibody, section%multibody)
     else
-      flies = (strobe%state%mode == mode_slip_plus .or. strobe%state%mode == mode_slip_minus) .and. &
-        abs(strobe%state%v) >= flow%slowest
+      flies = (section%state%mode == mode_slip_plus .or. section%state%mode == mode_slip_minus) .and. &
+        abs(section%state%v) >= flow%slowest
     end if
   end function flies_in_lane
 
   !> Puts a motion into a lane of a batch, which will fly it to the section. `new`: without memory of flights before. Several
   !> bodies alone ask for `structures`.
-  pure subroutine put_into_lane(moving, flow, lane, strobe, new, batch, structures)
+  pure subroutine put_into_lane(moving, flow, lane, section, new, batch, structures)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(in) :: flow
     integer, intent(in) :: lane
-    class(strobe_t), intent(in) :: strobe
+    class(section_state_t), intent(in) :: section
     logical, intent(in) :: new
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     if (allocated(moving%multibody)) then
-      call occupy_structure_lane(moving%multibody, lane, strobe%multibody, batch, structures)
+      call occupy_structure_lane(moving%multibody, lane, section%multibody, batch, structures)
     else
-      call occupy_lane(flow, lane, strobe%state, new, batch)
+      call occupy_lane(flow, lane, section%state, new, batch)
     end if
   end subroutine put_into_lane
 
   !> The motion in a lane, where it stopped or at the start of the flight that is left to the event loop; what the lane has
   !> counted goes to the tally. Not a function: the copy of its result, just written, would stall every stop.
-  pure subroutine take_from_lane(moving, lane, batch, structures, strobe, tally)
+  pure subroutine take_from_lane(moving, lane, batch, structures, section, tally)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
-    class(strobe_t), intent(inout) :: strobe
+    class(section_state_t), intent(inout) :: section
     type(tally_t), intent(inout) :: tally
     if (allocated(moving%multibody)) then
-      call structure_lane_state(moving%multibody, structures, lane, strobe%multibody)
-      strobe%state = watched_state(moving%multibody%machine, strobe%multibody)
+      call structure_lane_state(moving%multibody, structures, lane, section%multibody)
+      section%state = watched_state(moving%multibody%machine, section%multibody)
       call take_structure_counts(structures, lane, tally)
     else
-      call lane_state(batch, lane, strobe%state)
+      call lane_state(batch, lane, section%state)
     end if
     call take_counts(batch, lane, tally)
   end subroutine take_from_lane
 
   !> Flies every occupied lane until it has stopped or is left to the event loop.
-  pure subroutine fly_fleet(flow, fleet)
+  pure subroutine advance_lanes(flow, lane_slots)
     type(lane_flow_t), intent(in) :: flow
-    type(fleet_t), intent(inout) :: fleet
-    if (allocated(fleet%structures)) then
-      call fly_structure_lanes(flow, fleet%batch, fleet%structures)
+    type(lane_slots_t), intent(inout) :: lane_slots
+    if (allocated(lane_slots%structures)) then
+      call fly_structure_lanes(flow, lane_slots%batch, lane_slots%structures)
     else
-      call fly_lanes(flow, fleet%regions, fleet%batch)
+      call fly_lanes(flow, lane_slots%regions, lane_slots%batch)
     end if
-  end subroutine fly_fleet
+  end subroutine advance_lanes
 
-end module fleet
+end module lane_slots

@@ -1,59 +1,60 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The convex problem that a choice of modes puts: forces of the joints in question within their limits, each with no
+!> The convex problem that a choice of modes puts: forces of the joints in lcp within their limits, each with no
 !> acceleration along its joint unless it is at a limit. Derivatives of it settle ties.
-module mode_question
-  use boxed_forces, only: depends_on, solve_boxed
+module mode_lcp
+  use bounded_lcp, only: depends_on, solve_bounded_lcp
   use multibody, only: joint_contact, joint_friction, joint_spring, multibody_t, most_joints
   use multibody_state, only: is_held, joint_force, joint_motion, multibody_state_t, running_control, spring_force, strength_now
   use kinds, only: wp
   implicit none
   private
 
-  public :: ask, set_mobility, drift_of, sizes, second_rate, solve, is_tied, narrow, keep_loaded, settle_ties
+  public :: add_constraint, set_mobility, drift_of, sizes, second_rate, solve, is_degenerate, restrict_bounds, keep_loaded, &
+    resolve_degeneracy
 
-  !> What the choice is made of: the joints in question, their rows, and the drift of the free structure along them.
-  type, public :: question_t
+  !> What the choice is made of: the joints in lcp, their rows, and the drift of the free structure along them.
+  type, public :: mode_lcp_t
     integer :: count = 0
     integer :: joint(most_joints) = 0
     real(wp), dimension(most_joints) :: lower = 0, upper = 0
-    !> Not in question any more: no force is sought.
+    !> Not in lcp any more: no force is sought.
     logical :: fixed(most_joints) = .false.
     real(wp) :: g(most_joints, most_joints) = 0
     real(wp) :: tolerance = 0
-  end type question_t
+  end type mode_lcp_t
 
 contains
 
-  pure subroutine ask(question, j, lower, upper)
-    type(question_t), intent(inout) :: question
+  pure subroutine add_constraint(lcp, j, lower, upper)
+    type(mode_lcp_t), intent(inout) :: lcp
     integer, intent(in) :: j
     real(wp), intent(in) :: lower, upper
-    question%count = question%count + 1
-    question%joint(question%count) = j
-    question%lower(question%count) = lower
-    question%upper(question%count) = upper
-  end subroutine ask
+    lcp%count = lcp%count + 1
+    lcp%joint(lcp%count) = j
+    lcp%lower(lcp%count) = lower
+    lcp%upper(lcp%count) = upper
+  end subroutine add_constraint
 
   !> W' M^-1 W.
-  pure subroutine set_mobility(machine, question)
+  pure subroutine set_mobility(machine, lcp)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(inout) :: question
+    type(mode_lcp_t), intent(inout) :: lcp
     integer :: i, k
-    do i = 1, question%count
-      do k = 1, question%count
-        question%g(k, i) = sum(machine%joints(question%joint(k))%row &
-                               *matmul(machine%mobility, machine%joints(question%joint(i))%row))
+    do i = 1, lcp%count
+      do k = 1, lcp%count
+        lcp%g(k, i) = sum(machine%joints(lcp%joint(k))%row &
+                               *matmul(machine%mobility, machine%joints(lcp%joint(i))%row))
       end do
     end do
   end subroutine set_mobility
 
-  !> Derivative number `order` of the joint coordinates in question without the forces sought: that of the free structure
+  !> Derivative number `order` of the joint coordinates in lcp without the forces sought: that of the free structure
   !> under `force` (or its rates), and that of the surfaces.
-  pure subroutine drift_of(machine, question, state, turning, order, force, drift)
+  pure subroutine drift_of(machine, lcp, state, turning, order, force, drift)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(in) :: question
+    type(mode_lcp_t), intent(in) :: lcp
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
@@ -63,9 +64,9 @@ contains
     integer :: i
     a = matmul(machine%mobility, force)
     drift = 0
-    do i = 1, question%count
-      drift(i) = sum(machine%joints(question%joint(i))%row*a) &
-                 + surface(machine, question%joint(i), state, turning, order)
+    do i = 1, lcp%count
+      drift(i) = sum(machine%joints(lcp%joint(i))%row*a) &
+                 + surface(machine, lcp%joint(i), state, turning, order)
     end do
   end subroutine drift_of
 
@@ -86,10 +87,10 @@ contains
     if (state%time /= state%time) surface = 0
   end function surface
 
-  !> Sizes of what the accelerations in question, or their rates (derivative number `order`), are sums of, for their rounding.
-  pure function sizes(machine, question, state, turning, order, force) result(size_of_y)
+  !> Sizes of what the accelerations in lcp, or their rates (derivative number `order`), are sums of, for their rounding.
+  pure function sizes(machine, lcp, state, turning, order, force) result(size_of_y)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(in) :: question
+    type(mode_lcp_t), intent(in) :: lcp
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
@@ -128,9 +129,9 @@ contains
       parts(i) = parts(i) + swing_of_force(energy, max(machine%stiffness(i, i), 0.0_wp), machine%mobility(i, i), order)
     end do
     size_of_y = 0
-    do i = 1, question%count
-      size_of_y(i) = sum(abs(machine%joints(question%joint(i))%row)*matmul(abs(machine%mobility), parts)) &
-                     + swing_of(machine, question%joint(i), order)
+    do i = 1, lcp%count
+      size_of_y(i) = sum(abs(machine%joints(lcp%joint(i))%row)*matmul(abs(machine%mobility), parts)) &
+                     + swing_of(machine, lcp%joint(i), order)
     end do
   end function sizes
 
@@ -196,104 +197,104 @@ contains
     end do
   end subroutine second_rate
 
-  pure subroutine solve(question, drift, tolerance, side, r, y, ok)
-    type(question_t), intent(in) :: question
+  pure subroutine solve(lcp, drift, tolerance, side, r, y, ok)
+    type(mode_lcp_t), intent(in) :: lcp
     real(wp), intent(in) :: drift(:), tolerance
     integer, intent(inout) :: side(:)
     real(wp), intent(out) :: r(:), y(:)
     logical, intent(out) :: ok
     integer :: n
-    n = question%count
-    call solve_boxed(question%g(:n, :n), drift(:n), question%lower(:n), question%upper(:n), question%fixed(:n), tolerance, &
+    n = lcp%count
+    call solve_bounded_lcp(lcp%g(:n, :n), drift(:n), lcp%lower(:n), lcp%upper(:n), lcp%fixed(:n), tolerance, &
                      side(:n), r(:n), y(:n), ok)
   end subroutine solve
 
   !> Whether a force is at its limit while the joint has no acceleration.
-  pure logical function is_tied(question, r, y, side, tolerance)
-    type(question_t), intent(in) :: question
+  pure logical function is_degenerate(lcp, r, y, side, tolerance)
+    type(mode_lcp_t), intent(in) :: lcp
     real(wp), intent(in) :: r(:), y(:), tolerance(:)
     integer, intent(in) :: side(:)
     integer :: i
-    is_tied = .false.
-    do i = 1, question%count
-      if (tied_at(question, i, r, y, side, tolerance(i)) /= 0) is_tied = .true.
+    is_degenerate = .false.
+    do i = 1, lcp%count
+      if (degenerate_at(lcp, i, r, y, side, tolerance(i)) /= 0) is_degenerate = .true.
     end do
-  end function is_tied
+  end function is_degenerate
 
   !> A joint at its limit that joints which hold keep from moving is no tie: friction slides at no speed, a contact lies open at
   !> its stop, and they bear what comes.
-  pure subroutine keep_loaded(question, y, side, tolerance)
-    type(question_t), intent(inout) :: question
+  pure subroutine keep_loaded(lcp, y, side, tolerance)
+    type(mode_lcp_t), intent(inout) :: lcp
     real(wp), intent(in) :: y(:), tolerance(:)
     integer, intent(in) :: side(:)
     integer :: i
-    associate (n => question%count)
+    associate (n => lcp%count)
       do i = 1, n
-        if (question%fixed(i) .or. side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
-        question%fixed(i) = depends_on(question%g(:n, :n), i, side(:n) == 0)
+        if (lcp%fixed(i) .or. side(i) == 0 .or. .not. abs(y(i)) <= tolerance(i)) cycle
+        lcp%fixed(i) = depends_on(lcp%g(:n, :n), i, side(:n) == 0)
       end do
     end associate
   end subroutine keep_loaded
 
   !> What no derivative decides sticks, or stays closed; a contact whose force a guard has seen end (`ends`) opens.
-  pure subroutine settle_ties(machine, question, r, y, ends, tolerance, side)
+  pure subroutine resolve_degeneracy(machine, lcp, r, y, ends, tolerance, side)
     type(multibody_t), intent(in) :: machine
-    type(question_t), intent(in) :: question
+    type(mode_lcp_t), intent(in) :: lcp
     real(wp), intent(in) :: r(:), y(:), tolerance(:)
     logical, intent(in) :: ends(:)
     integer, intent(inout) :: side(:)
     integer :: i, limit
-    do i = 1, question%count
-      limit = tied_at(question, i, r, y, side, tolerance(i))
+    do i = 1, lcp%count
+      limit = degenerate_at(lcp, i, r, y, side, tolerance(i))
       if (limit == 0) cycle
-      side(i) = merge(limit, 0, ends(question%joint(i)) .and. machine%joints(question%joint(i))%kind == joint_contact)
+      side(i) = merge(limit, 0, ends(lcp%joint(i)) .and. machine%joints(lcp%joint(i))%kind == joint_contact)
     end do
-  end subroutine settle_ties
+  end subroutine resolve_degeneracy
 
-  !> The limit at which joint number `i` in question is tied, 0 if it is not.
-  pure integer function tied_at(question, i, r, y, side, tolerance) result(limit)
-    type(question_t), intent(in) :: question
+  !> The limit at which joint number `i` in lcp is degenerate, 0 if it is not.
+  pure integer function degenerate_at(lcp, i, r, y, side, tolerance) result(limit)
+    type(mode_lcp_t), intent(in) :: lcp
     integer, intent(in) :: i, side(:)
     real(wp), intent(in) :: r(:), y(:), tolerance
     real(wp) :: mobility
     limit = 0
-    if (question%fixed(i)) return
-    mobility = question%g(i, i)
+    if (lcp%fixed(i)) return
+    mobility = lcp%g(i, i)
     if (side(i) == 0) then
-      if (abs(question%upper(i)) < huge(1.0_wp)) then
-        if ((question%upper(i) - r(i))*mobility <= tolerance) limit = 1
+      if (abs(lcp%upper(i)) < huge(1.0_wp)) then
+        if ((lcp%upper(i) - r(i))*mobility <= tolerance) limit = 1
       end if
-      if (abs(question%lower(i)) < huge(1.0_wp)) then
+      if (abs(lcp%lower(i)) < huge(1.0_wp)) then
         ! The rounding of a stiff joint can be more than lies between the limits.
-        if ((r(i) - question%lower(i))*mobility <= tolerance .and. &
-            (limit == 0 .or. r(i) - question%lower(i) < question%upper(i) - r(i))) limit = -1
+        if ((r(i) - lcp%lower(i))*mobility <= tolerance .and. &
+            (limit == 0 .or. r(i) - lcp%lower(i) < lcp%upper(i) - r(i))) limit = -1
       end if
     else if (abs(y(i)) <= tolerance) then
       limit = side(i)
     end if
-  end function tied_at
+  end function degenerate_at
 
-  !> Limits of the rates of the forces: none for what holds, nothing for what slides or is open, one for what is tied.
-  pure subroutine narrow(question, r, y, side, tolerance)
-    type(question_t), intent(inout) :: question
+  !> Limits of the rates of the forces: none for what holds, nothing for what slides or is open, one for what is degenerate.
+  pure subroutine restrict_bounds(lcp, r, y, side, tolerance)
+    type(mode_lcp_t), intent(inout) :: lcp
     real(wp), intent(in) :: r(:), y(:), tolerance(:)
     integer, intent(in) :: side(:)
     integer :: i, limit
-    do i = 1, question%count
-      limit = tied_at(question, i, r, y, side, tolerance(i))
+    do i = 1, lcp%count
+      limit = degenerate_at(lcp, i, r, y, side, tolerance(i))
       if (limit > 0) then
-        question%lower(i) = -huge(1.0_wp)
-        question%upper(i) = 0
+        lcp%lower(i) = -huge(1.0_wp)
+        lcp%upper(i) = 0
       else if (limit < 0) then
-        question%lower(i) = 0
-        question%upper(i) = huge(1.0_wp)
+        lcp%lower(i) = 0
+        lcp%upper(i) = huge(1.0_wp)
       else if (side(i) == 0) then
-        question%lower(i) = -huge(1.0_wp)
-        question%upper(i) = huge(1.0_wp)
+        lcp%lower(i) = -huge(1.0_wp)
+        lcp%upper(i) = huge(1.0_wp)
       else
-        question%fixed(i) = .true.
+        lcp%fixed(i) = .true.
       end if
     end do
-  end subroutine narrow
+  end subroutine restrict_bounds
 
-end module mode_question
+end module mode_lcp

@@ -4,12 +4,12 @@
 !> The complementarity problem of constraints with limited forces: y = G r + c with lower <= r <= upper, y >= 0 where r is
 !> at its lower limit, y <= 0 at the upper, y = 0 between. G is symmetric and positive semidefinite: y is unique.
 !> Principal pivoting by the least index, which ends (Murty 1974; with limits: Judice, Pires 1994).
-module boxed_forces
+module bounded_lcp
   use kinds, only: wp
   implicit none
   private
 
-  public :: solve_boxed, depends_on, shared_inverse
+  public :: solve_bounded_lcp, depends_on, shared_inverse
 
   !> Constraints that depend on each other to this relative amount share their force evenly.
   real(wp), parameter, public :: dependent = 1e-10_wp
@@ -21,7 +21,7 @@ contains
   !> `side` is -1, +1 at a limit, 0 between; what it holds at the start is tried first. `tolerance` is how much of y, and of
   !> r as y by its own mobility, counts as nothing; what is `fixed` has no force and keeps its
   !> side. `ok` is false if the pivoting does not end.
-  pure subroutine solve_boxed(g, c, lower, upper, fixed, tolerance, side, r, y, ok)
+  pure subroutine solve_bounded_lcp(g, c, lower, upper, fixed, tolerance, side, r, y, ok)
     real(wp), intent(in) :: g(:, :), c(:), lower(:), upper(:), tolerance
     logical, intent(in) :: fixed(:)
     integer, intent(inout) :: side(:)
@@ -66,7 +66,7 @@ contains
         return
       end if
     end do
-  end subroutine solve_boxed
+  end subroutine solve_bounded_lcp
 
   !> Inverse of a positive semidefinite matrix, as far as it has one: of the forces that bring about a motion those that are shared
   !> evenly, X of X G X = X, symmetric.
@@ -181,4 +181,4 @@ contains
     end do
   end subroutine forces_for
 
-end module boxed_forces
+end module bounded_lcp
