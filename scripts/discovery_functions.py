@@ -176,10 +176,10 @@ def main() -> None:
         for number, one in enumerate(pool.map(partial(examine, options.seed), range(options.cases))):
             found.append(one)
             print(f"case {number}: {one}", file=sys.stderr, flush=True)
-    judged = [one for one in found if one is not None]
-    shown = [one.within for one in judged if not math.isnan(one.within)]
-    whole = rate([one.right for one in judged])
-    said = rate([one.right for one in judged if one.named])
+    scored = [one for one in found if one is not None]
+    shown = [one.within for one in scored if not math.isnan(one.within)]
+    whole = rate([one.right for one in scored])
+    said = rate([one.right for one in scored if one.named])
     head = ["restitution loss", "d'", "cases", "family right", "functions", "law in the band", "half width"]
     page = PAGE.format(
         asked=options.cases,
@@ -187,7 +187,7 @@ def main() -> None:
         unreachable=found.count(None),
         family=FAMILY,
         points=POINTS,
-        rows=table(head, rows_of(judged))
+        rows=table(head, rows_of(scored))
         + "\n\n*Half width* is the median half width of the band, as a share of the change of the law "
         "over its support.",
         family_all=whole,
@@ -200,7 +200,7 @@ def main() -> None:
         inside=rate([one >= BAR_BAND for one in shown]),
         others=table(
             ["shape", "d'", "verdict"],
-            [[one.shape, f"{one.target:g}", one.said] for one in judged if not one.right],
+            [[one.shape, f"{one.target:g}", one.said] for one in scored if not one.right],
         ),
     )
     if options.print:

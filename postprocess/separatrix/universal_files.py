@@ -35,7 +35,7 @@ class FileUnits:
 
     length: float
     force: float
-    fault: str
+    problem: str
 
 
 def check_whole(path: Path) -> None:
@@ -72,10 +72,10 @@ def units_of(sets: Sequence[Mapping]) -> FileUnits | None:
     if not (0 < length < np.inf and 0 < force < np.inf):
         raise SeparatrixError(f"{stated}, allowed ones above 0")
     of_code = _OF_CODE.get(code, (length, force))
-    fault = ""
+    problem = ""
     if not np.allclose((length, force), of_code, rtol=1e-3, atol=0):
-        fault = (
+        problem = (
             f"{stated} with the units code {code}, allowed {of_code[0]:g} and {of_code[1]:g}, "
             "or the code 9 of other units"
         )
-    return FileUnits(length, force, fault)
+    return FileUnits(length, force, problem)

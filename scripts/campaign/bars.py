@@ -55,7 +55,7 @@ def bars(found: list[Score], with_asked: list[bool]) -> list[list[str]]:
             f"{100 * share:.1f} % (median of {len(closes)})",
             met(rate([one >= 0.8 for one in closes]), 0.5, 1),
         ],
-        at_most("a negative control could be named, all cases", 0.02, [o.decoy for o in found]),
+        at_most("a negative control could be named, all cases", 0.02, [o.negative_control for o in found]),
         at_least(
             "region of rightly named effects, d' >= 5",
             0.90,

@@ -34,7 +34,7 @@ CI_SEED, CI_CASES = 1, (0, 12, 14, 16, 17, 32)
 """Nothing hidden, one effect, an effect that is one of a set; quick ones."""
 KEPT = (
     "outcome effects alternatives equivalent in_families parameters gap gates leaves p_value reasons"
-    " detectable d_prime decoys character where experiments notes records seed version runtime_s"
+    " detectable d_prime negative_controls character where experiments notes records seed version runtime_s"
 ).split()
 UNREACHABLE = "unreachable"
 

@@ -19,7 +19,7 @@ GROUPS: dict[str, Callable[[Score], bool]] = {
 
 
 def followed(folders: object, found: list[Score]) -> list[tuple[Score, Score]]:
-    """Cases that asked for a record, as they were judged before and with it.
+    """Cases that asked for a record, as they were scored before and with it.
 
     One whose records could not be made is as it was.
     """

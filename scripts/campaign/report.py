@@ -31,7 +31,7 @@ class Broken(Exception):
 
 
 def scores_of(folders: object, numbers: Sequence[int]) -> tuple[list[Score], int]:
-    """All cases with a result, judged, and the number of those whose effect could not have its size."""
+    """All cases with a result, scored, and the number of those whose effect could not have its size."""
     found, unreachable = [], 0
     for number in numbers:
         if not folders.result(number).is_file():

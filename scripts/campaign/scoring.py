@@ -79,7 +79,7 @@ REGIONS = {
 
 @dataclass(frozen=True)
 class Score:
-    """One case, judged."""
+    """One case, scored."""
 
     number: int
     kind: str
@@ -108,8 +108,8 @@ class Score:
     covered: tuple[bool, ...]
     removed: float
     """Share of the held-out excess that the verdict removed; NaN without excess or name."""
-    decoy: bool
-    """A decoy could have been named."""
+    negative_control: bool
+    """A negative control could have been named."""
     region: bool | None
     """The clearest region is one where the effect acts; None without region or rule."""
     depends_rightly: bool | None
@@ -121,7 +121,7 @@ class Score:
     by_family: bool
     """Right by the function of its family or a form of its trend, not by its own name."""
     rig: bool
-    """The records have the small faults of a rig."""
+    """The records have the small imperfections of a rig."""
     whole: int
     """Samples of all records together."""
     leaves: str
@@ -238,7 +238,8 @@ def score(truth: dict, result: dict) -> Score:
         errors=errors,
         covered=covered,
         removed=removed(held_out) if one_answer else math.nan,
-        decoy=bool(verdict.get("decoys", {}).get("accepted")),
+        # of verdicts before version 2: "decoys"
+        negative_control=bool(verdict.get("negative_controls", verdict.get("decoys", {})).get("accepted")),
         region=region(truth["names"], verdict.get("where", [])) if one_answer and right else None,
         depends_rightly=depends_rightly(truth, verdict),
         character_closes=verdict["character"][0]["closed"]["held_out"]

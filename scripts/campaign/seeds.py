@@ -28,7 +28,7 @@ DEVELOPED_ON = (
     90127,
 )
 BLIND_UP_TO = {83477: "cf4c090"}
-"""Of seeds that were looked at with verdicts on a page: the last commit that was judged before."""
+"""Of seeds that were looked at with verdicts on a page: the last commit that was scored before."""
 
 
 def developed_on() -> str:

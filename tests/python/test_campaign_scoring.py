@@ -279,9 +279,9 @@ def test_the_clearest_region_is_judged(campaign):
 
 
 def test_a_decoy_that_could_be_named_counts(campaign):
-    said = verdict("none", decoys={"tested": 9, "accepted": True})
-    assert campaign.scoring.score(truth([], "none"), said).decoy
-    assert not campaign.scoring.score(truth([], "none"), verdict("none")).decoy
+    said = verdict("none", negative_controls={"tested": 9, "accepted": True})
+    assert campaign.scoring.score(truth([], "none"), said).negative_control
+    assert not campaign.scoring.score(truth([], "none"), verdict("none")).negative_control
 
 
 def test_removed_excess(campaign):

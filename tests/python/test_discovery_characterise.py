@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("library")
 
 @pytest.fixture(scope="module")
 def hide(source_dir, tmp_path_factory):
-    """Records and the sealed truth of a case without faults of the rig."""
+    """Records and the sealed truth of a case without imperfections of the rig."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(source_dir / "tests" / "generator"))
         patch.syspath_prepend(str(source_dir / "scripts"))
@@ -49,19 +49,21 @@ def ask(case: Path, **options) -> dict:
     return discover(case / "base.toml", training, [case / "held_out.csv"], Options(quick=True, **options))
 
 
-@pytest.mark.parametrize(("evidence", "beside", "faults", "foremost", "outcome"), [
+@pytest.mark.parametrize(("evidence", "beside", "imperfections", "best_of", "outcome"), [
     (106.5, 6.5, 0.0, "memory", "characterised"),
     # as far ahead as one of several names has to be
     (105.5, 6.5, 0.0, "memory", "named"),
     # a right name leaves nothing to it
     (106.5, 5.5, 0.0, "memory", "named"),
-    # or faults of the rig, of which it would explain a part
+    # or imperfections of the rig, of which it would explain a part
     (200.0, 16.5, 12.0, "memory", "named"),
     (200.0, 18.5, 12.0, "memory", "characterised"),
     # a function of the catalogue would do it as well, linearised as the hidden state is
     (106.5, 6.5, 0.0, "speed", "named"),
 ])  # fmt: skip
-def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, beside, faults, foremost, outcome):
+def test_a_name_has_to_hold_against_a_hidden_state(
+    monkeypatch, evidence, beside, imperfections, best_of, outcome
+):
     def one(variable: str, evidence: float = evidence) -> SimpleNamespace:
         return SimpleNamespace(hypothesis=SimpleNamespace(depends_on=(variable,)), evidence=evidence)
 
@@ -72,19 +74,19 @@ def test_a_name_has_to_hold_against_a_hidden_state(monkeypatch, evidence, beside
     decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
     monkeypatch.setattr(characterise, "_motions", lambda _, machine, told: (machine is fitted, None))
     monkeypatch.setattr(characterise, "memories", lambda _: ["memory"])
-    monkeypatch.setattr(characterise, "evidence_of_faults", lambda *_: faults)
+    monkeypatch.setattr(characterise, "evidence_of_imperfections", lambda *_: imperfections)
     monkeypatch.setattr(
         characterise,
         "_best",
         lambda named, held_out, variable: one("memory", beside if named else evidence),
     )
 
-    def characterised(bench, gap):
+    def characterised(context, gap):
         assert (gap.outcome, gap.accepted) == ("not-in-catalogue", [])
-        return Decision("characterised", [], [], [], [first], None, None, characters=[one(foremost)])
+        return Decision("characterised", [], [], [], [first], None, None, characters=[one(best_of)])
 
     monkeypatch.setattr(characterise, "characterised", characterised)
-    found = characterise.remembered(SimpleNamespace(options=Options()), decision)
+    found = characterise.hidden_state_tested(SimpleNamespace(options=Options()), decision)
     assert found.outcome == outcome
     assert bool(found.accepted) == (outcome == "named")
 

@@ -61,7 +61,7 @@ def said(generator, case, folder) -> set[str]:
 
 
 def test_an_asymmetry_of_dry_friction_needs_no_viscous_one(generator, tmp_path):
-    """Fitted with both, what the viscous part has of chance foretold badly: the truth was left out."""
+    """Fitted with both, what the viscous part has of chance predicted badly: the truth was left out."""
     base = {
         "stiffness": 89.8604,
         "coulomb": 0.4989,
@@ -100,7 +100,7 @@ def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path
     (51239, 48, "sensor_bias"),
 ])  # fmt: skip
 def test_names_of_one_motion_are_not_lost_in_other_minima(generator, tmp_path, seed, number, hidden):
-    """One name had found the motion, another was caught elsewhere or had a law more: the truth was out."""
+    """One name found the motion, another ended in a local minimum or had a law more: the truth was out."""
     from design import draw
 
     case = draw(seed, number)

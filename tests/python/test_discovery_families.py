@@ -254,7 +254,7 @@ def test_three_effects_are_found_one_by_one():
 
 
 def test_the_experiment_that_is_asked_for_settles_an_ambiguous_verdict():
-    """Drag too small to be foretold by the records there are; measured as asked, it is named."""
+    """Drag too small to be predicted by the records there are; measured as asked, it is named."""
     without = base()
     true = without.with_effect("quadratic_drag", {"coefficient": 0.0007})
     records = records_of(true)

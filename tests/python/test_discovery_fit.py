@@ -10,7 +10,7 @@ from scipy.signal import savgol_filter
 from separatrix.discovery.decision import decide as decide_module
 from separatrix.discovery.decision import partial as partial_module
 from separatrix.discovery.decision import rounds
-from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
@@ -169,10 +169,10 @@ def test_what_was_not_tested_is_in_the_order_of_the_catalogue(monkeypatch):
     monkeypatch.setattr(rounds, "signature", lambda *_: None)
     monkeypatch.setattr(rounds, "screen", lambda *_: None)
     monkeypatch.setattr(rounds, "choose", lambda *_: [])
-    bench = rounds.Bench(None, None, None, Options(candidates=tuple(reversed(names))))
+    context = rounds.SearchContext(None, None, None, Options(candidates=tuple(reversed(names))))
     problem = SimpleNamespace(free=[], in_force=False)
     base = SimpleNamespace(names=(), model=SimpleNamespace(parameters={}), problem=problem, fit=fits)
-    found = rounds.run_round(bench, base, None, 0, 1)
+    found = rounds.run_round(context, base, None, 0, 1)
     assert list(found.absent) == names
     assert found.absent["dahl"] == "the machine has no friction"
 
@@ -354,8 +354,8 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         fitted_now.append((one.names[-1], known is not None))
         return SimpleNamespace(names=one.names, fit=SimpleNamespace(converged=True), gain=1.0)
 
-    def judge_one(base, foretold, one, prediction):
-        return Judged(one, prediction, one.gain, 0.0, np.zeros(0), 0)
+    def judge_one(base, predicted, one, prediction):
+        return ScoredCandidate(one, prediction, one.gain, 0.0, np.zeros(0), 0)
 
     monkeypatch.setattr(
         rounds, "candidate_of", lambda model, free, names, name, _: SimpleNamespace(names=(*names, name))
@@ -365,10 +365,10 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     monkeypatch.setattr(rounds, "signature", lambda *_: SimpleNamespace())
     monkeypatch.setattr(rounds, "screen", lambda *_: seen)
     monkeypatch.setattr(rounds, "refit", fit_one)
-    monkeypatch.setattr(rounds, "judged", judge_one)
+    monkeypatch.setattr(rounds, "scored", judge_one)
     monkeypatch.setattr(rounds, "gain_over", lambda one, other: (one.gain - other.gain, None))
     monkeypatch.setattr(rounds, "_out_of_race", lambda *_: False)
-    monkeypatch.setattr(rounds, "_simplest", lambda bench, found, one: one)
+    monkeypatch.setattr(rounds, "_simplest", lambda context, found, one: one)
     for step in ("_carry_on", "_cross", "_fair"):
         monkeypatch.setattr(rounds, step, lambda *_: None)
     fits = SimpleNamespace(values=[], reduced_chi2=1.0, like_noise=lambda _: False)
@@ -378,15 +378,15 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         problem=SimpleNamespace(free=[], in_force=False),
         fit=fits,
     )
-    bench = rounds.Bench(None, None, None, Options(candidates=("dahl", "viscous")))
+    context = rounds.SearchContext(None, None, None, Options(candidates=("dahl", "viscous")))
     monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous"])
-    earlier = rounds.run_round(bench, base, None, 0, 1)
+    earlier = rounds.run_round(context, base, None, 0, 1)
     assert fitted_now == [("viscous", False)]
     fitted_now.clear()
     monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous", "dahl"])
     again = SimpleNamespace(**vars(base)) if renewed else base
-    found = rounds.run_round(bench, again, None, 0, 1, earlier, everything=True)
-    assert {one.name for one in found.judged} == {"dahl", "viscous"}
+    found = rounds.run_round(context, again, None, 0, 1, earlier, everything=True)
+    assert {one.name for one in found.scored} == {"dahl", "viscous"}
     assert fitted_now == ([("viscous", True), ("dahl", False)] if renewed else [("dahl", False)])
 
 
@@ -397,24 +397,24 @@ def test_the_noise_is_measured_again_where_several_effects_leave_nothing_else(mo
     single = SimpleNamespace(gates={"adequate": False, "detect": True, "stable": True})
     base = Fitted((), None, SimpleNamespace(), SimpleNamespace(values=None, starts=None), ())
 
-    def renewing(bench, found, at, known, everything=False):
+    def renewing(context, found, at, known, everything=False):
         settled.append(known)
         return found
 
     monkeypatch.setattr(
         decide_module,
         "run_round",
-        lambda bench, base, *_: SimpleNamespace(base=base, judged=[single], foretold=None),
+        lambda context, base, *_: SimpleNamespace(base=base, scored=[single], predicted=None),
     )
     monkeypatch.setattr(decide_module, "_renewing", renewing)
-    monkeypatch.setattr(decide_module, "_begun", lambda bench, found: SimpleNamespace(rounds=[found]))
+    monkeypatch.setattr(decide_module, "_begun", lambda context, found: SimpleNamespace(rounds=[found]))
     monkeypatch.setattr(decide_module, "_lead", lambda *_: (single, []))
     monkeypatch.setattr(decide_module, "_shaped", lambda *_: None)
     monkeypatch.setattr(decide_module, "with_more", lambda *_: (pair, [], next(closed)))
     monkeypatch.setattr(decide_module, "_noise_renewed", lambda *_: True)
     monkeypatch.setattr(decide_module, "minimise", lambda *_, **__: "fitted again")
-    monkeypatch.setattr(decide_module, "conclude", lambda bench, decision, *found: (decision, *found))
-    bench = SimpleNamespace(options=Options(quick=True), foretell=lambda _: None)
-    decision, best, rivals = decide_module.decide(bench, base)
+    monkeypatch.setattr(decide_module, "conclude", lambda context, decision, *found: (decision, *found))
+    context = SimpleNamespace(options=Options(quick=True), predict=lambda _: None)
+    decision, best, rivals = decide_module.decide(context, base)
     assert (best, rivals, settled) == (pair, [], [False, True])
     assert decision.rounds[0].base.fit == "fitted again"

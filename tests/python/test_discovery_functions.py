@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from separatrix.discovery.decision import decide, functions
-from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.options import Options
 
 
@@ -21,7 +21,7 @@ def test_a_form_that_its_function_refutes_leads_only_where_it_foretells_better(
 ):
     """The table is not clearly ahead: fitted and held-out records contradict each other."""
     form, table = (
-        Judged(SimpleNamespace(names=(name,)), None, 0.0, 0.0, np.zeros(0), 1)
+        ScoredCandidate(SimpleNamespace(names=(name,)), None, 0.0, 0.0, np.zeros(0), 1)
         for name in ("restitution_slope", "restitution_curve")
     )
     member = SimpleNamespace(family="restitution over impact speed")
@@ -29,10 +29,10 @@ def test_a_form_that_its_function_refutes_leads_only_where_it_foretells_better(
     function = SimpleNamespace(forms=refuted, member=member, gain=50.0)
     monkeypatch.setattr(functions, "best_table", lambda *_: iter([table]))
     monkeypatch.setattr(functions, "pass_gates", lambda _, one, *__: one.gates.update(detect=passes))
-    monkeypatch.setattr(functions, "judge_ceiling", lambda *_: None)
+    monkeypatch.setattr(functions, "score_ceiling", lambda *_: None)
     monkeypatch.setattr(functions, "clear_of", lambda *_: False)
     monkeypatch.setattr(functions, "lead", lambda *_: ahead)
-    monkeypatch.setattr(functions, "share_beside_faults", lambda *_: 1.0)
+    monkeypatch.setattr(functions, "share_with_imperfections", lambda *_: 1.0)
     found = SimpleNamespace(base=form.fitted, screened=SimpleNamespace(tests=1.0))
     decision = decide.Decision("named", [form], [], [], [found], None, None, function=function)
     given = functions._held_against_it(SimpleNamespace(options=Options()), decision)

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
-from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.misfit import foretold_chi2, refuted
 from separatrix.discovery.decision.partial import preferred
+from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.heldout import Prediction, _records_own, ahead, gained, gained_together
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.options import Options
@@ -29,22 +29,22 @@ def prediction(chi2, score, misfit):
     )
 
 
-def candidate(foretold, parameters, training):
+def candidate(predicted, parameters, training):
     """A candidate with nothing but what the choice needs."""
-    count = foretold.good.size
+    count = predicted.good.size
     fit = SimpleNamespace(
-        reduced_chi2=foretold.misfit,
+        reduced_chi2=predicted.misfit,
         chi2=np.full(count, -2 * training / count),
-        good=foretold.good,
-        counts=foretold.fit.counts,
+        good=predicted.good,
+        counts=predicted.fit.counts,
         at_bound=np.zeros(parameters, bool),
-        evaluation=SimpleNamespace(failed=~foretold.good, steady=foretold.good),
+        evaluation=SimpleNamespace(failed=~predicted.good, steady=predicted.good),
     )
     free = [SimpleNamespace(record=None, positive=True) for _ in range(parameters)]
     fitted = SimpleNamespace(fit=fit, added=tuple(range(parameters)), problem=SimpleNamespace(free=free))
     # every segment tells as much
-    foretold.fit.reduced = SimpleNamespace(matrix=np.tile(np.eye(parameters), (count, 1, 1)))
-    return Judged(fitted, foretold, training, 0.0, np.zeros(count), parameters)
+    predicted.fit.reduced = SimpleNamespace(matrix=np.tile(np.eye(parameters), (count, 1, 1)))
+    return ScoredCandidate(fitted, predicted, training, 0.0, np.zeros(count), parameters)
 
 
 def test_of_two_wrong_machines_the_one_with_smaller_errors_wins_however_uncertain_the_other():
@@ -171,12 +171,12 @@ def test_a_machine_that_leaves_noise_in_training_is_refuted_by_a_held_out_record
     far = told(2238 * noise, 0.0, 1.0, 0.1)
     assert refuted(far, fitted, options)
     assert foretold_chi2(far, fitted) == pytest.approx(2238)
-    # a few segments may be caught in a wrong minimum
-    caught = noise.copy()
-    caught[:3] *= 2238
-    assert not refuted(told(caught, 0.0, 1.0, 0.1), fitted, options)
-    caught[:6] *= 2238
-    assert refuted(told(caught, 0.0, 1.0, 0.1), fitted, options)
+    # a few segments may be in a wrong minimum
+    in_local_minimum = noise.copy()
+    in_local_minimum[:3] *= 2238
+    assert not refuted(told(in_local_minimum, 0.0, 1.0, 0.1), fitted, options)
+    in_local_minimum[:6] *= 2238
+    assert refuted(told(in_local_minimum, 0.0, 1.0, 0.1), fitted, options)
     # noise that is larger than stated in training is so here
     assert not refuted(told(3 * noise, 0.0, 1.0, 0.1), SimpleNamespace(reduced_chi2=1.7), options)
 

@@ -82,14 +82,14 @@ def test_a_machine_without_contacts_has_no_impacts_that_are_not_steady():
 
 @pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])
 def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, training, held_out, outcome):
-    # without faults of a rig
+    # without imperfections of a rig
     monkeypatch.setattr(decide, "cleaned_prediction", lambda base, told: told.fit)
-    bench = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
+    context = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
     first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
-    foretold = SimpleNamespace(problem=None, fit=fit(1, held_out))
+    predicted = SimpleNamespace(problem=None, fit=fit(1, held_out))
     gap = SimpleNamespace(p=0.5, fit=first.base.fit)
-    decision = Decision("none", [], [], [], [first], gap, foretold)
-    assert _without_name(bench, decision).outcome == (outcome or "not-in-catalogue")
+    decision = Decision("none", [], [], [], [first], gap, predicted)
+    assert _without_name(context, decision).outcome == (outcome or "not-in-catalogue")
     assert bool(decision.reasons) == (not outcome)
 
 

@@ -40,7 +40,7 @@ def write(path: Path, t: np.ndarray, x: np.ndarray, head: list[str] = HEAD) -> P
 
 
 def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """A record with one fault."""
+    """A record with one imperfection."""
     t, x = rows()
     head = list(HEAD)
     if kind == "time":
@@ -138,23 +138,23 @@ def test_records_get_names_of_their_own(tmp_path):
     assert [one.name for one in records] == ["a", "a_3", "a_2", "b", "a_4"]
 
 
-@pytest.mark.parametrize("fault", ["nan", "other machine", "coarse", "no such file"])
-def test_nothing_is_left_behind(tmp_path, library, capsys, fault):
+@pytest.mark.parametrize("imperfection", ["nan", "other machine", "coarse", "no such file"])
+def test_nothing_is_left_behind(tmp_path, library, capsys, imperfection):
     (tmp_path / "base.toml").write_text(CASE)
     good = write(tmp_path / "good.csv", *rows())
     t, x = rows()
-    if fault == "nan":
+    if imperfection == "nan":
         x[3] = np.nan
-    elif fault == "other machine":
+    elif imperfection == "other machine":
         x *= 1000
-    elif fault == "coarse":
+    elif imperfection == "coarse":
         t, x = np.arange(400) * 0.1, x
     bad = tmp_path / "bad.csv"
-    if fault != "no such file":
+    if imperfection != "no such file":
         write(bad, t, x, [line for line in HEAD if "rate" not in line])
     before = listing(tmp_path)
     arguments = [tmp_path / "base.toml", good, bad, "--out", tmp_path / "out", "-q"]
-    assert main([str(word) for word in arguments]) == (66 if fault == "no such file" else 65)
+    assert main([str(word) for word in arguments]) == (66 if imperfection == "no such file" else 65)
     assert "separatrix-discover: " in capsys.readouterr().err
     assert listing(tmp_path) == before
 

@@ -9,7 +9,7 @@ import pytest
 from separatrix.discovery.fitting import data as data_module
 from separatrix.discovery.fitting import refit
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.machine import FAULT_OF_RIG, Free
+from separatrix.discovery.fitting.machine import IMPERFECTION, Free
 from separatrix.discovery.fitting.refit import Fitted
 
 FREE = [Free("restoring.stiffness", 9.0), Free("effect.viscous.damping", 0.5, lower=0.0)]
@@ -45,9 +45,11 @@ def test_a_candidate_is_fitted_from_the_base_before_it_is_worse(
 
 
 def test_a_motion_is_imitated_without_faults_of_the_rig_and_followed_with_them(monkeypatch):
-    """The motion of the other name is that of its machine: faults that records showed are not in it."""
-    fault = Free(f"{FAULT_OF_RIG}curve_2", 0.0, -3.0, 3.0, record=0)
-    free = [FREE[0], fault, FREE[1]]
+    """The motion of the other name is that of its machine: imperfections that records showed are not in
+    it.
+    """
+    imperfection = Free(f"{IMPERFECTION}curve_2", 0.0, -3.0, 3.0, record=0)
+    free = [FREE[0], imperfection, FREE[1]]
     problem = SimpleNamespace(free=free, evaluate=lambda *_, **__: None, imitating=lambda _: "imitated")
     other = Fitted(("coulomb",), None, problem, fit([8.0, 1.5, 0.4], 100.0), (2,))
     one = Fitted(("viscous",), None, problem, fit([9.0, 0.0, 0.5], 300.0), (2,))

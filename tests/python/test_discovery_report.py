@@ -21,7 +21,7 @@ from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import comparison
 from separatrix.discovery.report.document import write_report
-from separatrix.discovery.report.story import sections
+from separatrix.discovery.report.verdict_sections import sections
 from separatrix.discovery.workflow import investigate
 from separatrix.library import Model
 
@@ -292,7 +292,7 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
 def test_where_nothing_is_missing_no_region_misses_a_force(report: tuple) -> None:
     told, page, _ = report
     nothing = told["outcome"] == "none"
-    assert ("what follows is what noise and small faults of a rig leave" in page.text) == nothing
+    assert ("what follows is what noise and small imperfections of a rig leave" in page.text) == nothing
     assert any(line.startswith("  where:") for line in summary(told)) != nothing
 
 

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small faults of a rig explain what they cause, and nothing that is larger than they are."""
+"""Small imperfections of a rig explain what they cause, and nothing that is larger than they are."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.decision.beside_faults import decide_beside_faults, in_words
 from separatrix.discovery.decision.decide import decide
-from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.with_imperfections import decide_with_imperfections, in_words
 from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import ceiling
@@ -20,13 +20,13 @@ from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.rig import (
     Contest,
-    beside_faults,
     cleaned,
     cleaned_prediction,
-    evidence_of_faults,
-    faults_of,
-    share_beside_faults,
-    shares_beside_faults,
+    evidence_of_imperfections,
+    imperfections_of,
+    share_with_imperfections,
+    shares_with_imperfections,
+    with_imperfections,
 )
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -89,25 +89,25 @@ def test_an_effect_is_its_own_as_far_as_it_is_larger_than_faults_of_a_rig():
     shares = []
     for drag in (0.02, 0.05, 0.3):
         base, true = fitted_base(drag=drag, curved=0.0)
-        shares.append(share_beside_faults(with_drag(base, true), base))
+        shares.append(share_with_imperfections(with_drag(base, true), base))
         assert ceiling(base.problem, base.fit, 1.0).p < 1e-6 or drag < 0.05
     assert shares == sorted(shares)
     assert shares[-1] > 0.8
 
 
-@pytest.mark.parametrize(("gain", "faults", "beside", "lead"), [
-    # nothing speaks for faults: all of the gain is evidence
+@pytest.mark.parametrize(("gain", "imperfections", "beside", "lead"), [
+    # nothing speaks for imperfections: all of the gain is evidence
     (20.0, (-12.0, -5.0, -2.0), (1.0, 2.0, 5.0), 20.0),
-    # one effect says with less what sixteen faults say too
+    # one effect says with less what sixteen imperfections say too
     (150.0, (124.0, 120.0, 97.0), (9.0, 20.0, 47.0), 26.0),
-    # the rig has faults, which say nearly all that the effect says
+    # the rig has imperfections, which say nearly all that the effect says
     (11.0, (33.0, 30.0, 21.0), (0.3, 0.8, 2.8), 0.3),
 ])  # fmt: skip
-def test_a_rig_has_faults_or_it_has_none(gain, faults, beside, lead):
-    """An effect has to beat the better of the two, and may have faults beside it itself."""
-    contest = Contest(gain, np.array(faults), np.array(beside))
+def test_a_rig_has_faults_or_it_has_none(gain, imperfections, beside, lead):
+    """An effect has to beat the better of the two, and may have imperfections beside it itself."""
+    contest = Contest(gain, np.array(imperfections), np.array(beside))
     assert contest.lead == pytest.approx(lead)
-    # that a rig has faults is known from all of its records
+    # that a rig has imperfections is known from all of its records
     clean = Contest(5.0, np.full(3, -4.0), np.full(3, 0.1))
     more = (contest + clean).lead - contest.lead
     assert more < 0.2 if lead < 1 else more >= 5.0
@@ -115,7 +115,7 @@ def test_a_rig_has_faults_or_it_has_none(gain, faults, beside, lead):
 
 def test_what_is_a_fault_of_the_rig_is_no_effect():
     base, _ = fitted_base(drag=0.0, curved=1e-3)
-    assert share_beside_faults(replace(base, fit=cleaned(base.problem, base.fit)), base) < 0.3
+    assert share_with_imperfections(replace(base, fit=cleaned(base.problem, base.fit)), base) < 0.3
 
 
 def three_records(curved: tuple[float, float, float], drag: float = 0.0) -> tuple[Model, list]:
@@ -136,7 +136,7 @@ def three_records(curved: tuple[float, float, float], drag: float = 0.0) -> tupl
 
 
 def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_number():
-    """Neither where it was fitted nor foretold; the intervals hold what faults have moved."""
+    """Neither where it was fitted nor predicted; the intervals hold what imperfections have moved."""
     base, prepared = three_records((1e-3, -1e-3, 8e-4))
     fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
     assert fitted.fit.sample_chi2 > 1.5
@@ -147,7 +147,7 @@ def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_nu
     assert told.sample_chi2 > 1.5
     assert cleaned(told.problem, told.fit).reduced_chi2 > cleaned_prediction(fitted, told).reduced_chi2
     assert cleaned_prediction(fitted, told).sample_chi2 < 1.15
-    beside = beside_faults(fitted.problem, fitted.fit)
+    beside = with_imperfections(fitted.problem, fitted.fit)
     off, narrow = [], []
     for i, one in enumerate(fitted.problem.free):
         if one.record is None:
@@ -171,7 +171,7 @@ def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_expla
         predict(held_out, one.model, one.problem.free, Known(one.fit.values, one.covariance, one.unseen))
         for one in (effect, without)
     ]
-    _, share = shares_beside_faults((effect, without), tuple(told))
+    _, share = shares_with_imperfections((effect, without), tuple(told))
     assert share > 0.6 if drag else share < 0.2
 
 
@@ -181,7 +181,7 @@ def test_the_evidence_of_faults_of_a_rig_is_that_of_all_records(curved):
     fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
     known = Known(fitted.fit.values, fitted.covariance, fitted.unseen)
     told = predict(gather(prepared[2:], 1.0, None), base, fitted.problem.free, known)
-    evidence = evidence_of_faults(fitted, told)
+    evidence = evidence_of_imperfections(fitted, told)
     assert evidence > 100 if curved else evidence < 3
 
 
@@ -200,36 +200,38 @@ def test_whitened_columns_come_back_in_their_units(memory):
 def test_faults_that_are_fitted_are_those_that_are_weighed():
     """The curve of a sensor about the middle of its record, over its swing, in halves of a thousandth."""
     base, _ = fitted_base(drag=0.0, curved=1e-3)
-    tables = faults_of(base.problem, base.fit, 10.0)
+    tables = imperfections_of(base.problem, base.fit, 10.0)
     assert len(tables) == 14
     followed = base.problem.segments.inside & base.fit.good[:, None]
     x = base.problem.prepared[0].record.x
     u = (base.fit.evaluation.x - x.mean()) / x.std()
-    square = tables["nuisance:fault_of_rig:curve_2", 0][:, 0]
+    square = tables["nuisance:imperfection_of_rig:curve_2", 0][:, 0]
     assert square[followed] == pytest.approx((5e-4 * x.std() * u**2)[followed], rel=1e-9)
     # harmonics have one size for all records, whatever their motion
-    twice = faults_of(base.problem, base.fit, 20.0)["nuisance:fault_of_rig:sine_2", None]
-    assert twice == pytest.approx(2 * tables["nuisance:fault_of_rig:sine_2", None], rel=1e-12)
+    twice = imperfections_of(base.problem, base.fit, 20.0)["nuisance:imperfection_of_rig:sine_2", None]
+    assert twice == pytest.approx(2 * tables["nuisance:imperfection_of_rig:sine_2", None], rel=1e-12)
     assert np.abs(twice).max() > 0
 
 
-def bench_of(curved: tuple[float, float, float], drag: float) -> tuple[Bench, Fitted]:
+def context_of(curved: tuple[float, float, float], drag: float) -> tuple[SearchContext, Fitted]:
     """What a search needs, on the machine without drag fitted to two records."""
     base, prepared = three_records(curved, drag)
     training, held_out = gather(prepared[:2], 1.0, None), gather(prepared[2:], 1.0, None)
     options = Options(candidates=("quadratic_drag", "cubic_spring", "offset_force"), most_effects=1)
-    return Bench(training, held_out, scales_of(training, base), options), fit_base(training, base, 1.0)
+    return SearchContext(training, held_out, scales_of(training, base), options), fit_base(
+        training, base, 1.0
+    )
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.008])
 def test_an_effect_that_faults_hide_is_named_beside_them(drag):
     """They explain many times as much as it does; without it they are all there is."""
-    bench, fitted = bench_of((1.2e-3, -1.2e-3, 1.2e-3), drag)
-    assert decide(bench, fitted).outcome != "named"
-    noise = [(one.sigma, one.memory) for one in bench.training.prepared]
-    beside, decision = decide_beside_faults(bench, fitted)
-    assert [(one.sigma, one.memory) for one in bench.training.prepared] == noise
-    assert (beside is bench) == (not drag)
+    context, fitted = context_of((1.2e-3, -1.2e-3, 1.2e-3), drag)
+    assert decide(context, fitted).outcome != "named"
+    noise = [(one.sigma, one.memory) for one in context.training.prepared]
+    beside, decision = decide_with_imperfections(context, fitted)
+    assert [(one.sigma, one.memory) for one in context.training.prepared] == noise
+    assert (beside is context) == (not drag)
     assert decision.outcome == ("named" if drag else "none")
     if drag:
         (one,) = decision.accepted
@@ -239,7 +241,7 @@ def test_an_effect_that_faults_hide_is_named_beside_them(drag):
         error = np.sqrt(one.fitted.covariance[place, place])
         assert abs(values[place] - drag) < 4 * error
         sizes = {(known.path, known.record): value for known, value in zip(free, values, strict=True)}
-        squares = [sizes["nuisance:fault_of_rig:curve_2", record] for record in (0, 1)]
+        squares = [sizes["nuisance:imperfection_of_rig:curve_2", record] for record in (0, 1)]
         assert squares == pytest.approx([2.4, -2.4], abs=0.6)
         # its own of the held-out record; those of the drive are known from training
         told = one.prediction.problem.free
@@ -254,7 +256,7 @@ def test_an_effect_that_faults_hide_is_named_beside_them(drag):
 
 def test_a_fault_that_is_larger_than_faults_are_makes_no_name():
     """A sensor that is curved by four standard deviations: what three leave over is no friction."""
-    bench, fitted = bench_of((2e-3, 2e-3, 2e-3), 0.0)
-    beside, decision = decide_beside_faults(bench, fitted)
-    assert beside is bench
+    context, fitted = context_of((2e-3, 2e-3, 2e-3), 0.0)
+    beside, decision = decide_with_imperfections(context, fitted)
+    assert beside is context
     assert decision.outcome != "named"

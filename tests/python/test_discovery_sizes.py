@@ -10,8 +10,15 @@ from program import CASE
 from scipy.signal import lfilter
 from scipy.stats import chi2
 from separatrix.discovery import Options, discover
-from separatrix.discovery.decision.judge import LARGER_NOISE, LITTLE, NOISE, Judged, adequate, sizeable
 from separatrix.discovery.decision.remains import Remains, share_text
+from separatrix.discovery.decision.scoring import (
+    LARGER_NOISE,
+    LITTLE,
+    NOISE,
+    ScoredCandidate,
+    adequate,
+    sizeable,
+)
 from separatrix.discovery.decision.verdict import _hump, _of_accepted
 from separatrix.discovery.fitting.ceiling import Ceiling, Family
 from separatrix.discovery.fitting.machine import drive_nuisances
@@ -90,12 +97,14 @@ def test_noise_with_memory_is_no_gap_at_any_rate(rate):
         assert one["after"] == pytest.approx(1, abs=0.1)
 
 
-def candidate(training: float, left: float, samples: float, p: float = 0.0) -> Judged:
+def candidate(training: float, left: float, samples: float, p: float = 0.0) -> ScoredCandidate:
     """An effect that gained so much and leaves so much in chi^2, by chance with a probability of `p`."""
     fit = SimpleNamespace(samples=samples, excess=left, sample_chi2=1 + left / samples)
     prediction = SimpleNamespace(excess=left)
     problem = SimpleNamespace(prepared=[])
-    one = Judged(SimpleNamespace(fit=fit, problem=problem), prediction, training, training, np.zeros(0), 1)
+    one = ScoredCandidate(
+        SimpleNamespace(fit=fit, problem=problem), prediction, training, training, np.zeros(0), 1
+    )
     one.ceiling = SimpleNamespace(p=p, closable=left if p < 0.01 else 0.0, fit=fit)
     return one
 
@@ -144,14 +153,14 @@ def test_what_a_force_depends_on_is_what_explains_most(speed, place, pieces, mos
 def test_a_law_that_leaves_more_than_noise_says_that_its_errors_count_noise_alone():
     def said(leaves: str, beside: bool) -> list[str]:
         left = SimpleNamespace(fit=SimpleNamespace(sample_chi2=1.44))
-        told = SimpleNamespace(beside_faults=beside)
+        told = SimpleNamespace(with_imperfections=beside)
         return _of_accepted(SimpleNamespace(leaves=leaves, name="viscous", ceiling=left, prediction=told))
 
     assert said(NOISE, False) == []
     assert "errors of parameters count noise alone" in said(LITTLE, False)[0]
     assert "1.2 times as large" in said(LARGER_NOISE, False)[0]
     (note,) = said(NOISE, True)
-    assert "beside small faults of the rig" in note
+    assert "beside small imperfections of the rig" in note
 
 
 def test_a_function_is_told_with_its_hump():

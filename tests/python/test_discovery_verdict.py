@@ -134,7 +134,9 @@ def test_a_part_is_named_where_more_is_missing(separatrix, tmp_path):
 
 
 def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so(monkeypatch):
-    monkeypatch.setattr(verdict, "beside_faults", lambda *_: SimpleNamespace(errors=np.array([0.0, 0.5])))
+    monkeypatch.setattr(
+        verdict, "with_imperfections", lambda *_: SimpleNamespace(errors=np.array([0.0, 0.5]))
+    )
     free = [Free("contact.restitution", 1.0, 0.0, 1.0), Free("restoring.stiffness", 89.0)]
     fitted = SimpleNamespace(
         problem=SimpleNamespace(free=free),
@@ -168,7 +170,7 @@ def test_a_fit_worse_than_the_machine_that_it_contains_is_not_called_converged()
     fitted = SimpleNamespace(
         names=("viscous",), fit=fit, problem=SimpleNamespace(free=free), added=(0,), tries=1
     )
-    judged = SimpleNamespace(name="viscous", fitted=fitted, held_out=0.0, evidence=0.0, faults=None)
-    told = {gain: _candidate(SimpleNamespace(**vars(judged), training=gain)) for gain in (-0.5, -400.0)}
+    scored = SimpleNamespace(name="viscous", fitted=fitted, held_out=0.0, evidence=0.0, imperfections=None)
+    told = {gain: _candidate(SimpleNamespace(**vars(scored), training=gain)) for gain in (-0.5, -400.0)}
     assert told[-0.5]["converged"]
     assert not told[-400.0]["converged"]

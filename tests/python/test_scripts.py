@@ -87,7 +87,9 @@ def test_quickstart_does_nothing_on_an_option(source_dir, option, code):
 
 
 def test_only_the_integrator_asks_what_kind_of_machine_it_moves(source_dir):
-    """`section` is the interface to any machine; variations, lanes, segments of coordinates have their own."""
+    """`section` is the interface to any machine; variations, lanes, segments of coordinates have their
+    own.
+    """
     asks = re.compile(r"%\s*(pair|multibody)\b")
     sources = (source_dir / "src").glob("*/*.f90")
     asking = ("integrator", "variation", "modes")

@@ -155,7 +155,7 @@ def summary(verdict: dict) -> list[str]:
         )
     lines += [f"  {one['text']}" for one in verdict["remains"]]
     if verdict["outcome"] != "none":
-        # of no gap it is what noise and small faults of the rig leave
+        # of no gap it is what noise and small imperfections of the rig leave
         lines += [f"  where: {one['text']}" for one in verdict["where"][:4]]
     lines += [f"  {reason}" for reason in verdict["reasons"]]
     if verdict["separating_experiment"]:

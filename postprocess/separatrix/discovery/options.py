@@ -58,7 +58,8 @@ class Options:
     # p value of what is left below which no share is enough
     adequate_p: float = 1e-4
     # root mean square over the noise of a sample below which what a flexible force would explain is no gap,
-    # and below which nothing is named: with samples enough everything is significant, faults of a rig too
+    # and below which nothing is named: with samples enough everything is significant, imperfections of a rig
+    # too
     least_gap: float = 0.05
     least_effect: float = 0.02
     # share of the gap, in training and on held-out records, that may remain of one that is closed but for so

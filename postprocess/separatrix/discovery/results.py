@@ -169,12 +169,12 @@ def machine_values(fitted: Fitted) -> dict[str, float]:
 
 def write_details(path: Path, findings: Findings) -> None:
     """Numbers behind the figures: see docs/discovery-guide.md for the layout."""
-    decision, bench = findings.decision, findings.bench
+    decision, context = findings.decision, findings.context
     final = decision.corrected
     with h5py.File(path, "w") as file:
         units = units_of(findings.base.model.parameters)
         file.attrs["position_unit"], file.attrs["velocity_unit"] = units.position, units.velocity
-        file.attrs["force_unit"], file.attrs["compared"] = units.force, bench.options.compare
+        file.attrs["force_unit"], file.attrs["compared"] = units.force, context.options.compare
         for one in findings.maps:
             group = file.create_group(f"where/{one.name}")
             group.attrs["unit"], group.attrs["force_unit"] = one.unit, one.force_unit
@@ -187,15 +187,15 @@ def write_details(path: Path, findings: Findings) -> None:
         file["confusability/names"] = np.array(screened.names, dtype=h5py.string_dtype())
         file["confusability/matrix"] = screened.cosines
         _write_fits(file, "training", findings.base, final.fitted if final else None)
-        if decision.foretold is not None:
-            before = decision.foretold
+        if decision.predicted is not None:
+            before = decision.predicted
             after = final.prediction if final else None
             _write_fits(file, "held_out", before, after)
-        for data in (bench.training, bench.held_out):
+        for data in (context.training, context.held_out):
             for prepared, smoothed in zip(data.prepared, data.smoothed, strict=True) if data else ():
                 group = file.create_group(f"records/{prepared.record.name}")
                 group.attrs["sigma"] = prepared.sigma
-                group.attrs["held_out"] = data is bench.held_out
+                group.attrs["held_out"] = data is context.held_out
                 group["t"], group["x"] = prepared.record.t, prepared.record.x
                 if isinstance(prepared, SensedPrepared):
                     # no motion of one body: what each sensor shows

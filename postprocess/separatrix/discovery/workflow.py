@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from separatrix.discovery.decision.added import with_law
-from separatrix.discovery.decision.beside_faults import decide_beside_faults
-from separatrix.discovery.decision.characterise import characterised, remembered
+from separatrix.discovery.decision.characterise import characterised, hidden_state_tested
 from separatrix.discovery.decision.functions import with_function
 from separatrix.discovery.decision.partial import decide_in_part, nearest
-from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.verdict import Findings, verdict_of
+from separatrix.discovery.decision.with_imperfections import decide_with_imperfections
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.fitting.data import Data, fit_stages, gather, scales_of
 from separatrix.discovery.fitting.joint_effects import names_for
@@ -67,7 +67,7 @@ def investigate(
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[_prepared(one, model, still, options) for one in group] for group in (training, held_out)]
     data = _gathered(prepared[0], model, options)
-    foretold = _gathered(prepared[1], model, options) if held_out else None
+    predicted = _gathered(prepared[1], model, options) if held_out else None
     scales = None if is_structure(model) else scales_of(data, model)
     options.progress("fitting the base machine", 0.05)
     fitted = fit_base(data, model, scales.mass if scales else 1.0)
@@ -75,20 +75,20 @@ def investigate(
         raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
     data.base_starts = fitted.fit.starts
     scales = scales or place_scales(fitted.problem, fitted.fit)
-    if foretold is not None:
-        _prepare_held_out(foretold, data, model, fitted, scales.mass)
-    bench = Bench(data, foretold, scales, options)
+    if predicted is not None:
+        _prepare_held_out(predicted, data, model, fitted, scales.mass)
+    context = SearchContext(data, predicted, scales, options)
     if options.partial:
-        decision = decide_in_part(bench, fitted)
+        decision = decide_in_part(context, fitted)
     else:
-        bench, decision = decide_beside_faults(bench, fitted)
-        decision = remembered(bench, decision)
-        decision.reasons += nearest(bench, decision)
+        context, decision = decide_with_imperfections(context, fitted)
+        decision = hidden_state_tested(context, decision)
+        decision.reasons += nearest(context, decision)
         options.progress("asking what the rest of the gap depends on", 0.9)
-        decision = with_law(bench, characterised(bench, decision))
-    decision = with_function(bench, decision)
+        decision = with_law(context, characterised(context, decision))
+    decision = with_function(context, decision)
     # its noise may have been measured again
-    findings = Findings(bench, decision.rounds[0].base, decision, chosen)
+    findings = Findings(context, decision.rounds[0].base, decision, chosen)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings
@@ -180,7 +180,7 @@ def _split(
 
 
 def _all_different(records: list[Record]) -> None:
-    """Refuse a record that is given twice: it would count twice, or foretell itself."""
+    """Refuse a record that is given twice: it would count twice, or predict itself."""
     for place, one in enumerate(records):
         for other in records[:place]:
             if _same(one, other):

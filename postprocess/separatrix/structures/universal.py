@@ -46,8 +46,8 @@ def _factors(sets: Sequence[Mapping]) -> tuple[float, float]:
     units = units_of(sets)
     if units is None:
         return 1.0, 1.0
-    if units.fault:
-        raise SeparatrixError(units.fault)
+    if units.problem:
+        raise SeparatrixError(units.problem)
     return units.length, units.force
 
 

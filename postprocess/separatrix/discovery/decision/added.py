@@ -7,22 +7,22 @@ from dataclasses import replace
 from separatrix.discovery.decision.characterise import Character
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.flexible import best_table
-from separatrix.discovery.decision.judge import Judged
 from separatrix.discovery.decision.remains import closed_share
-from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import fits_machine
 from separatrix.discovery.fitting.members import MEMBERS
 
 
-def with_law(bench: Bench, decision: Decision) -> Decision:
+def with_law(context: SearchContext, decision: Decision) -> Decision:
     """The decision with what was characterised as a table, or with the reason why the simulator has none.
 
     The table must close as much of the gap as what is characterised must, fitted and on held-out records.
     """
     if decision.suspected is not None:
-        found = _law(bench, decision, decision.suspected)
-        if not isinstance(found, Judged):
+        found = _law(context, decision, decision.suspected)
+        if not isinstance(found, ScoredCandidate):
             return decision
         return replace(decision, outcome="characterised", characters=[decision.suspected], added=found)
     if decision.outcome != "characterised":
@@ -31,14 +31,14 @@ def with_law(bench: Bench, decision: Decision) -> Decision:
         return replace(decision, not_added="nothing is added to the case: tables are laws of one body")
     reasons = []
     for character in decision.characters:
-        found = _law(bench, decision, character)
-        if isinstance(found, Judged):
+        found = _law(context, decision, character)
+        if isinstance(found, ScoredCandidate):
             return replace(decision, added=found, not_added="")
         reasons.append(found)
     return replace(decision, not_added=f"nothing is added to the case: {'; '.join(reasons)}")
 
 
-def _law(bench: Bench, decision: Decision, character: Character) -> Judged | str:
+def _law(context: SearchContext, decision: Decision, character: Character) -> ScoredCandidate | str:
     """The table that a character is, fitted; or why there is none."""
     base, depends_on = decision.rounds[0].base, character.hypothesis.depends_on
     what = " and ".join(depends_on)
@@ -48,14 +48,14 @@ def _law(bench: Bench, decision: Decision, character: Character) -> Judged | str
     member = next((one for one in members if fits_machine(one, base.model)), None)
     if member is None:
         return f"this machine has no place for effect.{members[0].effect}, a force that depends on {what}"
-    best = next(best_table(bench, decision.rounds[0], member, strict=False), None)
+    best = next(best_table(context, decision.rounds[0], member, strict=False), None)
     if best is None:
         return f"effect.{member.effect} could not be fitted to these records"
     shares = [closed_share(base.fit, best.fitted.fit)]
     if best.prediction is not None:
-        shares.append(closed_share(decision.foretold, best.prediction))
+        shares.append(closed_share(decision.predicted, best.prediction))
     lowest = min((share for share in shares if share is not None), default=0.0)
-    if lowest <= bench.options.characterised:
+    if lowest <= context.options.characterised:
         return f"effect.{member.effect}, over {member.variable}, closes only {100 * lowest:.0f} % of the gap"
     return best
 

@@ -3,7 +3,7 @@
 """What is known of a gap that no effect of the catalogue closes: on what the missing force depends.
 
 Hypotheses are fitted to what the base machine leaves over in training, linearised, together with the
-parameters of the machine; then they foretell the held-out records. No hypothesis is a name: nothing is added
+parameters of the machine; then they predict the held-out records. No hypothesis is a name: nothing is added
 to the machine.
 """
 
@@ -14,13 +14,13 @@ import numpy as np
 from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, memories, motion_of
 from separatrix.discovery.decision.joint_hypotheses import hypotheses_at, motion_at
-from separatrix.discovery.decision.judge import family_wise
-from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.scoring import family_wise
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import evidence_of_faults
+from separatrix.discovery.fitting.rig import evidence_of_imperfections
 from separatrix.discovery.fitting.sensed import SensedData
 
 # least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
@@ -80,78 +80,78 @@ class Character:
         }
 
 
-def characterised(bench: Bench, decision: Decision) -> Decision:
+def characterised(context: SearchContext, decision: Decision) -> Decision:
     """The decision with what is known of a gap without a name; as it was where nothing is known for sure."""
-    base, foretold = decision.rounds[0].base, decision.foretold
-    if decision.outcome != "not-in-catalogue" or foretold is None or foretold.fit.excess <= 0:
+    base, predicted = decision.rounds[0].base, decision.predicted
+    if decision.outcome != "not-in-catalogue" or predicted is None or predicted.fit.excess <= 0:
         return decision
     if isinstance(base.problem, CoordinateProblem):
-        training, held_out = motion_at(base, bench.training), motion_at(foretold, bench.held_out)
+        training, held_out = motion_at(base, context.training), motion_at(predicted, context.held_out)
         tried = hypotheses_at(training)
     else:
-        training, held_out = _motions(bench, base, foretold)
+        training, held_out = _motions(context, base, predicted)
         tried = hypotheses(training)
     found = [_best(training, held_out, one) for one in tried]
     best = max(found, key=lambda one: one.evidence)
-    if not _known(best, bench):
-        return replace(decision, suspected=best if _likely(best, bench) else None)
+    if not _known(best, context):
+        return replace(decision, suspected=best if _likely(best, context) else None)
     others: dict[tuple[str, ...], Character] = {}
     for one in sorted(found, key=lambda one: -one.evidence):
-        close = one.evidence > best.evidence - bench.options.separation * _left(best, base.fit)
+        close = one.evidence > best.evidence - context.options.separation * _left(best, base.fit)
         if (close or _akin(one, best)) and one.hypothesis.depends_on != best.hypothesis.depends_on:
             others.setdefault(one.hypothesis.depends_on, one)
     return replace(decision, outcome="characterised", characters=[best, *others.values()])
 
 
-def remembered(bench: Bench, decision: Decision) -> Decision:
+def hidden_state_tested(context: SearchContext, decision: Decision) -> Decision:
     """The decision without its names where a hidden state explains clearly more than they do.
 
     It is no effect of the catalogue, and what it does a function of speed, place or phase does in part. A
-    right name leaves nothing to it: it has to explain more beside the names too, and than faults of a rig.
-    """
-    base, foretold = decision.rounds[0].base, decision.foretold
-    if not decision.accepted or foretold is None or foretold.fit.excess <= 0:
+    right name leaves nothing to it: it has to explain more beside the names too, and than imperfections of a
+    rig."""
+    base, predicted = decision.rounds[0].base, decision.predicted
+    if not decision.accepted or predicted is None or predicted.fit.excess <= 0:
         return decision
     name = decision.accepted[0]
-    if bench.options.quick or isinstance(base.problem, CoordinateProblem) or name.prediction is None:
+    if context.options.quick or isinstance(base.problem, CoordinateProblem) or name.prediction is None:
         return decision
-    training, held_out = _motions(bench, base, foretold)
+    training, held_out = _motions(context, base, predicted)
     best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
-    faults = evidence_of_faults(name.fitted, name.prediction)
-    least = bench.options.needed * bench.options.separation
-    lead = best.evidence - name.own_evidence / max(1.0, name.fitted.fit.reduced_chi2) - faults
+    imperfections = evidence_of_imperfections(name.fitted, name.prediction)
+    least = context.options.needed * context.options.separation
+    lead = best.evidence - name.own_evidence / max(1.0, name.fitted.fit.reduced_chi2) - imperfections
     if lead < least:
         return decision
-    beside = _best(*_motions(bench, name.fitted, name.prediction), best.hypothesis)
-    if beside.evidence - faults < least:
+    beside = _best(*_motions(context, name.fitted, name.prediction), best.hypothesis)
+    if beside.evidence - imperfections < least:
         return decision
     gap = replace(
         decision, outcome="not-in-catalogue", accepted=[], alternatives=[], rivals=[], equivalent=False
     )
-    told = characterised(bench, gap)
+    told = characterised(context, gap)
     if not told.characters or told.characters[0].hypothesis.depends_on != best.hypothesis.depends_on:
         return decision
     said = f"a hidden state explains more than {' and '.join(name.fitted.names)} (log-likelihood {lead:.3g})"
     return replace(told, reasons=[said])
 
 
-def _motions(bench: Bench, base: Fitted, foretold: Prediction) -> tuple[Motion, Motion]:
+def _motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
     """The motion of one body in training and on held-out records."""
-    natural = _natural_frequency(bench)
-    training, held_out = (motion_of(one, bench.scales.mass, natural) for one in (base, foretold))
+    natural = _natural_frequency(context)
+    training, held_out = (motion_of(one, context.scales.mass, natural) for one in (base, predicted))
     return training, held_out
 
 
-def _known(best: Character, bench: Bench) -> bool:
+def _known(best: Character, context: SearchContext) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
-    options = bench.options
-    least = _AT_A_PLACE if isinstance(bench.training, SensedData) else options.characterised
+    options = context.options
+    least = _AT_A_PLACE if isinstance(context.training, SensedData) else options.characterised
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > least
 
 
-def _likely(best: Character, bench: Bench) -> bool:
+def _likely(best: Character, context: SearchContext) -> bool:
     """Whether it may be known once it is fitted: of a large gap the linearised share says little."""
-    return best.p < bench.options.detection_level and best.closed > bench.options.characterised
+    return best.p < context.options.detection_level and best.closed > context.options.characterised
 
 
 def _akin(one: Character, best: Character) -> bool:
@@ -215,15 +215,15 @@ def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant
     values, after, rank = _solved(training, matrix, gradient, open_)
     gain, rank = after - before, rank - first
     excess, excess_held = max(fit.excess, 1.0), max(held_out.fit.excess, 1.0)
-    foretold = _foretold(training, held_out, columns[1], values, count)
-    closed, closed_held = (gain - rank) / excess, foretold / excess_held
+    predicted = _foretold(training, held_out, columns[1], values, count)
+    closed, closed_held = (gain - rank) / excess, predicted / excess_held
     noise = max(1.0, 1 + (excess - gain) / max(1.0, fit.samples))
-    evidence = (0.5 * gain + 0.5 * foretold) / noise - rank - np.log(hypothesis.values.size)
+    evidence = (0.5 * gain + 0.5 * predicted) / noise - rank - np.log(hypothesis.values.size)
     size = None
     if hypothesis.formula and count:
         variance = noise * np.diag(inverse_scaled(matrix, np.diag(matrix) > 0, 1e-15))
         size = (float(values[p]), float(np.sqrt(variance[p])))
-    chance = family_wise((gain + max(0.0, foretold)) / noise, max(1, rank), hypothesis.values.size)
+    chance = family_wise((gain + max(0.0, predicted)) / noise, max(1, rank), hypothesis.values.size)
     return Character(hypothesis, constant, closed, closed_held, evidence, chance, size)
 
 
@@ -280,7 +280,7 @@ def _foretold(
     return float(fall + after - before) - (rank - rank_before)
 
 
-def _natural_frequency(bench: Bench) -> float:
+def _natural_frequency(context: SearchContext) -> float:
     """That of the machine of the case [rad/s], or where it has none, of its motion in the records."""
-    stated = next((one.natural for one in bench.training.prepared if one.natural), None)
-    return stated or bench.scales.speed / bench.scales.length
+    stated = next((one.natural for one in context.training.prepared if one.natural), None)
+    return stated or context.scales.speed / context.scales.length

@@ -7,12 +7,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from separatrix.discovery.decision.flexible import flexible_member
-from separatrix.discovery.decision.gates import choice, foremost, judge_ceiling, pass_gates, weigh_faults
-from separatrix.discovery.decision.judge import NOISE, Judged, admissible, equivalent, sizeable
+from separatrix.discovery.decision.gates import (
+    best_of,
+    choice,
+    pass_gates,
+    score_ceiling,
+    weigh_imperfections,
+)
 from separatrix.discovery.decision.misfit import CAUGHT, foretold_chi2, missed, misses
 from separatrix.discovery.decision.other_machine import other_units
 from separatrix.discovery.decision.remains import closed_share
-from separatrix.discovery.decision.rounds import Bench, Round, run_round
+from separatrix.discovery.decision.rounds import Round, SearchContext, run_round
+from separatrix.discovery.decision.scoring import NOISE, ScoredCandidate, admissible, equivalent, sizeable
 from separatrix.discovery.decision.several import with_more
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
@@ -40,13 +46,13 @@ class Decision:
     """The outcome and all that led to it."""
 
     outcome: str
-    accepted: list[Judged]
+    accepted: list[ScoredCandidate]
     alternatives: list[list[str]]
     # the fits that could not be told from the accepted one
-    rivals: list[Judged]
+    rivals: list[ScoredCandidate]
     rounds: list[Round]
     base_ceiling: Ceiling
-    foretold: Prediction | None
+    predicted: Prediction | None
     reasons: list[str] = field(default_factory=list)
     equivalent: bool = False
     # whether nothing is left to name
@@ -54,7 +60,7 @@ class Decision:
     # of a gap without a name: on what the missing force depends, likeliest first
     characters: list = field(default_factory=list)
     # that force as a table of the simulator, which is no name; else why there is none
-    added: Judged | None = None
+    added: ScoredCandidate | None = None
     # what is told only if it closes the gap as a table
     suspected: object | None = None
     not_added: str = ""
@@ -78,98 +84,102 @@ class Decision:
         return found[0] if self.outcome == "ambiguous" and all(one == found[0] for one in found) else []
 
     @property
-    def corrected(self) -> Judged | None:
+    def corrected(self) -> ScoredCandidate | None:
         """The machine that goes on: with the effects of the verdict, or with a table that has no name."""
         return self.accepted[0] if self.accepted else self.added
 
 
-def decide(bench: Bench, base: Fitted, settled: bool = False) -> Decision:
+def decide(context: SearchContext, base: Fitted, settled: bool = False) -> Decision:
     """Add effects until what is left is noise or nothing in the catalogue helps.
 
     With `settled` noise it is not measured again.
     """
-    foretold = bench.foretell(base)
-    first = _renewing(bench, run_round(bench, base, foretold, 0.2, 0.6), 0.6, settled)
-    decision = _begun(bench, first)
-    if not first.judged:
-        return _without_name(bench, decision)
-    best, rivals = _lead(bench, first)
+    predicted = context.predict(base)
+    first = _renewing(context, run_round(context, base, predicted, 0.2, 0.6), 0.6, settled)
+    decision = _begun(context, first)
+    if not first.scored:
+        return _without_name(context, decision)
+    best, rivals = _lead(context, first)
     found = first
     if not _detected(best):
-        decision = _shape_alone(bench, _without_name(bench, decision), first)
+        decision = _shape_alone(context, _without_name(context, decision), first)
         if best.gates["detect"] and not decision.accepted:
             decision.reasons.append(
                 f"{best.name} gains more than chance does (p = {best.p:.1g}), but few segments carry that, "
                 "which may be in a wrong minimum: longer records would tell"
             )
         return decision
-    shaped = None if best.gates["adequate"] else _shaped(bench, first)
-    if shaped is None and not (best.gates["adequate"] or bench.options.quick):
+    shaped = None if best.gates["adequate"] else _shaped(context, first)
+    if shaped is None and not (best.gates["adequate"] or context.options.quick):
         # the linear screen may have passed over the effect that closes the gap
-        whole = run_round(bench, first.base, first.foretold, 0.75, 0.8, first, everything=True)
-        whole = _renewing(bench, whole, 0.8, settled, everything=True)
-        better, others = _lead(bench, whole)
-        decision = _begun(bench, whole)
+        whole = run_round(context, first.base, first.predicted, 0.75, 0.8, first, everything=True)
+        whole = _renewing(context, whole, 0.8, settled, everything=True)
+        better, others = _lead(context, whole)
+        decision = _begun(context, whole)
         if _detected(better):
             best, rivals, found = better, others, whole
         elif whole.base is not first.base:
             # the base itself explains what the effect did
-            return _without_name(bench, decision)
+            return _without_name(context, decision)
     if best.gates["adequate"]:
-        return conclude(bench, decision, *_with_more_foretold(bench, decision, best, rivals))
+        return conclude(context, decision, *_with_more_foretold(context, decision, best, rivals))
     if shaped is None and found is not first:
-        shaped = _shaped(bench, found, first)
-    if shaped is not None and not (_of_several(bench, shaped[0]) and bench.options.most_effects > 1):
-        return conclude(bench, decision, *shaped)
-    if bench.options.most_effects < 2:
-        return _give_up(bench, decision, best)
+        shaped = _shaped(context, found, first)
+    if shaped is not None and not (_of_several(context, shaped[0]) and context.options.most_effects > 1):
+        return conclude(context, decision, *shaped)
+    if context.options.most_effects < 2:
+        return _give_up(context, decision, best)
     rounds = list(decision.rounds)
-    before = list(rounds[0].judged)
-    *more, closed = with_more(bench, rounds, best)
-    alone = None if closed else _led_alone(bench, rounds[0], before)
+    before = list(rounds[0].scored)
+    *more, closed = with_more(context, rounds, best)
+    alone = None if closed else _warm_started_alone(context, rounds[0], before)
     if shaped is not None:
         # what it is held against has them
-        weigh_faults(bench, shaped[0])
+        weigh_imperfections(context, shaped[0])
     if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
-        return conclude(bench, decision, *alone)
+        return conclude(context, decision, *alone)
     if shaped is not None:
         # a table for each direction says what a law over the speed and one of the direction say with less
         closed = closed and more[0].evidence > shaped[0].evidence
-        if not closed and not _only_follows(bench, shaped[0]):
-            return conclude(bench, decision, *shaped)
+        if not closed and not _only_follows(context, shaped[0]):
+            return conclude(context, decision, *shaped)
     decision.rounds = rounds
     if closed:
-        return conclude(bench, decision, *more)
-    if not settled and more[0].fitted.fit.like_noise(2) and _noise_renewed(bench, more[0]):
+        return conclude(context, decision, *more)
+    if not settled and more[0].fitted.fit.like_noise(2) and _noise_renewed(context, more[0]):
         # the memory of the noise is seen only where several effects together leave nothing else
         base = decision.rounds[0].base
         fit = minimise(base.problem, base.fit.values, base.fit.starts, patient=True)
-        return decide(bench, replace(base, fit=fit), settled=True)
-    return _give_up(bench, decision, best)
+        return decide(context, replace(base, fit=fit), settled=True)
+    return _give_up(context, decision, best)
 
 
-def _led_alone(bench: Bench, found: Round, before: list[Judged]) -> tuple[Judged, list[Judged]] | None:
-    """An effect alone that closes the gap since several led it out of a wrong minimum, and its rivals."""
-    if all(any(one is other for other in before) for one in found.judged):
+def _warm_started_alone(
+    context: SearchContext, found: Round, before: list[ScoredCandidate]
+) -> tuple[ScoredCandidate, list[ScoredCandidate]] | None:
+    """An effect alone that closes the gap since several led it out of a wrong minimum, and its
+    rivals.
+    """
+    if all(any(one is other for other in before) for one in found.scored):
         return None
-    best, rivals = _lead(bench, found)
+    best, rivals = _lead(context, found)
     return (best, rivals) if _detected(best) and best.gates["adequate"] else None
 
 
 def _with_more_foretold(
-    bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]
-) -> tuple[Judged, list[Judged]]:
+    context: SearchContext, decision: Decision, best: ScoredCandidate, rivals: list[ScoredCandidate]
+) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """An effect that leaves noise where it was fitted but misses a held-out record, and another beside it.
 
     What two effects do together where they were fitted one may do alone, but not at another drive.
     """
     told = best.prediction
-    if told is None or bench.options.quick or bench.options.most_effects < 2 or best.leaves != NOISE:
+    if told is None or context.options.quick or context.options.most_effects < 2 or best.leaves != NOISE:
         return best, rivals
-    if not _only_follows(bench, best):
+    if not _only_follows(context, best):
         return best, rivals
     rounds = list(decision.rounds)
-    whole, others, closed = with_more(bench, rounds, best)
+    whole, others, closed = with_more(context, rounds, best)
     sure = closed and all(whole.gates.values())
     share = closed_share(told, whole.prediction)
     if not sure or share is None or share < _CLOSES:
@@ -178,145 +188,151 @@ def _with_more_foretold(
     return whole, others
 
 
-def _shape_alone(bench: Bench, decision: Decision, found: Round) -> Decision:
+def _shape_alone(context: SearchContext, decision: Decision, found: Round) -> Decision:
     """A family as a function where none of its closed forms, nor any other effect, stands out of chance."""
-    shaped = _shaped(bench, found) if decision.outcome == "not-in-catalogue" else None
-    if shaped is None or _only_follows(bench, shaped[0]):
+    shaped = _shaped(context, found) if decision.outcome == "not-in-catalogue" else None
+    if shaped is None or _only_follows(context, shaped[0]):
         return decision
     decision.reasons.clear()
-    return conclude(bench, decision, *shaped)
+    return conclude(context, decision, *shaped)
 
 
-def _shaped(bench: Bench, found: Round, earlier: Round | None = None) -> tuple[Judged, list[Judged]] | None:
+def _shaped(
+    context: SearchContext, found: Round, earlier: Round | None = None
+) -> tuple[ScoredCandidate, list[ScoredCandidate]] | None:
     """A family whose built-in shapes are wrong and that closes the gap as a function.
 
-    What a function foretells is its proof: one that helps no held-out record only follows the fitted ones.
+    What a function predicts is its proof: one that helps no held-out record only follows the fitted ones.
     """
-    base = ceiling(found.base.problem, found.base.fit, bench.scales.mass)
-    member = flexible_member(bench, found, base, earlier)
+    base = ceiling(found.base.problem, found.base.fit, context.scales.mass)
+    member = flexible_member(context, found, base, earlier)
     if member is None:
         return None
     one, rivals = member
-    pass_gates(bench, one, found.base, rivals, found.screened.tests)
+    pass_gates(context, one, found.base, rivals, found.screened.tests)
     if not _detected(one):
         return None
-    judge_ceiling(bench, one)
+    score_ceiling(context, one)
     needed = [
         one.gates[gate] for gate in ("adequate", "admissible", "converged", "hold-out") if gate in one.gates
     ]
     return member if all(needed) else None
 
 
-def _of_several(bench: Bench, one: Judged) -> bool:
+def _of_several(context: SearchContext, one: ScoredCandidate) -> bool:
     """Whether a function may be the sum of several effects.
 
     A table of friction for each direction says what two closed forms say with less; and what follows the
     fitted records but not held-out ones may have taken over what another effect does.
     """
-    if bench.options.quick or one.prediction is None:
+    if context.options.quick or one.prediction is None:
         return _of_two_directions(one)
-    return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, bench.options)
+    return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, context.options)
 
 
-def _only_follows(bench: Bench, one: Judged) -> bool:
+def _only_follows(context: SearchContext, one: ScoredCandidate) -> bool:
     """Whether a machine follows fitted records, as a function has the freedom to, and misses held-out ones.
 
-    What faults of a rig may explain of those is taken off.
+    What imperfections of a rig may explain of those is taken off.
     """
     told = one.prediction
-    if told is None or not misses(told, one.fitted.fit, bench.options):
+    if told is None or not misses(told, one.fitted.fit, context.options):
         return False
     told = replace(told, fit=cleaned_prediction(one.fitted, told))
-    return misses(told, one.fitted.fit, bench.options)
+    return misses(told, one.fitted.fit, context.options)
 
 
-def _of_two_directions(one: Judged) -> bool:
+def _of_two_directions(one: ScoredCandidate) -> bool:
     """Whether a fit has a table of friction for each direction of its own."""
     free = one.fitted.problem.free
     return one.name == "friction_curve" and not any(free[i].also for i in one.fitted.added)
 
 
-def _begun(bench: Bench, first: Round) -> Decision:
+def _begun(context: SearchContext, first: Round) -> Decision:
     """No name yet."""
     base = first.base
-    gap = ceiling(base.problem, base.fit, bench.scales.mass)
-    return Decision("none", [], [], [], [first], gap, first.foretold)
+    gap = ceiling(base.problem, base.fit, context.scales.mass)
+    return Decision("none", [], [], [], [first], gap, first.predicted)
 
 
-def _renewing(bench: Bench, found: Round, at: float, settled: bool, everything: bool = False) -> Round:
+def _renewing(
+    context: SearchContext, found: Round, at: float, settled: bool, everything: bool = False
+) -> Round:
     """The round again, for as long as it shows that its base can be fitted better."""
     for _ in range(_RENEWALS):
-        lower = renewed(bench, found, settled)
+        lower = renewed(context, found, settled)
         if lower is None:
             break
-        told = bench.foretell(lower, found.foretold)
-        found = run_round(bench, lower, told, at, at + 0.1, found, everything)
+        told = context.predict(lower, found.predicted)
+        found = run_round(context, lower, told, at, at + 0.1, found, everything)
     return found
 
 
-def _lead(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
+def _lead(context: SearchContext, found: Round) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """The best candidate of a round with its gates, and its rivals."""
-    best, rivals = leaders(bench, found)
-    pass_gates(bench, best, found.base, rivals, found.screened.tests)
+    best, rivals = leaders(context, found)
+    pass_gates(context, best, found.base, rivals, found.screened.tests)
     if _detected(best):
-        judge_ceiling(bench, best)
+        score_ceiling(context, best)
     return best, rivals
 
 
-def _detected(one: Judged) -> bool:
+def _detected(one: ScoredCandidate) -> bool:
     """Whether a gain is more than chance and what a few segments carry."""
     return one.gates["detect"] and one.gates["stable"]
 
 
-def _noise_renewed(bench: Bench, best: Judged) -> bool:
+def _noise_renewed(context: SearchContext, best: ScoredCandidate) -> bool:
     """Measure the noise of all records by a better machine; whether it changed."""
-    changed = renew_noise(bench.training, best.fitted.problem, best.fitted.fit, bench.scales.mass)
-    if bench.held_out is not None and best.prediction is not None:
+    changed = renew_noise(context.training, best.fitted.problem, best.fitted.fit, context.scales.mass)
+    if context.held_out is not None and best.prediction is not None:
         if changed:
             held = best.prediction
-            renew_noise(bench.held_out, held.problem, held.fit, bench.scales.mass)
-            copy_noise(bench.training, bench.held_out)
-        changed |= limit_noise(bench.training, bench.held_out)
+            renew_noise(context.held_out, held.problem, held.fit, context.scales.mass)
+            copy_noise(context.training, context.held_out)
+        changed |= limit_noise(context.training, context.held_out)
     return changed
 
 
-def renewed(bench: Bench, first: Round, settled: bool = False) -> Fitted | None:
+def renewed(context: SearchContext, first: Round, settled: bool = False) -> Fitted | None:
     """The base fitted again where candidates show that the noise is another or that it was not at its best.
 
-    A candidate may have left a minimum that the base was caught in: what the base reaches from there is no
-    merit of the candidate.
+    A candidate may have left a minimum that the base was in: what the base reaches from
+    there is no merit of the candidate.
     """
     base = first.base
-    lowest_misfit = sorted(first.judged, key=lambda one: -one.training)[:_LEADERS]
+    lowest_misfit = sorted(first.scored, key=lambda one: -one.training)[:_LEADERS]
     if not lowest_misfit:
         return None
-    best = next((one for one in first.judged if one.settled), None)
-    changed = best is not None and not settled and _noise_renewed(bench, best)
+    best = next((one for one in first.scored if one.settled), None)
+    changed = best is not None and not settled and _noise_renewed(context, best)
     fits = [minimise(base.problem, base.fit.values, base.fit.starts, patient=True)]
     for one in lowest_misfit:
         values = shared_values(base, one.fitted)
         fits.append(minimise(base.problem, values, one.fitted.fit.starts))
     fits = [fit for fit in fits if fit.good.sum() >= fits[0].good.sum()]
     lowest = min(fits, key=lambda fit: fit.total)
-    led = (best or lowest_misfit[0]).training
-    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * led):
+    warm_started = (best or lowest_misfit[0]).training
+    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * warm_started):
         return None
     return Fitted(base.names, base.model, base.problem, lowest, base.added)
 
 
-def leaders(bench: Bench, found: Round) -> tuple[Judged, list[Judged]]:
+def leaders(context: SearchContext, found: Round) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """The best candidate that converged, and those that it does not beat clearly."""
-    able = [one for one in found.judged if admissible(one, found.base, bench.options)[0]]
-    chosen = choice(bench, found.base, found.foretold, able or found.judged, foremost)
+    able = [one for one in found.scored if admissible(one, found.base, context.options)[0]]
+    chosen = choice(context, found.base, found.predicted, able or found.scored, best_of)
     found.rank()
     return chosen
 
 
-def conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged]) -> Decision:
+def conclude(
+    context: SearchContext, decision: Decision, best: ScoredCandidate, rivals: list[ScoredCandidate]
+) -> Decision:
     """A name, if every gate is passed; else what it could be."""
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
-    if "foretold" in failed:
+    if "predicted" in failed:
         size = foretold_chi2(best.prediction, best.fitted.fit)
         decision.reasons.append(
             f"held-out records are missed by more than the noise and what errors of the parameters would "
@@ -325,25 +341,25 @@ def conclude(bench: Bench, decision: Decision, best: Judged, rivals: list[Judged
     # what only fitted records say, over a base that is not at its minimum, may be what the base lacks to it
     proven = best.gates.get("hold-out", False) or decision.rounds[0].base.fit.converged
     if not (best.gates["admissible"] and best.gates["converged"] and proven):
-        return _without_name(bench, decision)
+        return _without_name(context, decision)
     decision.accepted = [best]
     decision.rivals = rivals
     decision.alternatives = [list(one.fitted.names) for one in rivals]
-    odd = other_units(bench.training, decision.rounds[0].base.model)
+    odd = other_units(context.training, decision.rounds[0].base.model)
     decision.reasons += odd
     decision.outcome = "ambiguous" if failed or odd else "named"
     decision.equivalent = bool(rivals) and all(equivalent(best, one) for one in rivals)
     return decision
 
 
-def _without_name(bench: Bench, decision: Decision) -> Decision:
+def _without_name(context: SearchContext, decision: Decision) -> Decision:
     """Nothing in the catalogue helps: either there is no gap, or the catalogue lacks what makes it."""
-    left, wide = _gap_of_base(bench, decision)
+    left, wide = _gap_of_base(context, decision)
     if left:
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(f"the base machine misses {', '.join(left)}, and no effect helps")
-    elif decision.rounds[0].base.fit.sample_chi2 > bench.options.adequate_chi2:
-        decision.reasons.append(_no_gap(bench, decision))
+    elif decision.rounds[0].base.fit.sample_chi2 > context.options.adequate_chi2:
+        decision.reasons.append(_no_gap(context, decision))
     if wide:
         decision.outcome = "not-in-catalogue"
         # of several bodies forces at several places explain a large gap
@@ -354,23 +370,23 @@ def _without_name(bench: Bench, decision: Decision) -> Decision:
     return decision
 
 
-def _no_gap(bench: Bench, decision: Decision) -> str:
+def _no_gap(context: SearchContext, decision: Decision) -> str:
     """Why what the base machine leaves is more than noise and yet no gap, in words."""
     before, beside = decision.rounds[0].base.fit.sample_chi2, decision.base_ceiling.fit.sample_chi2
-    if beside > bench.options.adequate_chi2:
+    if beside > context.options.adequate_chi2:
         return "a reduced chi^2 as large as that may be chance with so few samples"
     return (
-        f"what the base machine leaves (reduced chi^2 {before:.3g}) may be small faults of the rig, of some "
-        f"1e-3 of the signal: beside them it is {beside:.3g}"
+        f"what the base machine leaves (reduced chi^2 {before:.3g}) may be small imperfections of the rig, "
+        f"of some 1e-3 of the signal: beside them it is {beside:.3g}"
     )
 
 
-def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:
+def _give_up(context: SearchContext, decision: Decision, best: ScoredCandidate) -> Decision:
     """Effects stand out of chance, but none is all that is missing."""
     base = decision.rounds[0].base
     # over a base that is not at its minimum a gain may be its own
-    told = base.fit.converged and sizeable(2 * best.training, base.fit, bench.options)
-    if told or any(_gap_of_base(bench, decision)):
+    told = base.fit.converged and sizeable(2 * best.training, base.fit, context.options)
+    if told or any(_gap_of_base(context, decision)):
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
             "the best effects of the catalogue leave a gap that a flexible force would close"
@@ -385,22 +401,22 @@ def _give_up(bench: Bench, decision: Decision, best: Judged) -> Decision:
     return decision
 
 
-def _gap_of_base(bench: Bench, decision: Decision) -> tuple[list[str], bool]:
+def _gap_of_base(context: SearchContext, decision: Decision) -> tuple[list[str], bool]:
     """The records that the base machine misses, and whether a flexible force explains what is no trifle.
 
-    Small faults of a rig count as noise. What a few segments carry that are followed far worse than all
-    others may be a wrong minimum of theirs.
+    Small imperfections of a rig count as noise. What a few segments carry that are followed far worse than
+    all others may be a wrong minimum of theirs.
     """
     base = decision.rounds[0].base
-    fits = [(bench.training, decision.base_ceiling.fit)]
-    if bench.held_out is not None and decision.foretold is not None:
-        fits.append((bench.held_out, cleaned_prediction(base, decision.foretold)))
-    left = [one for data, fit in fits for one in missed(data, fit, bench.options)]
-    wide = _wide(decision.base_ceiling, base.fit, bench.options)
-    caught = suspicious(base.fit) if wide else np.zeros(0, int)
-    if 0 < caught.size <= CAUGHT:
-        others = without_segments(base.fit, caught)
-        wide = _wide(ceiling(base.problem, others, bench.scales.mass), others, bench.options)
+    fits = [(context.training, decision.base_ceiling.fit)]
+    if context.held_out is not None and decision.predicted is not None:
+        fits.append((context.held_out, cleaned_prediction(base, decision.predicted)))
+    left = [one for data, fit in fits for one in missed(data, fit, context.options)]
+    wide = _wide(decision.base_ceiling, base.fit, context.options)
+    in_local_minimum = suspicious(base.fit) if wide else np.zeros(0, int)
+    if 0 < in_local_minimum.size <= CAUGHT:
+        others = without_segments(base.fit, in_local_minimum)
+        wide = _wide(ceiling(base.problem, others, context.scales.mass), others, context.options)
     return left, wide
 
 

@@ -4,9 +4,9 @@
 
 from collections.abc import Iterator
 
-from separatrix.discovery.decision.gates import weigh_faults
-from separatrix.discovery.decision.judge import Judged, admissible, clear_of, margin
-from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.decision.gates import weigh_imperfections
+from separatrix.discovery.decision.rounds import Round, SearchContext
+from separatrix.discovery.decision.scoring import ScoredCandidate, admissible, clear_of, margin
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.joint_effects import effect_of
@@ -25,34 +25,34 @@ _FAR_BEHIND = 30.0
 
 
 def flexible_member(
-    bench: Bench, found: Round, ceiling: Ceiling, earlier: Round | None = None
-) -> tuple[Judged, list[Judged]] | None:
+    context: SearchContext, found: Round, ceiling: Ceiling, earlier: Round | None = None
+) -> tuple[ScoredCandidate, list[ScoredCandidate]] | None:
     """The best family as a function, and its rivals of other families; or None.
 
     Tables that left most of the gap in an `earlier` round of the same records are not fitted again.
     """
     far = _far_tables(earlier) if earlier is not None else set()
-    members = [one for one in _promising(bench, found, ceiling) if one.effect not in far]
-    fitted = [one for member in members for one in best_table(bench, found, member)]
+    members = [one for one in _promising(context, found, ceiling) if one.effect not in far]
+    fitted = [one for member in members for one in best_table(context, found, member)]
     if not fitted:
         return None
-    if any(one.faults is not None for one in found.judged):
+    if any(one.imperfections is not None for one in found.scored):
         # what they are held against has them
         for one in fitted:
-            weigh_faults(bench, one)
-    able = [one for one in fitted if admissible(one, found.base, bench.options)[0]]
+            weigh_imperfections(context, one)
+    able = [one for one in fitted if admissible(one, found.base, context.options)[0]]
     best = max(able or fitted, key=lambda one: one.evidence)
     family = effect_of(best.name).family
-    others = [one for one in [*found.judged, *fitted] if effect_of(one.name).family != family]
-    return best, [one for one in others if not clear_of(best, one, bench.options)]
+    others = [one for one in [*found.scored, *fitted] if effect_of(one.name).family != family]
+    return best, [one for one in others if not clear_of(best, one, context.options)]
 
 
-def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
+def _promising(context: SearchContext, found: Round, ceiling: Ceiling) -> list[Member]:
     """Members of the families that explain much of the gap, in closed form or as a free force."""
-    wanted = bench.options.candidates
+    wanted = context.options.candidates
     free = {one.name: max(0.0, one.gain - one.rank) for one in ceiling.families if one.name != "pieces"}
     most = max([1e-300, *free.values()])
-    highest = max([1e-300, *(one.evidence for one in found.judged)])
+    highest = max([1e-300, *(one.evidence for one in found.scored)])
     shares = {}
     for member in MEMBERS:
         if not fits_machine(member, found.base.model):
@@ -62,7 +62,7 @@ def _promising(bench: Bench, found: Round, ceiling: Ceiling) -> list[Member]:
         )
         if not allowed:
             continue
-        closed = [one.evidence for one in found.judged if effect_of(one.name).family == member.family]
+        closed = [one.evidence for one in found.scored if effect_of(one.name).family == member.family]
         share = max([free.get(member.explains, 0.0) / most, *(one / highest for one in closed)])
         if share > _PROMISING:
             shares[member] = share
@@ -80,10 +80,12 @@ def _far_tables(found: Round) -> set[str]:
     return {effect for effect, closes in closing.items() if not closes}
 
 
-def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) -> Iterator[Judged]:
+def best_table(
+    context: SearchContext, found: Round, member: Member, strict: bool = True
+) -> Iterator[ScoredCandidate]:
     """The table of a family on as many knots as the evidence pays for; nothing where none converges.
 
-    What is no name need not converge where not `strict`: what it foretells is its proof. One that was fitted
+    What is no name need not converge where not `strict`: what it predicts is its proof. One that was fitted
     on this base stands.
     """
     known = _begun(found, member.family)
@@ -92,30 +94,32 @@ def best_table(bench: Bench, found: Round, member: Member, strict: bool = True) 
         for effect, begun, how, one in found.tables
         if (effect, how) == (member.effect, strict) and begun is known
     ]
-    best = same[0] if same else _fit_table(bench, found, member, known, strict)
+    best = same[0] if same else _fit_table(context, found, member, known, strict)
     if not same:
         found.tables.append((member.effect, known, strict, best))
     if best is not None:
-        yield found.judge(best.fitted, best.prediction)
+        yield found.score(best.fitted, best.prediction)
 
 
-def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict: bool) -> Judged | None:
+def _fit_table(
+    context: SearchContext, found: Round, member: Member, known: Fitted, strict: bool
+) -> ScoredCandidate | None:
     """The table of a family, from a `known` machine."""
     best = None
     seen = member.seen(known)
     ahead = max(
-        (one.fitted for one in found.judged if one.fitted.fit.converged), default=None, key=_closeness
+        (one.fitted for one in found.scored if one.fitted.fit.converged), default=None, key=_closeness
     )
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in KNOTS:
             knots = knots_at(member, seen, count)
             made = None
             if knots is not None:
-                made = fit_member(bench.training, found.base, member, known, knots, alike, ahead)
+                made = fit_member(context.training, found.base, member, known, knots, alike, ahead)
             if made is None:
                 break
-            bench.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
-            if made.fit.good.sum() < bench.options.followed * found.base.fit.good.sum():
+            context.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
+            if made.fit.good.sum() < context.options.followed * found.base.fit.good.sum():
                 # what it lost would pass for a gain
                 continue
             if not made.fit.converged:
@@ -129,12 +133,12 @@ def _fit_table(bench: Bench, found: Round, member: Member, known: Fitted, strict
                     continue
             else:
                 known = made
-            one = found.judge(made, bench.foretell(made, found.foretold))
-            if best is not None and one.evidence < best.evidence + margin(best, one, bench.options):
+            one = found.score(made, context.predict(made, found.predicted))
+            if best is not None and one.evidence < best.evidence + margin(best, one, context.options):
                 best.fitted.finer = made
                 if _pointless(best.fitted, made, ahead):
                     break
-                # far from its shape yet: it follows the fitted records and foretells no others
+                # far from its shape yet: it follows the fitted records and predicts no others
                 continue
             slow = best is not None and _pointless(best.fitted, made, ahead)
             best = one
@@ -161,5 +165,5 @@ def _pointless(one: Fitted, more: Fitted, ahead: Fitted | None) -> bool:
 
 def _begun(found: Round, family: str) -> Fitted:
     """The closed form of the family where there is one, else the base."""
-    members = [one for one in found.judged if effect_of(one.name).family == family]
+    members = [one for one in found.scored if effect_of(one.name).family == family]
     return members[0].fitted if members else found.base

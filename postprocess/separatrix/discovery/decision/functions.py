@@ -12,16 +12,16 @@ from scipy.stats import chi2
 
 from separatrix.discovery.decision.decide import Decision, conclude
 from separatrix.discovery.decision.flexible import best_table
-from separatrix.discovery.decision.gates import judge_ceiling, pass_gates, weigh_faults
-from separatrix.discovery.decision.judge import clear_of, lead
-from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.gates import pass_gates, score_ceiling, weigh_imperfections
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.scoring import clear_of, lead
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.rig import share_beside_faults
+from separatrix.discovery.fitting.rig import share_with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY
 from separatrix.discovery.fitting.smooth import function_of
 
 
-def with_function(bench: Bench, decision: Decision) -> Decision:
+def with_function(context: SearchContext, decision: Decision) -> Decision:
     """The decision with what the records tell of the function of its last effect.
 
     A closed form that this refutes yields to the table of its family, or is in doubt: then the one of more
@@ -32,11 +32,11 @@ def with_function(bench: Bench, decision: Decision) -> Decision:
         return decision
     bases = [one.base for one in decision.rounds if one.base.names == fitted.names[:-1]]
     if bases:
-        decision.function = function_of(bench.training, bases[-1], fitted)
-    return decision if bench.options.partial else _held_against_it(bench, decision)
+        decision.function = function_of(context.training, bases[-1], fitted)
+    return decision if context.options.partial else _held_against_it(context, decision)
 
 
-def _held_against_it(bench: Bench, decision: Decision) -> Decision:
+def _held_against_it(context: SearchContext, decision: Decision) -> Decision:
     """The decision with a closed form alone held against its function."""
     best, function = decision.accepted[0] if decision.accepted else None, decision.function
     sure = decision.outcome == "named" or bool(decision.in_families)
@@ -47,19 +47,19 @@ def _held_against_it(bench: Bench, decision: Decision) -> Decision:
         return decision
     found = decision.rounds[0]
     said = f"the function of {function.member.family} has another form than {best.name} (p = {form['p']:.1g})"
-    table = next(best_table(bench, found, function.member), None)
+    table = next(best_table(context, found, function.member), None)
     if table is None:
         return replace(decision, outcome="ambiguous", reasons=[*decision.reasons, said])
-    if best.faults is not None:
-        weigh_faults(bench, table)
-    pass_gates(bench, table, found.base, [], found.screened.tests)
-    judge_ceiling(bench, table)
+    if best.imperfections is not None:
+        weigh_imperfections(context, table)
+    pass_gates(context, table, found.base, [], found.screened.tests)
+    score_ceiling(context, table)
     passes = all(table.gates.values())
-    if passes and clear_of(table, best, bench.options):
+    if passes and clear_of(table, best, context.options):
         bare = replace(decision, accepted=[], rivals=[], alternatives=[], reasons=[], function=None)
-        return with_function(bench, conclude(bench, bare, table, []))
-    # small faults of the rig bend a function, too
-    own = share_beside_faults(table.fitted, best.fitted) * function.gain
+        return with_function(context, conclude(context, bare, table, []))
+    # small imperfections of the rig bend a function, too
+    own = share_with_imperfections(table.fitted, best.fitted) * function.gain
     if chi2.sf(own, table.parameters) > LIKELY:
         return decision
     first = table if passes and lead(table, best) > 0 else best

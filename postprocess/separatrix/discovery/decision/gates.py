@@ -4,86 +4,94 @@
 
 from collections.abc import Callable
 
-from separatrix.discovery.decision.judge import (
+from separatrix.discovery.decision.misfit import refuted
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.scoring import (
     LITTLE,
-    Judged,
+    ScoredCandidate,
     adequate,
     admissible,
     beyond_doubt,
     clear_of,
     detection,
-    foretells,
     held_out_bounds,
-    judged,
+    predicts,
+    scored,
     sizeable,
     stable,
 )
-from separatrix.discovery.decision.misfit import refuted
-from separatrix.discovery.decision.rounds import Bench
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.heldout import Prediction, gained_together
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import share_beside_faults, shares_beside_faults, weight_of_faults
+from separatrix.discovery.fitting.rig import (
+    share_with_imperfections,
+    shares_with_imperfections,
+    weight_of_imperfections,
+)
 from separatrix.discovery.options import Options
 
-# share of the evidence of the best from which on faults of a rig are weighed beside a candidate, and beside
-# how many
+# share of the evidence of the best from which on imperfections of a rig are weighed beside a candidate, and
+# beside how many
 _SHARE = 0.2
 _WEIGHED = 8
-# share of what faults of a rig explain that is known no better, as they are taken as linear
+# share of what imperfections of a rig explain that is known no better, as they are taken as linear
 _UNSURE = 0.1
 
 
 def choice(
-    bench: Bench, base: Fitted, foretold: Prediction | None, pool: list[Judged], choose: Callable
-) -> tuple[Judged, list[Judged]]:
+    context: SearchContext,
+    base: Fitted,
+    predicted: Prediction | None,
+    pool: list[ScoredCandidate],
+    choose: Callable,
+) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """What `choose` takes from a pool, and its rivals.
 
-    Who was not asked to foretell is asked now, and where the best leaves more than noise or has rivals the
-    leaders are weighed with faults of a rig beside them; then the choice is made again.
+    Who was not asked to predict is asked now, and where the best leaves more than noise or has rivals the
+    leaders are weighed with imperfections of a rig beside them; then the choice is made again.
     """
     pool = list(pool)
     while True:
-        best, rivals = choose(pool, bench.options)
-        if best.prediction is None and foretold is not None:
+        best, rivals = choose(pool, context.options)
+        if best.prediction is None and predicted is not None:
             place = next(i for i, one in enumerate(pool) if one is best)
-            pool[place] = judged(base, foretold, best.fitted, bench.foretell(best.fitted, foretold))
+            pool[place] = scored(base, predicted, best.fitted, context.predict(best.fitted, predicted))
             continue
-        leading = _leading(pool, best, foretold is not None)
-        weighed = [one.faults is not None for one in leading]
+        leading = _leading(pool, best, predicted is not None)
+        weighed = [one.imperfections is not None for one in leading]
         matters = any(weighed) or rivals or not best.fitted.fit.like_noise(2)
         if all(weighed) or not matters:
             return best, rivals
         for one in leading:
-            weigh_faults(bench, one)
+            weigh_imperfections(context, one)
 
 
-def weigh_faults(bench: Bench, one: Judged) -> None:
-    """Give the rig of a candidate its faults, where that was not done.
+def weigh_imperfections(context: SearchContext, one: ScoredCandidate) -> None:
+    """Give the rig of a candidate its imperfections, where that was not done.
 
-    What faults have moved its parameters by in training they do not foretell with: held-out records are
-    foretold by the parameters beside them, where those foretell better by themselves too.
+    What imperfections have moved its parameters by in training they do not predict with: held-out records are
+    predicted by the parameters beside them, where those predict better by themselves too.
     """
-    if one.faults is not None:
+    if one.imperfections is not None:
         return
-    one.faults = weight_of_faults(one.fitted, one.prediction)
-    if one.prediction is None or one.faults[0] <= 0:
+    one.imperfections = weight_of_imperfections(one.fitted, one.prediction)
+    if one.prediction is None or one.imperfections[0] <= 0:
         return
-    told = bench.foretell_beside_faults(one.fitted, one.prediction)
-    parts = gained_together(told, one.foretold)
+    told = context.predict_with_imperfections(one.fitted, one.prediction)
+    parts = gained_together(told, one.predicted)
     if parts.sum() > one.held_out:
         one.prediction, one.held_out_parts, one.held_out = told, parts, float(parts.sum())
-        one.faults = weight_of_faults(one.fitted, told)
+        one.imperfections = weight_of_imperfections(one.fitted, told)
 
 
-def _leading(pool: list[Judged], best: Judged, foretold: bool) -> list[Judged]:
-    """Those that faults of a rig may have put behind the best, and itself."""
-    able = [one for one in pool if one.prediction is not None or not foretold]
+def _leading(pool: list[ScoredCandidate], best: ScoredCandidate, predicted: bool) -> list[ScoredCandidate]:
+    """Those that imperfections of a rig may have put behind the best, and itself."""
+    able = [one for one in pool if one.prediction is not None or not predicted]
     near = [one for one in able if one.evidence > _SHARE * best.evidence]
     return [best, *sorted(near, key=lambda one: -one.evidence)[:_WEIGHED]]
 
 
-def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
+def best_of(pool: list[ScoredCandidate], options: Options) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """Return the settled candidate of most evidence, and all that it does not beat clearly for its misfit.
 
     A fit that is not at its end may not be named, but what it gained so far may stand against a name.
@@ -93,22 +101,24 @@ def foremost(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]
     return best, [one for one in order if one is not best and not clear_of(best, one, options)]
 
 
-def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], tested: float) -> None:
+def pass_gates(
+    context: SearchContext, best: ScoredCandidate, base: Fitted, rivals: list[ScoredCandidate], tested: float
+) -> None:
     """Set the p value of a candidate and every gate but the adequacy."""
-    options = bench.options
-    if best.prediction is None or best.foretold is None:
-        best.own = share_beside_faults(best.fitted, base)
+    options = context.options
+    if best.prediction is None or best.predicted is None:
+        best.own = share_with_imperfections(best.fitted, base)
     else:
-        told = (best.prediction, best.foretold)
-        best.own, best.own_foretold = shares_beside_faults((best.fitted, base), told)
+        told = (best.prediction, best.predicted)
+        best.own, best.own_foretold = shares_with_imperfections((best.fitted, base), told)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.settled
     best.gates["detect"] = (
-        best.p < options.detection_level and _of_some_size(best, options) and not _within_faults(best)
+        best.p < options.detection_level and _of_some_size(best, options) and not _within_imperfections(best)
     )
     if best.prediction is not None:
         bounds = held_out_bounds(best, options).values()
-        helps = any(low > 0 for low, _ in bounds) or foretells(best, options)
+        helps = any(low > 0 for low, _ in bounds) or predicts(best, options)
         helps |= beyond_doubt(best, base, options)
         best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
     best.gates["separate"] = not rivals
@@ -116,27 +126,29 @@ def pass_gates(bench: Bench, best: Judged, base: Fitted, rivals: list[Judged], t
     best.gates["stable"] = stable(best, base, options) >= options.inclusion
 
 
-def _within_faults(best: Judged) -> bool:
-    """Whether what faults of a rig do not explain of a gain is within the errors of their being linear."""
+def _within_imperfections(best: ScoredCandidate) -> bool:
+    """Whether what imperfections of a rig do not explain of a gain is within the errors of their being
+    linear.
+    """
     gained = best.training + best.held_out
     own = best.own * best.training + best.own_foretold * best.held_out
     return own < _UNSURE * (gained - own)
 
 
-def _of_some_size(best: Judged, options: Options) -> bool:
-    """Whether what an effect explains, where it was fitted or foretold, is no fault of a rig."""
+def _of_some_size(best: ScoredCandidate, options: Options) -> bool:
+    """Whether what an effect explains, where it was fitted or predicted, is no imperfection of a rig."""
     seen = sizeable(2 * best.own * best.training, best.fitted.fit, options, options.least_effect)
     if best.prediction is None:
         return seen
-    foretold = 2 * best.own_foretold * best.held_out
-    return seen or sizeable(foretold, best.prediction.fit, options, options.least_effect)
+    predicted = 2 * best.own_foretold * best.held_out
+    return seen or sizeable(predicted, best.prediction.fit, options, options.least_effect)
 
 
-def judge_ceiling(bench: Bench, one: Judged) -> None:
+def score_ceiling(context: SearchContext, one: ScoredCandidate) -> None:
     """Set the gate of the adequacy: what a flexible machine would still explain."""
-    one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, bench.scales.mass)
-    one.leaves = adequate(one, bench.options)
+    one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, context.scales.mass)
+    one.leaves = adequate(one, context.options)
     one.gates["adequate"] = bool(one.leaves)
     if one.prediction is not None:
         closed = one.leaves == LITTLE
-        one.gates["foretold"] = closed or not refuted(one.prediction, one.fitted.fit, bench.options)
+        one.gates["predicted"] = closed or not refuted(one.prediction, one.fitted.fit, context.options)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a missing force may depend on beyond the catalogue, as columns of a linear fit along the motion.
 
-Every hypothesis has columns whose coefficients belong to the machine and are foretold on other records, and
+Every hypothesis has columns whose coefficients belong to the machine and are predicted on other records, and
 columns whose coefficients each stretch of a record has for itself: an oscillation of unknown phase, what a
 hidden state began with.
 """
@@ -141,7 +141,7 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
         over_s = knots_of(training.spring[training.good], 7)
 
         def stretched(m: Motion) -> np.ndarray:
-            # of records whose machine cannot be asked nothing is foretold
+            # of records whose machine cannot be asked nothing is predicted
             known = m.good if m.spring is not None else np.zeros_like(m.good)
             return splines(m.x if m.spring is None else m.spring, over_s, known)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted
@@ -36,7 +36,7 @@ _ADVICE = {
 }
 
 
-def detectable(bench: Bench, found: Round) -> dict[str, dict]:
+def detectable(context: SearchContext, found: Round) -> dict[str, dict]:
     """Smallest size of each effect that these records would have shown at `visible` standard errors.
 
     None, with a reason, where no size can be told.
@@ -55,27 +55,27 @@ def detectable(bench: Bench, found: Round) -> dict[str, dict]:
             size, reason = None, "the base machine can imitate it"
         elif found.screened.live[name][:1].any():
             usual = made.free[made.added[0]].size
-            size = bench.options.visible * float(found.screened.error[name][0]) * usual
+            size = context.options.visible * float(found.screened.error[name][0]) * usual
             if size > _BELIEVED * usual:
                 size, reason = None, "the base machine can all but imitate it"
-        elif not made.linear.any() and not bench.options.quick:
-            size = _by_ladder(bench, found, made)
+        elif not made.linear.any() and not context.options.quick:
+            size = _by_ladder(context, found, made)
             reason = "" if size is not None else "no size that was tried stands out so much"
         else:
             size, reason = None, "its size is not proportional to what it does"
-            reason += ": see a run without --quick" if bench.options.quick else ""
+            reason += ": see a run without --quick" if context.options.quick else ""
         sizes[name] = {"size": size, "path": path, "unit": unit, "reason": reason}
     return sizes
 
 
-def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
+def _by_ladder(context: SearchContext, found: Round, made: Candidate) -> float | None:
     """The size at which d' is what counts as visible, between the rungs of a ladder around the usual size."""
     place = made.added[0]
     usual = made.free[place].physical(made.free[place].value)
     if made.names[-1] == "second_barrier":
-        depths = np.abs(bench.scales.highest - bench.scales.lowest) * 0.002 * _LADDER
-        inward = 1 if usual < 0.5 * (bench.scales.highest + bench.scales.lowest) else -1
-        edge = bench.scales.lowest if inward > 0 else bench.scales.highest
+        depths = np.abs(context.scales.highest - context.scales.lowest) * 0.002 * _LADDER
+        inward = 1 if usual < 0.5 * (context.scales.highest + context.scales.lowest) else -1
+        edge = context.scales.lowest if inward > 0 else context.scales.highest
         rungs = edge + inward * depths
     else:
         rungs = usual * _LADDER
@@ -91,7 +91,7 @@ def _by_ladder(bench: Bench, found: Round, made: Candidate) -> float | None:
         error = screen(found.base.fit, [shown]).error[made.names[-1]]
         visible.append(float(1 / error[0]) if error.size else 0.0)
     logarithm = np.log(np.maximum(visible, 1e-12))
-    wanted = np.log(bench.options.visible)
+    wanted = np.log(context.options.visible)
     crossings = np.flatnonzero((logarithm[:-1] - wanted) * (logarithm[1:] - wanted) <= 0)
     if not crossings.size:
         return None

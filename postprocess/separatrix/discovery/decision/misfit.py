@@ -26,7 +26,7 @@ _LARGER = 2.0
 # share of the noise that is rounding from which on its size is no known one
 _ROUNDING = 0.2
 
-# segments that may be caught in a wrong minimum
+# segments that may be in a wrong minimum
 CAUGHT = 3
 # standard deviations of chi^2 that are no chance
 _CHANCE = 4.0
@@ -62,7 +62,7 @@ def missed(data: Data, fit: Fit, options: Options) -> list[str]:
 
 
 def unused(data: Data, fit: Fit, contacts: bool) -> list[str]:
-    """Return in words how many segments of each record a machine, with contacts or none, is not judged by."""
+    """Return in words how many segments of each record a machine, with contacts or none, is not scored by."""
     record, evaluation = data.stages[data.last].record, fit.evaluation
     notes = []
     for number, one in enumerate(data.prepared):
@@ -101,7 +101,7 @@ def foretold_chi2(told: Prediction, fitted: Fit) -> float:
     """Reduced chi^2 of held-out records over that in training, where it is above 1.
 
     What an error of the parameters explains that is likely by what training says of them is taken off, and
-    the few segments that may be caught in a wrong minimum are left out.
+    the few segments that may be in a wrong minimum are left out.
     """
     kept, freedom = _followed(told)
     left = told.fit.chi2[kept].sum() - explained(told, kept)
@@ -109,11 +109,13 @@ def foretold_chi2(told: Prediction, fitted: Fit) -> float:
 
 
 def _followed(told: Prediction) -> tuple[np.ndarray, float]:
-    """Held-out segments without a few that may be caught in a wrong minimum, and their degrees of freedom."""
+    """Held-out segments without a few that may be in a wrong minimum, and their degrees of
+    freedom.
+    """
     fit, kept = told.fit, told.good.copy()
-    caught = suspicious(fit)
-    if caught.size <= CAUGHT:
-        kept[caught] = False
+    in_local_minimum = suspicious(fit)
+    if in_local_minimum.size <= CAUGHT:
+        kept[in_local_minimum] = False
     return kept, max(1.0, float((fit.counts - fit.unknowns)[kept].sum()))
 
 

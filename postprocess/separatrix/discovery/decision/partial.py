@@ -5,7 +5,7 @@
 The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by
 one (the first two together, if only that helps) as long as each passes every gate but the adequacy, which
 here is not to be had; the verdict says that it is not complete. Among wrong machines everything is
-significant in training, so held-out records choose: of the candidates that foretell no worse than the best,
+significant in training, so held-out records choose: of the candidates that predict no worse than the best,
 the one with the fewest parameters is taken, and each effect must close a share of the gap there that no
 other effect closes.
 """
@@ -16,18 +16,18 @@ import numpy as np
 
 from separatrix.discovery.decision.decide import Decision, decide
 from separatrix.discovery.decision.gates import choice, pass_gates
-from separatrix.discovery.decision.judge import (
-    Judged,
+from separatrix.discovery.decision.other_machine import other_units
+from separatrix.discovery.decision.rounds import Round, SearchContext, pair_gains, run_round
+from separatrix.discovery.decision.scoring import (
+    ScoredCandidate,
     adequate,
     admissible,
     differs_from_nothing,
     held_out_bounds,
-    judged,
     lead,
     margin,
+    scored,
 )
-from separatrix.discovery.decision.other_machine import other_units
-from separatrix.discovery.decision.rounds import Bench, Round, pair_gains, run_round
 from separatrix.discovery.decision.several import fit_set, over_base, without
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.refit import Fitted
@@ -39,32 +39,32 @@ _LEADERS = 2
 _LEAST = 0.1
 
 
-def decide_in_part(bench: Bench, base: Fitted) -> Decision:
+def decide_in_part(context: SearchContext, base: Fitted) -> Decision:
     """Return the strict decision on one effect, else the effects that help though more is missing."""
-    decision = decide(replace(bench, options=replace(bench.options, most_effects=1)), base)
+    decision = decide(replace(context, options=replace(context.options, most_effects=1)), base)
     if decision.outcome != "not-in-catalogue":
         return decision
     base = decision.rounds[0].base
     rounds = decision.rounds[:1]
-    accepted = _first(bench, rounds[0])
+    accepted = _first(context, rounds[0])
     last = None
     while accepted is not None:
         last = accepted
-        if len(last.fitted.names) >= bench.options.most_effects:
+        if len(last.fitted.names) >= context.options.most_effects:
             break
-        rounds.append(run_round(bench, last.fitted, last.prediction, 0.9, 0.98))
-        accepted = _next(bench, rounds[-1])
-        if accepted is not None and not _all_needed(bench, rounds[0], accepted):
+        rounds.append(run_round(context, last.fitted, last.prediction, 0.9, 0.98))
+        accepted = _next(context, rounds[-1])
+        if accepted is not None and not _all_needed(context, rounds[0], accepted):
             accepted = None
     if last is None:
         return decision
-    whole = over_base(bench, base, rounds[0].foretold, last)
+    whole = over_base(context, base, rounds[0].predicted, last)
     whole.gates, whole.p = last.gates, last.p
-    whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, bench.scales.mass)
-    whole.leaves = adequate(whole, bench.options)
+    whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, context.scales.mass)
+    whole.leaves = adequate(whole, context.options)
     complete = bool(whole.leaves)
     whole.gates["adequate"] = complete
-    odd = other_units(bench.training, base.model)
+    odd = other_units(context.training, base.model)
     return replace(
         decision,
         outcome="ambiguous" if odd else "named",
@@ -73,18 +73,18 @@ def decide_in_part(bench: Bench, base: Fitted) -> Decision:
         alternatives=[],
         rivals=[],
         rounds=rounds,
-        reasons=[*([] if complete else remaining(bench, whole)), *odd],
+        reasons=[*([] if complete else remaining(context, whole)), *odd],
     )
 
 
-def remaining(bench: Bench, whole: Judged) -> list[str]:
+def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
     """What is left of the gap with the named effects, in words, by use of the records."""
     said = ["named in part: what is left is not in the catalogue"]
-    fits = [("fitted", bench.training, whole.fitted, whole.fitted.fit.reduced_chi2)]
+    fits = [("fitted", context.training, whole.fitted, whole.fitted.fit.reduced_chi2)]
     if whole.prediction is not None:
-        fits.append(("held-out", bench.held_out, whole.prediction, whole.prediction.reduced_chi2))
+        fits.append(("held-out", context.held_out, whole.prediction, whole.prediction.reduced_chi2))
     for use, data, found, left in fits:
-        depends_on = ceiling(found.problem, found.fit, bench.scales.mass).mostly
+        depends_on = ceiling(found.problem, found.fit, context.scales.mass).mostly
         names = ", ".join(one.record.name for one in data.prepared)
         what = (
             f"forces that depend on {depends_on} would close most of it"
@@ -96,75 +96,75 @@ def remaining(bench: Bench, whole: Judged) -> list[str]:
     return said
 
 
-def nearest(bench: Bench, decision: Decision) -> list[str]:
+def nearest(context: SearchContext, decision: Decision) -> list[str]:
     """Say which single effect passes where the strict decision names none."""
     if decision.outcome != "not-in-catalogue":
         return []
-    found = _next(bench, decision.rounds[0])
+    found = _next(context, decision.rounds[0])
     said = "passes every gate but the adequacy; --partial names what helps though a gap remains"
     return [f"{found.name} {said}"] if found else []
 
 
-def _next(bench: Bench, found: Round) -> Judged | None:
+def _next(context: SearchContext, found: Round) -> ScoredCandidate | None:
     """The best candidate of a round, if it passes every gate."""
     pool = [
         one
-        for one in found.judged
-        if one.fitted.fit.converged and admissible(one, found.base, bench.options)[0]
+        for one in found.scored
+        if one.fitted.fit.converged and admissible(one, found.base, context.options)[0]
     ]
-    return _passing(bench, found, pool)
+    return _passing(context, found, pool)
 
 
-def _first(bench: Bench, found: Round) -> Judged | None:
-    """One effect, or two where together they foretell clearly better than the one."""
-    single, pair = _next(bench, found), _pair(bench, found)
+def _first(context: SearchContext, found: Round) -> ScoredCandidate | None:
+    """One effect, or two where together they predict clearly better than the one."""
+    single, pair = _next(context, found), _pair(context, found)
     if single is None or pair is None:
         return single or pair
-    return pair if _adds(pair, single, bench.options) else single
+    return pair if _adds(pair, single, context.options) else single
 
 
-def _pair(bench: Bench, found: Round) -> Judged | None:
+def _pair(context: SearchContext, found: Round) -> ScoredCandidate | None:
     """Two effects that pass only together: each alone drives the base to where it should not be."""
     seconds = []
-    for one in [one for one in found.judged if one.fitted.fit.converged][:_LEADERS]:
+    for one in [one for one in found.scored if one.fitted.fit.converged][:_LEADERS]:
         # some effects need another one: presliding needs dry friction
-        seconds.append(run_round(bench, one.fitted, one.prediction, 0.9, 0.95))
-    singles = [one for second in seconds for one in second.judged]
-    pairs = [over_base(bench, found.base, found.foretold, one) for one in singles]
+        seconds.append(run_round(context, one.fitted, one.prediction, 0.9, 0.95))
+    singles = [one for second in seconds for one in second.scored]
+    pairs = [over_base(context, found.base, found.predicted, one) for one in singles]
     tried = {frozenset(one.fitted.names) for one in pairs}
     for _, one, other in pair_gains(found)[:_PAIRS]:
         if frozenset((one, other)) in tried:
             continue
-        fitted = fit_set(bench, found, (one, other))
+        fitted = fit_set(context, found, (one, other))
         if fitted is not None:
-            pairs.append(over_base(bench, found.base, found.foretold, fitted))
-    pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found, bench.options)]
-    best = _passing(bench, found, pairs)
-    return best if best is not None and _all_needed(bench, found, best) else None
+            pairs.append(over_base(context, found.base, found.predicted, fitted))
+    pairs = [one for one in pairs if one.fitted.fit.converged and _both_clear(one, found, context.options)]
+    best = _passing(context, found, pairs)
+    return best if best is not None and _all_needed(context, found, best) else None
 
 
-def _both_clear(pair: Judged, found: Round, options: Options) -> bool:
+def _both_clear(pair: ScoredCandidate, found: Round, options: Options) -> bool:
     """Whether every parameter of both effects is inside its bounds and differs from nothing."""
     fit = pair.fitted.fit
     clear = [not fit.at_bound[i] and differs_from_nothing(pair.fitted, i) for i in pair.fitted.added]
     return all(clear) and admissible(pair, found.base, options)[0]
 
 
-def _passing(bench: Bench, found: Round, pool: list[Judged]) -> Judged | None:
+def _passing(context: SearchContext, found: Round, pool: list[ScoredCandidate]) -> ScoredCandidate | None:
     """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
     if not pool:
         return None
-    best, rivals = choice(bench, found.base, found.foretold, pool, preferred)
+    best, rivals = choice(context, found.base, found.predicted, pool, preferred)
     # the strict decision may have asked for these: a gap that remains is missed on held-out records, too
-    for name in ("adequate", "foretold"):
+    for name in ("adequate", "predicted"):
         best.gates.pop(name, None)
-    pass_gates(bench, best, found.base, rivals, found.screened.tests)
+    pass_gates(context, best, found.base, rivals, found.screened.tests)
     best.gates["hold-out"] = best.gates.get("hold-out", True) and worth_a_name(best, found)
     return best if all(best.gates.values()) else None
 
 
-def preferred(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged]]:
-    """Return the simplest candidate that foretells no worse than the best, and those as simple and good."""
+def preferred(pool: list[ScoredCandidate], options: Options) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
+    """Return the simplest candidate that predicts no worse than the best, and those as simple and good."""
     leader = max(pool, key=lambda one: one.evidence)
     close = [leader, *(one for one in pool if one is not leader and not _clearly(leader, one, options))]
     fewest = min(one.parameters for one in close)
@@ -173,46 +173,46 @@ def preferred(pool: list[Judged], options: Options) -> tuple[Judged, list[Judged
     return best, [one for one in simple if one is not best and lead(best, one) < margin(best, one, options)]
 
 
-def _clearly(one: Judged, other: Judged, options: Options) -> bool:
-    """Whether `one` foretells a held-out record better than `other` by more than chance."""
+def _clearly(one: ScoredCandidate, other: ScoredCandidate, options: Options) -> bool:
+    """Whether `one` predicts a held-out record better than `other` by more than chance."""
     if one.prediction is None:
         return one.evidence - other.evidence > margin(one, other, options)
     if other.prediction is None:
-        # so far behind that it was not asked to foretell
+        # so far behind that it was not asked to predict
         return True
-    over = judged(other.fitted, other.prediction, one.fitted, one.prediction)
+    over = scored(other.fitted, other.prediction, one.fitted, one.prediction)
     return any(low > 0 for low, _ in held_out_bounds(over, options).values())
 
 
-def _adds(one: Judged, other: Judged, options: Options) -> bool:
-    """Whether `one` foretells better than `other` by more than chance and by enough."""
+def _adds(one: ScoredCandidate, other: ScoredCandidate, options: Options) -> bool:
+    """Whether `one` predicts better than `other` by more than chance and by enough."""
     closes = one.prediction is None or _closes(other.prediction.reduced_chi2, one.prediction.reduced_chi2)
     return closes and _clearly(one, other, options)
 
 
-def worth_a_name(one: Judged, found: Round) -> bool:
+def worth_a_name(one: ScoredCandidate, found: Round) -> bool:
     """Whether a candidate closes enough of the gap that its base leaves on held-out records."""
-    return one.prediction is None or _closes(found.foretold.reduced_chi2, one.prediction.reduced_chi2)
+    return one.prediction is None or _closes(found.predicted.reduced_chi2, one.prediction.reduced_chi2)
 
 
 def _closes(before: float, after: float) -> bool:
     return before - after > _LEAST * max(before - 1.0, 0.0)
 
 
-def _all_needed(bench: Bench, first: Round, one: Judged) -> bool:
-    """Whether held-out records are foretold clearly worse without each of the effects; sets the gate 'drop'.
+def _all_needed(context: SearchContext, first: Round, one: ScoredCandidate) -> bool:
+    """Whether held-out records are predicted clearly worse without each of the effects; sets the gate 'drop'.
 
     The effects are put in the order in which they are missed.
     """
     missed = {}
     for name in one.fitted.names:
-        other = without(bench, first, name, one.fitted.names)
+        other = without(context, first, name, one.fitted.names)
         if other is None or (other.prediction is None and one.prediction is not None):
-            # it cannot be flown, or is so far behind that it was not asked to foretell
+            # it cannot be flown, or is so far behind that it was not asked to predict
             missed[name] = np.inf
             continue
-        over = judged(other.fitted, other.prediction, one.fitted, one.prediction)
-        needed = _adds(one, other, bench.options)
+        over = scored(other.fitted, other.prediction, one.fitted, one.prediction)
+        needed = _adds(one, other, context.options)
         missed[name] = over.evidence if needed else -np.inf
     one.gates["drop"] = all(size > 0 for size in missed.values())
     one.fitted = replace(one.fitted, names=tuple(sorted(missed, key=lambda name: -missed[name])))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.decision.judge import Judged
+from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
@@ -56,11 +56,13 @@ def share_text(share: float) -> str:
     return f"{np.floor(100 * share * 10**digits) / 10**digits:.{digits}f} %"
 
 
-def remains_of(base: Fitted, foretold: Prediction | None, best: Judged, mass: float) -> list[Remains]:
+def remains_of(
+    base: Fitted, predicted: Prediction | None, best: ScoredCandidate, mass: float
+) -> list[Remains]:
     """What an accepted effect leaves of the gap, in training and on held-out records."""
     found = [_remains("training", base, best.fitted, mass, best.ceiling)]
-    if best.prediction is not None and foretold is not None:
-        found.append(_remains("held_out", foretold, best.prediction, mass))
+    if best.prediction is not None and predicted is not None:
+        found.append(_remains("held_out", predicted, best.prediction, mass))
     return found
 
 

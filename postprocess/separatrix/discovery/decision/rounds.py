@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One round of the search: every candidate screened, refitted, and foretelling the held-out records."""
+"""One round of the search: every candidate screened, refitted, and predicting the held-out records."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from separatrix.discovery.decision.judge import Judged, judged
+from separatrix.discovery.decision.scoring import ScoredCandidate, scored
 from separatrix.discovery.fitting.catalogue import ON_REQUEST, Candidate, Scales
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
@@ -24,7 +24,7 @@ from separatrix.discovery.fitting.refit import (
     in_place_of,
     refit,
 )
-from separatrix.discovery.fitting.rig import beside_faults, cleaned
+from separatrix.discovery.fitting.rig import cleaned, with_imperfections
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
 
@@ -46,7 +46,7 @@ _NEAR = 3.0
 
 
 @dataclass
-class Bench:
+class SearchContext:
     """All that a search needs to know beside the machine."""
 
     training: Data
@@ -54,7 +54,7 @@ class Bench:
     scales: Scales | SensedScales
     options: Options
 
-    def foretell(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
+    def predict(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
         """Score the held-out records; from where an `other` prediction ended there, too."""
         if self.held_out is None:
             return None
@@ -63,14 +63,16 @@ class Bench:
         known = Known(fit.values, fitted.covariance, fitted.unseen)
         return predict(self.held_out, fitted.model, free, known, misfit, other)
 
-    def foretell_beside_faults(self, fitted: Fitted, other: Prediction) -> Prediction:
-        """The same by the parameters as they are beside faults of a rig in the training records."""
+    def predict_with_imperfections(self, fitted: Fitted, other: Prediction) -> Prediction:
+        """The same by the parameters as they are beside imperfections of a rig in the training records."""
         free, fit = fitted.problem.free, fitted.fit
-        beside = beside_faults(fitted.problem, fit)
+        beside = with_imperfections(fitted.problem, fit)
         lower, upper = (np.array([getattr(one, side) for one in free]) for side in ("lower", "upper"))
         known = Known(np.clip(fit.values + beside.shift, lower, upper), beside.covariance, fitted.unseen)
         misfit = max(1.0, cleaned(fitted.problem, fit).reduced_chi2)
-        return replace(predict(self.held_out, fitted.model, free, known, misfit, other), beside_faults=True)
+        return replace(
+            predict(self.held_out, fitted.model, free, known, misfit, other), with_imperfections=True
+        )
 
 
 @dataclass
@@ -78,29 +80,29 @@ class Round:
     """Candidates of a round, best first, and the screen that chose them."""
 
     base: Fitted
-    foretold: Prediction | None
+    predicted: Prediction | None
     candidates: dict[str, Candidate]
     signatures: list[Signature]
     screened: Screened
     # why some effects make no sense for this machine
     absent: dict[str, str]
-    judged: list[Judged] = field(default_factory=list)
+    scored: list[ScoredCandidate] = field(default_factory=list)
     # families as functions that were fitted on this base: effect, machine begun from, whether strictly
-    tables: list[tuple[str, Fitted, bool, Judged | None]] = field(default_factory=list)
+    tables: list[tuple[str, Fitted, bool, ScoredCandidate | None]] = field(default_factory=list)
 
-    def judge(self, fitted: Fitted, prediction: Prediction | None) -> Judged:
+    def score(self, fitted: Fitted, prediction: Prediction | None) -> ScoredCandidate:
         """Evidence over the base of this round."""
-        return judged(self.base, self.foretold, fitted, prediction)
+        return scored(self.base, self.predicted, fitted, prediction)
 
     def rank(self) -> None:
         """Put those of most evidence first."""
-        self.judged.sort(key=lambda one: -one.evidence)
+        self.scored.sort(key=lambda one: -one.evidence)
 
 
 def run_round(
-    bench: Bench,
+    context: SearchContext,
     base: Fitted,
-    foretold: Prediction | None,
+    predicted: Prediction | None,
     first: float,
     last: float,
     earlier: Round | None = None,
@@ -114,16 +116,16 @@ def run_round(
     An `earlier` round and its fits stand where its base was this very fit; the fits are carried on where the
     base was fitted again.
     """
-    options = bench.options
+    options = context.options
     stands = earlier is not None and earlier.base is base
     if stands:
         # those of now are held against those of then as they are by themselves
-        known_alone = [replace(one, faults=None) for one in earlier.judged]
-        found = replace(earlier, foretold=foretold, judged=known_alone)
+        known_alone = [replace(one, imperfections=None) for one in earlier.scored]
+        found = replace(earlier, predicted=predicted, scored=known_alone)
     else:
-        found = _screened(bench, base, foretold, first)
-    known = {one.name: one.fitted for one in earlier.judged} if earlier else {}
-    ends = [one for one in found.judged if one.fitted.fit.converged]
+        found = _screened(context, base, predicted, first)
+    known = {one.name: one.fitted for one in earlier.scored} if earlier else {}
+    ends = [one for one in found.scored if one.fitted.fit.converged]
     rival = max(ends, key=lambda one: one.training).fitted if ends else None
     if rival is None and base.fit.like_noise(2):
         rival = base
@@ -131,12 +133,12 @@ def run_round(
     if stands:
         chosen = [name for name in chosen if name not in known]
     # those that led before first: others may be out of the race at once
-    led = list(known)
-    chosen.sort(key=lambda name: led.index(name) if name in led else len(led))
+    warm_started = list(known)
+    chosen.sort(key=lambda name: warm_started.index(name) if name in warm_started else len(warm_started))
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
         fitted = refit(
-            bench.training,
+            context.training,
             base,
             found.candidates[name],
             found.screened,
@@ -144,23 +146,23 @@ def run_round(
             options.quick,
             known.get(name),
         )
-        # what is far behind a machine that leaves only noise and foretells need not foretell
-        told = None if _out_of_race(fitted, found, rival) else bench.foretell(fitted, _leading(found))
-        found.judged.append(_simplest(bench, found, found.judge(fitted, told)))
-        fitted = found.judged[-1].fitted
+        # what is far behind a machine that leaves only noise and predicts need not predict
+        told = None if _out_of_race(fitted, found, rival) else context.predict(fitted, _leading(found))
+        found.scored.append(_simplest(context, found, found.score(fitted, told)))
+        fitted = found.scored[-1].fitted
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
     found.rank()
-    _carry_on(bench, found)
-    _cross(bench, found)
-    _same_motion(bench, found)
-    _fair(bench, found)
+    _carry_on(context, found)
+    _cross(context, found)
+    _same_motion(context, found)
+    _fair(context, found)
     return found
 
 
-def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float) -> Round:
+def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None, at: float) -> Round:
     """All candidates on top of a machine and what they would do, none of them fitted yet."""
-    options = bench.options
+    options = context.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
     absent: dict[str, str] = {}
@@ -176,7 +178,7 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
         if base.problem.in_force and effect_of(name).acts != "flight":
             absent[name] = "it does nothing to the force along a known motion"
             continue
-        made = candidate_of(base.model, free, base.names, name, bench.scales)
+        made = candidate_of(base.model, free, base.names, name, context.scales)
         if isinstance(made, str):
             absent[name] = made
         else:
@@ -186,32 +188,34 @@ def _screened(bench: Bench, base: Fitted, foretold: Prediction | None, at: float
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
     absent = {name: absent[name] for name in every if name in absent}
-    return Round(base, foretold, candidates, signatures, screen(base.fit, signatures), absent)
+    return Round(base, predicted, candidates, signatures, screen(base.fit, signatures), absent)
 
 
-def _simplest(bench: Bench, found: Round, whole: Judged, doubtful: bool = True) -> Judged:
+def _simplest(
+    context: SearchContext, found: Round, whole: ScoredCandidate, doubtful: bool = True
+) -> ScoredCandidate:
     """The effect, or one of its laws alone that has more evidence; if `doubtful`, where one may be zero."""
     best = whole
-    if whole.prediction is None and bench.held_out is not None:
+    if whole.prediction is None and context.held_out is not None:
         return best
     candidate = found.candidates[whole.name]
-    for part, fitted in halves(bench.training, found.base, candidate, whole.fitted, doubtful):
-        one = found.judge(fitted, bench.foretell(fitted, whole.prediction))
+    for part, fitted in halves(context.training, found.base, candidate, whole.fitted, doubtful):
+        one = found.score(fitted, context.predict(fitted, whole.prediction))
         if one.evidence > best.evidence:
             best, found.candidates[whole.name] = one, part
     return best
 
 
 def _leading(found: Round) -> Prediction | None:
-    """What foretells the held-out records best so far: its starts there are the nearest."""
-    told = [one for one in found.judged if one.prediction is not None and one.held_out > 0]
-    return max(told, key=lambda one: one.held_out).prediction if told else found.foretold
+    """What predicts the held-out records best so far: its starts there are the nearest."""
+    told = [one for one in found.scored if one.prediction is not None and one.held_out > 0]
+    return max(told, key=lambda one: one.held_out).prediction if told else found.predicted
 
 
 def _out_of_race(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:
     if rival is None or not (rival.fit.like_noise(2) and beaten(fitted, rival)):
         return False
-    return rival is found.base or any(one.fitted is rival and one.held_out >= 0 for one in found.judged)
+    return rival is found.base or any(one.fitted is rival and one.held_out >= 0 for one in found.scored)
 
 
 def _beaten_by_noise(fitted: Fitted, base: Fitted) -> bool:
@@ -219,69 +223,69 @@ def _beaten_by_noise(fitted: Fitted, base: Fitted) -> bool:
     return base.fit.like_noise(2) and beaten(fitted, base)
 
 
-def _fair(bench: Bench, found: Round) -> None:
-    """Let the base foretell also from where the best candidate began, and hold all against that."""
-    if found.foretold is None or not found.judged or found.judged[0].held_out < _WORTH:
+def _fair(context: SearchContext, found: Round) -> None:
+    """Let the base predict also from where the best candidate began, and hold all against that."""
+    if found.predicted is None or not found.scored or found.scored[0].held_out < _WORTH:
         return
-    fairer = bench.foretell(found.base, found.judged[0].prediction)
-    if fairer.score[fairer.good].sum() <= found.foretold.score[found.foretold.good].sum():
+    fairer = context.predict(found.base, found.scored[0].prediction)
+    if fairer.score[fairer.good].sum() <= found.predicted.score[found.predicted.good].sum():
         return
-    found.foretold = fairer
-    found.judged = [found.judge(one.fitted, one.prediction) for one in found.judged]
+    found.predicted = fairer
+    found.scored = [found.score(one.fitted, one.prediction) for one in found.scored]
     found.rank()
 
 
-def _carry_on(bench: Bench, found: Round) -> None:
-    """Fit those near the best to their end and let them foretell, however little they were thought worth."""
-    order = found.judged
+def _carry_on(context: SearchContext, found: Round) -> None:
+    """Fit those near the best to their end and let them predict, however little they were thought worth."""
+    order = found.scored
     for place, one in enumerate(order):
-        near = order[0].evidence - one.evidence < _NEAR * bench.options.separation
+        near = order[0].evidence - one.evidence < _NEAR * context.options.separation
         done = one.fitted.fit.converged
-        if near and not (done and (one.prediction is not None or bench.held_out is None)):
+        if near and not (done and (one.prediction is not None or context.held_out is None)):
             fitted = one.fitted
             # of a base that leaves only noise the rest could be no name
             if not done and not _beaten_by_noise(fitted, found.base):
-                fitted = carried_on(bench.training, found.candidates[one.name], fitted, patient=True)
-            order[place] = found.judge(fitted, bench.foretell(fitted, one.prediction))
+                fitted = carried_on(context.training, found.candidates[one.name], fitted, patient=True)
+            order[place] = found.score(fitted, context.predict(fitted, one.prediction))
     found.rank()
 
 
-def _cross(bench: Bench, found: Round) -> None:
+def _cross(context: SearchContext, found: Round) -> None:
     """Try the leaders again from where the best one led: minima that only one of them left."""
-    order = found.judged
-    if len(order) < 2 or bench.options.quick or order[0].training < _WORTH_CROSSING:
+    order = found.scored
+    if len(order) < 2 or context.options.quick or order[0].training < _WORTH_CROSSING:
         return
     best = order[0].fitted
     for place in range(1, min(_CROSSED, len(order))):
         one = order[place]
         behind = order[0].evidence - one.evidence
-        if behind < bench.options.separation or one.evidence < _SHARE * order[0].evidence:
+        if behind < context.options.separation or one.evidence < _SHARE * order[0].evidence:
             continue
-        better = crossed(bench.training, one.fitted, best, found.candidates[one.name])
+        better = crossed(context.training, one.fitted, best, found.candidates[one.name])
         if better is not one.fitted:
-            order[place] = found.judge(better, bench.foretell(better, order[0].prediction))
+            order[place] = found.score(better, context.predict(better, order[0].prediction))
     found.rank()
 
 
-def _same_motion(bench: Bench, found: Round) -> None:
+def _same_motion(context: SearchContext, found: Round) -> None:
     """Let names of one motion follow the best of them: it is theirs too, unless sticking tells them apart.
 
     A name that is behind only because its fit ended in another minimum would be missed in a verdict.
     """
-    order = found.judged
+    order = found.scored
     best = next((one for one in order if effect_of(one.name).confused), None)
-    if best is None or bench.options.quick or best.training < _WORTH_CROSSING:
+    if best is None or context.options.quick or best.training < _WORTH_CROSSING:
         return
     if best.evidence < _SHARE * order[0].evidence:
         return
     for place, one in enumerate(order):
         behind = best.evidence - one.evidence
-        if one.name not in effect_of(best.name).confused or behind < bench.options.separation:
+        if one.name not in effect_of(best.name).confused or behind < context.options.separation:
             continue
-        better = in_place_of(bench.training, one.fitted, best.fitted, found.candidates[one.name])
+        better = in_place_of(context.training, one.fitted, best.fitted, found.candidates[one.name])
         if better is not one.fitted:
-            one = found.judge(better, bench.foretell(better, best.prediction))
-        order[place] = _simplest(bench, found, one, doubtful=False)
+            one = found.score(better, context.predict(better, best.prediction))
+        order[place] = _simplest(context, found, one, doubtful=False)
     found.rank()
 
 

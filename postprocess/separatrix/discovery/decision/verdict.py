@@ -6,17 +6,17 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from separatrix.discovery.decision.beside_faults import in_words
 from separatrix.discovery.decision.decide import Decision
-from separatrix.discovery.decision.decoys import decoys
 from separatrix.discovery.decision.experiments import experiments
-from separatrix.discovery.decision.judge import LARGER_NOISE, LITTLE, Judged
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
+from separatrix.discovery.decision.negative_controls import negative_controls
 from separatrix.discovery.decision.other_machine import other_drive, other_machine, other_phase, other_units
 from separatrix.discovery.decision.remains import Remains, remains_of
-from separatrix.discovery.decision.rounds import Bench, Round
+from separatrix.discovery.decision.rounds import Round, SearchContext
+from separatrix.discovery.decision.scoring import LARGER_NOISE, LITTLE, ScoredCandidate
 from separatrix.discovery.decision.where import Map, sentences, where_maps
+from separatrix.discovery.decision.with_imperfections import in_words
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
@@ -25,7 +25,7 @@ from separatrix.discovery.fitting.joint_effects import effect_of, place_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
 from separatrix.discovery.fitting.refit import WORSE, Fitted
-from separatrix.discovery.fitting.rig import beside_faults
+from separatrix.discovery.fitting.rig import with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import Function, Part
 from separatrix.discovery.measured.sensors import SensedPrepared
@@ -40,7 +40,7 @@ _EXPERIMENTS, _RIVALS = 5, 4
 class Findings:
     """Everything that was found, for the verdict, the files and the figures."""
 
-    bench: Bench
+    context: SearchContext
     base: Fitted
     decision: Decision
     held_out_chosen: str
@@ -49,16 +49,16 @@ class Findings:
 
 def verdict_of(findings: Findings) -> dict:
     """Return the content of verdict.json."""
-    decision, bench = findings.decision, findings.bench
+    decision, context = findings.decision, findings.context
     first = decision.rounds[0]
     best = decision.corrected
     final = best.fitted if best else findings.base
     named = list(final.names) if decision.accepted else []
-    findings.maps = where_maps(findings.base, bench.scales.mass, bench.options, named)
+    findings.maps = where_maps(findings.base, context.scales.mass, context.options, named)
     rivals = [one for one in decision.rivals if list(one.fitted.names) in decision.alternatives]
     return {
         "outcome": decision.outcome,
-        "compared": bench.options.compare,
+        "compared": context.options.compare,
         "complete": decision.complete,
         "effects": named,
         "added": list(final.names) if decision.added else [],
@@ -80,14 +80,14 @@ def verdict_of(findings: Findings) -> dict:
         "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
         "reasons": decision.reasons,
-        "asked_for": None if bench.options.candidates is None else list(bench.options.candidates),
+        "asked_for": None if context.options.candidates is None else list(context.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
-        "detectable": detectable(bench, first),
+        "detectable": detectable(context, first),
         "confusability": {"names": first.screened.names, "matrix": first.screened.cosines},
         **_next(findings, final, [one.fitted for one in rivals]),
         "d_prime": d_prime(first),
-        "decoys": decoys(first, bench.options),
-        "candidates": [_candidate(one) for one in first.judged],
+        "negative_controls": negative_controls(first, context.options),
+        "candidates": [_candidate(one) for one in first.scored],
         "ceiling": {
             one.name: {"gain": one.gain, "rank": one.rank, "p": one.p}
             for one in decision.base_ceiling.families
@@ -96,7 +96,7 @@ def verdict_of(findings: Findings) -> dict:
         "notes": _notes(findings),
         "records": _records(findings),
         "held_out_chosen": findings.held_out_chosen,
-        "seed": bench.options.seed,
+        "seed": context.options.seed,
         "version": __version__,
     }
 
@@ -143,8 +143,8 @@ def _remaining(findings: Findings) -> list[Remains]:
     decision = findings.decision
     if decision.corrected is None:
         return []
-    mass = findings.bench.scales.mass
-    return remains_of(findings.base, decision.foretold, decision.corrected, mass)
+    mass = findings.context.scales.mass
+    return remains_of(findings.base, decision.predicted, decision.corrected, mass)
 
 
 def _function(found: Function | None, final: Fitted) -> dict | None:
@@ -203,14 +203,14 @@ def d_prime(found: Round) -> dict[str, float]:
     return {name: float(np.sqrt(max(0.0, 2 * found.screened.gain[name]))) for name in found.screened.names}
 
 
-def _candidate(one: Judged) -> dict:
+def _candidate(one: ScoredCandidate) -> dict:
     fit = one.fitted.fit
     return {
         "effect": one.name,
         "training": one.training,
         "held_out": one.held_out,
-        # of faults of a rig beside it, where they were weighed
-        "faults": None if one.faults is None else sum(one.faults),
+        # of imperfections of a rig beside it, where they were weighed
+        "imperfections": None if one.imperfections is None else sum(one.imperfections),
         "evidence": one.evidence,
         "reduced_chi2": fit.sample_chi2,
         # what is worse than the base has not found its minimum, at which the effect does nothing
@@ -224,10 +224,10 @@ def _candidate(one: Judged) -> dict:
 
 
 def _notes(findings: Findings) -> list[str]:
-    bench = findings.bench
+    context = findings.context
     notes = [
         f"{one.record.name}: {note}"
-        for data in (bench.training, bench.held_out)
+        for data in (context.training, context.held_out)
         for one in (data.prepared if data else ())
         for note in one.notes
     ]
@@ -237,12 +237,12 @@ def _notes(findings: Findings) -> list[str]:
         notes += other_phase(data, fitted)
         if isinstance(fitted.problem, CoordinateProblem):
             continue
-        notes += doubted_noise(data, fitted.problem, fitted.fit, bench.scales.mass)
+        notes += doubted_noise(data, fitted.problem, fitted.fit, context.scales.mass)
     several = isinstance(findings.base.problem, CoordinateProblem)
-    notes += [] if several else other_machine(bench.training, fits[0][2], bench.options)
-    notes += other_units(bench.training, findings.base.model)
+    notes += [] if several else other_machine(context.training, fits[0][2], context.options)
+    notes += other_units(context.training, findings.base.model)
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
-        notes += other_drive(bench.training, findings.base)
+        notes += other_drive(context.training, findings.base)
     best = findings.decision.accepted
     notes += _of_accepted(best[0]) if best else []
     fit = findings.base.fit
@@ -254,17 +254,19 @@ def _notes(findings: Findings) -> list[str]:
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     for _, data, fitted in fits:
         notes += unused(data, fitted.fit, contact)
-    placed = any(one.record.has_place for one in bench.training.prepared)
-    if contact and placed and not any(one.impacts.size for one in bench.training.smoothed):
+    placed = any(one.record.has_place for one in context.training.prepared)
+    if contact and placed and not any(one.impacts.size for one in context.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
         why = (
-            ": they do not stand out of the stated noise" if too_quiet(bench.training, fits[0][2].fit) else ""
+            ": they do not stand out of the stated noise"
+            if too_quiet(context.training, fits[0][2].fit)
+            else ""
         )
         notes.append(f"no impacts are seen in the records{why}; the fitted machine has {hits}")
     return notes
 
 
-def _of_accepted(best: Judged) -> list[str]:
+def _of_accepted(best: ScoredCandidate) -> list[str]:
     """What the numbers of an accepted effect do not say by themselves."""
     notes = []
     if best.leaves == LITTLE:
@@ -278,21 +280,21 @@ def _of_accepted(best: Judged) -> list[str]:
             f"reduced chi^2 is {size:.3g} with effect.{best.name}, and no force explains more: the noise "
             f"is taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
         )
-    if best.prediction is not None and best.prediction.beside_faults:
+    if best.prediction is not None and best.prediction.with_imperfections:
         notes.append(
-            "held-out records are foretold, and their gap is told, by the parameters as they are beside "
-            "small faults of the rig; those of the verdict and of extended.toml are as fitted"
+            "held-out records are predicted, and their gap is told, by the parameters as they are beside "
+            "small imperfections of the rig; those of the verdict and of extended.toml are as fitted"
         )
     return notes
 
 
 def _final(findings: Findings) -> list[tuple[str, Data, Fitted | Prediction]]:
     """Use of records, the records, and the machine of the verdict on them."""
-    bench, decision = findings.bench, findings.decision
+    context, decision = findings.context, findings.decision
     best = decision.corrected
-    fits = [("training", bench.training, best.fitted if best else findings.base)]
-    if bench.held_out is not None:
-        fits.append(("held out", bench.held_out, best.prediction if best else decision.foretold))
+    fits = [("training", context.training, best.fitted if best else findings.base)]
+    if context.held_out is not None:
+        fits.append(("held out", context.held_out, best.prediction if best else decision.predicted))
     return fits
 
 
@@ -321,8 +323,8 @@ def _records(findings: Findings) -> list[dict]:
 
 
 def _parameters(fitted: Fitted) -> dict:
-    # faults of the rig may have moved a value by more than the noise did
-    errors = beside_faults(fitted.problem, fitted.fit).errors
+    # imperfections of the rig may have moved a value by more than the noise did
+    errors = with_imperfections(fitted.problem, fitted.fit).errors
     found = {}
     for one, value, error, held in zip(
         fitted.problem.free, fitted.fit.values, errors, fitted.fit.at_bound, strict=True
@@ -359,8 +361,8 @@ def _gap(findings: Findings) -> dict:
     best = decision.corrected
     gap = {"training": {"before": findings.base.fit.sample_chi2, "noise_floor": 1.0}}
     gap["training"]["after"] = best.fitted.fit.sample_chi2 if best else gap["training"]["before"]
-    if decision.foretold is not None:
-        before = decision.foretold.sample_chi2
+    if decision.predicted is not None:
+        before = decision.predicted.sample_chi2
         gap["held_out"] = {"before": before, "noise_floor": 1.0}
         gap["held_out"]["after"] = best.prediction.sample_chi2 if best else before
     return gap

@@ -99,7 +99,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     # values of stretches scatter by more than samples do where the noise has memory: that is no misfit
     known = found.of_samples or misfit < _MISFIT
     if not known and found.memory:
-        # nor are small faults of a rig
+        # nor are small imperfections of a rig
         known = misfit * cleaned(problem, fit).reduced_chi2 / fit.reduced_chi2 < _MISFIT
     for prepared in data.prepared:
         prepared.memory = found.memory if known else 0.0

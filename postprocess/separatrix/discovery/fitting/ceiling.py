@@ -50,7 +50,7 @@ class Ceiling:
     """All families; `p` is corrected for their number."""
 
     families: list[Family]
-    # the fit that they were tried on: without what faults of a rig may explain
+    # the fit that they were tried on: without what imperfections of a rig may explain
     fit: Fit
 
     @property
@@ -72,7 +72,7 @@ class Ceiling:
 
 
 def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
-    """Try every family on what faults of a rig leave of the residuals of a fit."""
+    """Try every family on what imperfections of a rig leave of the residuals of a fit."""
     fit = cleaned(problem, fit)
     families = []
     made = (

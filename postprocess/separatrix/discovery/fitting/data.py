@@ -46,10 +46,10 @@ class Data:
     prepared: list[Prepared]
     smoothed: list[Smoothed]
     stages: list[Segments]
-    # starts of the longest segments by the base machine, tried where another machine is caught
+    # starts of the longest segments by the base machine, tried where another machine is in a local minimum
     base_starts: np.ndarray | None = None
-    # what faults of the rig add to the longest segments where they are fitted, as in a `Problem`
-    faults: dict[tuple[str, int | None], np.ndarray] | None = None
+    # what imperfections of the rig add to the longest segments where they are fitted, as in a `Problem`
+    imperfections: dict[tuple[str, int | None], np.ndarray] | None = None
 
     @property
     def last(self) -> int:
@@ -58,12 +58,12 @@ class Data:
 
     def problem(self, model, stage: int, free: list[Free]) -> Problem:
         """The fit of a model to the segments of a stage."""
-        faults = self.faults if stage == self.last else None
-        return Problem(model, self.prepared, self.stages[stage], free, faults)
+        imperfections = self.imperfections if stage == self.last else None
+        return Problem(model, self.prepared, self.stages[stage], free, imperfections)
 
-    def with_faults(self, faults: dict[tuple[str, int | None], np.ndarray]) -> "Data":
-        """The same records with faults of the rig, whose noise may be measured anew."""
-        return replace(self, prepared=[copy(one) for one in self.prepared], faults=faults)
+    def with_imperfections(self, imperfections: dict[tuple[str, int | None], np.ndarray]) -> "Data":
+        """The same records with imperfections of the rig, whose noise may be measured anew."""
+        return replace(self, prepared=[copy(one) for one in self.prepared], imperfections=imperfections)
 
     def smoothed_starts(self, stage: int) -> np.ndarray:
         """Starts (segments, 2) of a stage from the smoother."""

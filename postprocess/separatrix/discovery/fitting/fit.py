@@ -57,7 +57,7 @@ class Fit:
     at_bound: np.ndarray
     movable: np.ndarray
     # in a minimum that is known not to be the lowest
-    caught: bool = False
+    in_local_minimum: bool = False
     # whether steps of every length were tried from there and gained next to nothing
     exhausted: bool = False
     # what condensed stretches leave over, and its degrees of freedom
@@ -73,7 +73,7 @@ class Fit:
         there too, within two standard errors.
         """
         most = max(_NEAR, 1e-4 * self.total, _KINK * max(1.0, self.reduced_chi2) if self.exhausted else 0.0)
-        return bool(self.decrement < most and self.good.any() and not self.caught)
+        return bool(self.decrement < most and self.good.any() and not self.in_local_minimum)
 
     def normal_equations(self, *columns: np.ndarray) -> Reduced:
         """Of derivatives of the residual (segments, samples, any), starts eliminated, over good segments."""
@@ -265,7 +265,7 @@ class _Descent:
                 self.damping = max(10 * self.damping, 1e-6)
             if self.kept is None:
                 return False
-            # the fault may be that of the old derivatives
+            # the imperfection may be that of the old derivatives
             self.renew()
             self.look(0.0, rough=False)
 
@@ -291,7 +291,7 @@ class _Descent:
     def behind(self, beat: float) -> bool:
         """Whether the squares are above `beat` by far more than the next steps may gain.
 
-        A few segments may be caught in a wrong minimum and are left out.
+        A few segments may be in a wrong minimum and are left out.
         """
         squares = np.sort(_costs(self.current, self.scale, robust=False)[self.inside.any(axis=1)])
         return bool(squares[:-_SPARED].sum() - beat > max(_LOST, _OVER * self.decrement))

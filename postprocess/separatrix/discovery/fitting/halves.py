@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An effect of several laws, as dry and viscous asymmetry, fitted with one of them alone.
 
-What the records say nothing of foretells other records badly, and the whole effect would lose to another of
+What the records say nothing of predicts other records badly, and the whole effect would lose to another of
 its one law.
 """
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well a fitted machine foretells records that the fit never saw.
+"""How well a fitted machine predicts records that the fit never saw.
 
 Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its
-clock, the curve of its sensor where faults of the rig are fitted. The score of a segment is the logarithm of
-its predictive density, with the uncertainty of the fitted parameters.
+clock, the curve of its sensor where imperfections of the rig are fitted. The score of a segment is the
+logarithm of its predictive density, with the uncertainty of the fitted parameters.
 
 Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
 forgiven more; what is held against such a machine is compared by squared errors alone.
@@ -38,8 +38,8 @@ class Prediction:
     misfit: float
     # of the parameters of the machine, which come first among those that are free and were not fitted here
     covariance: np.ndarray
-    # whether the parameters are those beside faults of a rig in the training records
-    beside_faults: bool = False
+    # whether the parameters are those beside imperfections of a rig in the training records
+    with_imperfections: bool = False
 
     @property
     def reduced_chi2(self) -> float:
@@ -70,7 +70,7 @@ class Prediction:
 class Known:
     """What training records say of the parameters of a machine: values, covariance; which they do not show.
 
-    Those are fitted to the held-out records: without an impact in training, nobody can foretell how one ends.
+    Those are fitted to the held-out records: without an impact in training, nobody can predict how one ends.
     """
 
     values: np.ndarray
@@ -88,7 +88,7 @@ def predict(
 ) -> Prediction:
     """Score held-out records by a machine as far as it is known, of the given `misfit` in training.
 
-    `guess`: what another machine foretold there, whose starts, crank and clock are tried too.
+    `guess`: what another machine predicted there, whose starts, crank and clock are tried too.
     """
     shared = [i for i, one in enumerate(free) if one.record is None]
     whole = on_other_records(free, data.prepared)
@@ -104,7 +104,7 @@ def predict(
 
 
 def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
-    """What `one` foretells better by segment, so that the sum is that of all segments together.
+    """What `one` predicts better by segment, so that the sum is that of all segments together.
 
     What a common error of the parameters costs or gains in every segment of a record is shared out among
     them; what several records say alike counts once, and is taken from each by what it says.
@@ -113,7 +113,7 @@ def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
     seen = parts != 0
     whole = ahead(one, other, other.misfit)
     if not other.fit.converged:
-        # it might foretell so much better
+        # it might predict so much better
         whole -= min(max(0.0, whole), 0.5 * other.fit.decrement)
     numbers = np.unique(one.record)
     alone = np.array([ahead(one, other, other.misfit, one.record == number) for number in numbers])
@@ -127,7 +127,7 @@ def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
-    """What `one` foretells better than `other` by segment, in units of log density; 0 where one fails.
+    """What `one` predicts better than `other` by segment, in units of log density; 0 where one fails.
 
     The difference of the scores. Where the `other` misses the records by far more than the noise, its density
     means nothing, and it is the difference of squared errors (the comparison of Diebold and Mariano), both
@@ -142,7 +142,7 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
 def ahead(
     one: Prediction, other: Prediction, misfit: float | None = None, rows: np.ndarray | None = None
 ) -> float:
-    """What `one` foretells better than `other` in all segments, or in some rows, in units of log density.
+    """What `one` predicts better than `other` in all segments, or in some rows, in units of log density.
 
     Where both leave only noise, the density is that of all segments together: a parameter that is hardly
     known errs in all of them alike, which counts once. The larger misfit of both chooses the measure, or one
@@ -180,8 +180,8 @@ def _fit_own(
     fit = None
     if guess is not None:
         problem = data.problem(settled, data.last, kept)
-        led = _records_own(guess, kept, values[own])
-        fit = minimise(problem, led, guess.fit.starts, most=12, fixed=fixed[own])
+        warm_started = _records_own(guess, kept, values[own])
+        fit = minimise(problem, warm_started, guess.fit.starts, most=12, fixed=fixed[own])
     # a guess that leads all segments to a minimum needs no way from short ones
     if fit is None or not fit.converged or suspicious(fit).size:
         stages = list(range(len(data.stages)))

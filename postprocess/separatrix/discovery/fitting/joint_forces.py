@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Families of forces at the places of a machine of several bodies, and the small faults of its rig.
+"""Families of forces at the places of a machine of several bodies, and the small imperfections of its rig.
 
 As in `ceiling` and `rig` those of one body: what a flexible machine could explain of what a fit left over,
 and what is no missing effect.
@@ -20,7 +20,7 @@ _FEWEST_IMPACTS = 4
 POWERS = 4
 """Of the speed before an impact, of which kicks are made: from 0 on."""
 FAULT = 5e-4
-"""Standard deviation of a fault of a rig over the signal: half of the largest that is usual."""
+"""Standard deviation of a imperfection of a rig over the signal: half of the largest that is usual."""
 
 
 def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
@@ -76,8 +76,10 @@ def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     return found
 
 
-def fault_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
-    """Columns of small faults of a rig: sensors that are not quite linear, further harmonics of a drive."""
+def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
+    """Columns of small imperfections of a rig: sensors that are not quite linear, further harmonics of a
+    drive.
+    """
     count, length = problem.segments.inside.shape
     good = problem.segments.inside & fit.good[:, None]
     columns = []

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is free in a fit: parameters of the machine, drive scale; phase, clock and zero of each record; small
-faults of the rig."""
+imperfections of the rig."""
 
 from dataclasses import dataclass, replace
 
@@ -20,7 +20,7 @@ _FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding")
 _KNOTS = ("speed[", "place[", "stretch[", "penetration[")
 SENSOR_BIAS = "effect.sensor_bias.bias"
 SENSOR_ZERO = "nuisance:sensor_zero"
-FAULT_OF_RIG = "nuisance:fault_of_rig:"
+IMPERFECTION = "nuisance:imperfection_of_rig:"
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
@@ -46,7 +46,8 @@ class Free:
     positive: bool = False
     # each record has its own beside it
     varies: bool = False
-    # standard error of a nuisance about 0 that a measurement of its own leaves, or that such faults have
+    # standard error of a nuisance about 0 that a measurement of its own leaves, or that such imperfections
+    # have
     error: float | None = None
     # another path of the machine that has the same value, or minus that
     also: str | None = None
@@ -86,8 +87,8 @@ class Free:
 
     @property
     def is_fault(self) -> bool:
-        """Whether this is the size of a small fault of the rig, which adds to what is measured."""
-        return self.path.startswith(FAULT_OF_RIG)
+        """Whether this is the size of a small imperfection of the rig, which adds to what is measured."""
+        return self.path.startswith(IMPERFECTION)
 
 
 def base_parameters(model, measured_force: bool, in_force: bool = False) -> list[Free]:
@@ -186,7 +187,7 @@ def sensor_zeros(free: list[Free], count: int) -> list[Free]:
 
 def on_other_records(free: list[Free], prepared: list) -> list[Free]:
     """What is free on other records: what `free` has for all of them, and what each record has of its own."""
-    # what was learned of a fault that all records share is not to be learned again
+    # what was learned of a imperfection that all records share is not to be learned again
     own = [replace(one, error=None) for one in free if one.record is None]
     if prepared[0].frequency:
         own += record_nuisances(prepared)

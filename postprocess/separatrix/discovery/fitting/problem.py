@@ -44,15 +44,15 @@ class Problem:
         prepared: list[Prepared],
         segments: Segments,
         free: list[Free],
-        faults: dict[tuple[str, int | None], np.ndarray] | None = None,
+        imperfections: dict[tuple[str, int | None], np.ndarray] | None = None,
     ) -> None:
         """Collect what every evaluation needs.
 
-        `faults`: what each fault of the rig of size 1, by path and record, adds to x and v
+        `imperfections`: what each imperfection of the rig of size 1, by path and record, adds to x and v
         (segments, channels, length) [m, m/s].
         """
         self.model = model
-        self.faults = faults or {}
+        self.imperfections = imperfections or {}
         self.prepared = prepared
         self.segments = segments
         self.free = free
@@ -66,13 +66,13 @@ class Problem:
         found = self.like(self.model, self.free, padded(old.record[rows], old.first[rows], old.last[rows]))
         # short segments are a narrower table
         length = found.segments.inside.shape[1]
-        found.faults = {key: table[rows][:, :, :length] for key, table in self.faults.items()}
+        found.imperfections = {key: table[rows][:, :, :length] for key, table in self.imperfections.items()}
         return found
 
     def like(self, model, free: list[Free], segments: Segments | None = None) -> "Problem":
-        """The same records with another model, or other segments without faults of the rig."""
+        """The same records with another model, or other segments without imperfections of the rig."""
         found = type(self)(model, self.prepared, self.segments if segments is None else segments, free)
-        found.faults = self.faults if segments is None else {}
+        found.imperfections = self.imperfections if segments is None else {}
         return found
 
     def imitating(self, motion: Evaluation) -> "Problem":
@@ -210,7 +210,7 @@ class Problem:
             out.used[rows, column] = 1 / rows.size
             if derivatives:
                 out.by_parameter[rows, column, place] = 1 / error
-        self._add_faults(values, out)
+        self._add_imperfections(values, out)
         # what was not flown to its end says nothing
         for table in (out.residual, out.by_start, out.by_parameter):
             if table is not None:
@@ -242,13 +242,13 @@ class Problem:
         table[:, : self.compared.shape[1]][~self.compared] = 0
         return table
 
-    def _add_faults(self, values: np.ndarray, out: Evaluation) -> None:
-        """What faults of the rig add to residuals and derivatives."""
-        if not self.faults:
+    def _add_imperfections(self, values: np.ndarray, out: Evaluation) -> None:
+        """What imperfections of the rig add to residuals and derivatives."""
+        if not self.imperfections:
             return
         deviations, length = self._deviations(), self.segments.inside.shape[1]
         for place, one in enumerate(self.free):
-            table = self.faults.get((one.path, one.record))
+            table = self.imperfections.get((one.path, one.record))
             if table is None:
                 continue
             rows = self._rows_of(one.record)

@@ -22,7 +22,7 @@ _BAD = 1.3
 _HOPELESS = 4.0
 # log-likelihood by which a candidate is out of the race
 _BEATEN = 15.0
-# segments that may be caught in a wrong minimum
+# segments that may be in a wrong minimum
 _SPARED = 3
 # share of segments that one fit may follow more than another without being better
 _FEW = 0.1
@@ -84,7 +84,7 @@ def refit(
     worse after its first start is not tried further. A fit `known` from another noise is carried on, and
     tried from the base of now where it is neither good nor out of the race.
     """
-    best, led = None, "known"
+    best, warm_started = None, "known"
     if known is not None:
         best = carried_on(data, candidate, known)
         out = best.fit.far_off(hopeless(base)) or (rival is not None and beaten(best, rival))
@@ -107,9 +107,9 @@ def refit(
             # of other kinds it was done with the last stage
             fit = polished(data, problem, fit, data.last, 8, rival=base.fit)
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        agreed = best is not None and _agree({kind, led}, found, best, base, rival)
+        agreed = best is not None and _agree({kind, warm_started}, found, best, base, rival)
         if best is None or _better(found, best):
-            best, led = found, kind
+            best, warm_started = found, kind
         best.tries = tries
         if agreed:
             break
@@ -167,7 +167,7 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
     best = found if _better(found, best) else best
     if gain_over(best, base)[0] > -WORSE:
         return best
-    return replace(best, fit=replace(best.fit, caught=True))
+    return replace(best, fit=replace(best.fit, in_local_minimum=True))
 
 
 def _absent(values: np.ndarray, candidate: Candidate) -> np.ndarray:
@@ -215,8 +215,8 @@ def _same_minimum(one: Fitted, other: Fitted) -> bool:
 def _agree(kinds: set[str], one: Fitted, other: Fitted, base: Fitted, rival: Fitted | None) -> bool:
     """Whether two starts of one candidate make another one needless.
 
-    They led to the same minimum, one from afar; or both are hopeless, or alike and far behind the base or a
-    converged rival.
+    They led to the same minimum, one from afar; or both are hopeless, or alike and far behind the
+    base or a converged rival.
     """
     if "far" in kinds and _same_minimum(one, other):
         return True
@@ -270,7 +270,9 @@ def _try(
 
 
 def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
-    """A fit tried again from where another effect led the machine and its starts; the better of both."""
+    """A fit tried again from where another effect led the machine and its starts; the better of
+    both.
+    """
     values = _base_values(other, candidate)
     added = list(candidate.added)
     values[added] = one.fit.values[list(one.added)]
@@ -304,20 +306,20 @@ def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     theirs = other.fit.values.copy()
     theirs[list(other.added)] *= _FIRST_SHARE
     motion = other.problem.evaluate(theirs, other.fit.starts, derivatives=False)
-    # which is that of the machine, without what faults of the rig add to it
-    faults = np.array([free.is_fault for free in one.problem.free])
-    begun = np.where(faults, 0.0, known)
-    fit = minimise(one.problem.imitating(motion), begun, other.fit.starts, most=8, fixed=faults)
+    # which is that of the machine, without what imperfections of the rig add to it
+    imperfections = np.array([free.is_fault for free in one.problem.free])
+    begun = np.where(imperfections, 0.0, known)
+    fit = minimise(one.problem.imitating(motion), begun, other.fit.starts, most=8, fixed=imperfections)
     starts = other.fit.starts + (fit.starts - other.fit.starts) / _FIRST_SHARE
     values = known + (fit.values - begun) / _FIRST_SHARE
     lower, upper = (
         np.array([getattr(free, side) for free in one.problem.free]) for side in ("lower", "upper")
     )
-    led = replace(other, fit=replace(other.fit, starts=starts))
-    return _from(data, one, np.clip(values, lower, upper), led)
+    warm_started = replace(other, fit=replace(other.fit, starts=starts))
+    return _from(data, one, np.clip(values, lower, upper), warm_started)
 
 
-def led_by(data: Data, one: Fitted, other: Fitted) -> Fitted:
+def warm_started_by(data: Data, one: Fitted, other: Fitted) -> Fitted:
     """A fit tried again from the end of a machine that contains it; the better of both."""
     return _from(data, one, shared_values(one, other), other)
 
@@ -378,7 +380,7 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
 
 
 def common(one: Fitted, other: Fitted) -> np.ndarray:
-    """Segments that both fits can be judged by."""
+    """Segments that both fits can be scored by."""
     return one.fit.good & other.fit.good
 
 

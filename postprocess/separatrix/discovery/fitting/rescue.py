@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Segments whose start is caught in a wrong minimum (one impact more or less), tried from others."""
+"""Segments whose start is in a wrong minimum (one impact more or less), tried from
+others.
+"""
 
 import numpy as np
 

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small faults that every rig has and that are no missing effect: a sensor that is not quite linear, a drive
-with further harmonics.
+"""Small imperfections that every rig has and that are no missing effect.
+
+A sensor that is not quite linear, a drive with further harmonics.
 
 Each is known to be no larger than some 1e-3 of the signal, which is two standard deviations here; as
 nuisances with that prior they take from a residual what they may explain of it (G. E. P. Box's tentative
@@ -16,8 +17,8 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import FAULT, fault_columns_of
-from separatrix.discovery.fitting.machine import FAULT_OF_RIG, Free
+from separatrix.discovery.fitting.joint_forces import FAULT, imperfection_columns_of
+from separatrix.discovery.fitting.machine import IMPERFECTION, Free
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, inverse_scaled, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
@@ -26,28 +27,28 @@ from separatrix.discovery.fitting.response import force_columns, in_swings
 
 _POWERS = (2, 3)
 _HARMONICS = 6
-# standard deviations that a fault may have, and by which factors its prior is made narrower for that
+# standard deviations that a imperfection may have, and by which factors its prior is made narrower for that
 _LARGEST = 3.0
 _NARROWER, _NARROWEST = 4.0, 1e15
-# precisions over that of the prior: faults of half and of a quarter of its size are as usual
+# precisions over that of the prior: imperfections of half and of a quarter of its size are as usual
 _SIZES = (1.0, 4.0, 16.0)
 # least eigenvalue of scaled equations that says something
 _SHOWN = 1e-11
 
 
-def fault_columns(problem: Problem, fit: Fit) -> np.ndarray:
-    """Columns (segments, width, q) of faults of one standard deviation, along the fitted motion.
+def imperfection_columns(problem: Problem, fit: Fit) -> np.ndarray:
+    """Columns (segments, width, q) of imperfections of one standard deviation, along the fitted motion.
 
     None where they are fitted already.
     """
-    if problem.faults:
+    if problem.imperfections:
         return np.zeros((*fit.evaluation.residual.shape, 0))
-    return _columns_of_faults(problem, fit)
+    return _columns_of_imperfections(problem, fit)
 
 
-def _columns_of_faults(problem: Problem, fit: Fit, usual: float | None = None) -> np.ndarray:
+def _columns_of_imperfections(problem: Problem, fit: Fit, usual: float | None = None) -> np.ndarray:
     if isinstance(problem, CoordinateProblem):
-        return fault_columns_of(problem, fit)
+        return imperfection_columns_of(problem, fit)
     state = scaled_motion(problem, fit)
     inside = problem.segments.inside
     columns = [_sensor(problem, fit)]
@@ -89,7 +90,7 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Beside:
-    """Parameters fitted beside faults, linearised: their steps from the fit, and covariance."""
+    """Parameters fitted beside imperfections, linearised: their steps from the fit, and covariance."""
 
     shift: np.ndarray
     covariance: np.ndarray
@@ -108,13 +109,13 @@ class Beside:
 
     @property
     def errors(self) -> np.ndarray:
-        """Standard errors, what faults may have moved a parameter by included."""
+        """Standard errors, what imperfections may have moved a parameter by included."""
         known = np.diag(self.covariance)
         return np.where(known > 0, np.sqrt(known + self.shift**2), 0.0)
 
 
 def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
-    """The fit without what faults may explain of its residuals, its parameters fitted beside them.
+    """The fit without what imperfections may explain of its residuals, its parameters fitted beside them.
 
     The first parameters of a held-out record were fitted to others: they are `known` from there.
     """
@@ -126,56 +127,57 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
     return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
 
 
-def faults_of(problem: Problem, fit: Fit, usual: float) -> dict[tuple[str, int | None], np.ndarray]:
-    """What each fault of one standard deviation adds to x and v along a fitted motion, as in a `Problem`.
+def imperfections_of(problem: Problem, fit: Fit, usual: float) -> dict[tuple[str, int | None], np.ndarray]:
+    """What each imperfection of one standard deviation adds to x and v along a fit, as in `Problem`.
 
     Sensors are curved in each record by themselves; the drive has its harmonics in all of them, of one size
     over the `usual` acceleration [m/s^2].
     """
     records = range(len(problem.prepared))
-    keys = [(f"{FAULT_OF_RIG}curve_{power}", number) for number in records for power in _POWERS]
+    keys = [(f"{IMPERFECTION}curve_{power}", number) for number in records for power in _POWERS]
     curves = len(keys)
-    columns = np.nan_to_num(problem.in_units(_columns_of_faults(problem, fit, usual)))
+    columns = np.nan_to_num(problem.in_units(_columns_of_imperfections(problem, fit, usual)))
     columns[:, :, :, curves:] *= fit.good[:, None, None, None]
     if columns.shape[3] > curves:
         orders = range(1, _HARMONICS + 1)
-        keys += [(f"{FAULT_OF_RIG}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
+        keys += [(f"{IMPERFECTION}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
     return dict(zip(keys, np.moveaxis(columns, 3, 0), strict=True))
 
 
-def as_nuisances(faults: dict[tuple[str, int | None], np.ndarray]) -> list[Free]:
-    """The sizes of faults as unknowns, in standard deviations."""
-    return [Free(path, 0.0, -_LARGEST, _LARGEST, record=record, error=1.0) for path, record in faults]
+def as_nuisances(imperfections: dict[tuple[str, int | None], np.ndarray]) -> list[Free]:
+    """The sizes of imperfections as unknowns, in standard deviations."""
+    return [Free(path, 0.0, -_LARGEST, _LARGEST, record=record, error=1.0) for path, record in imperfections]
 
 
 def _explained(problem: Problem, fit: Fit, known: Beside | None) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of parameters and faults, and their steps and sizes that explain most of a residual."""
+    """Columns of parameters and imperfections, and their steps and sizes that explain most of a residual."""
     columns, matrix, gradient, open_ = _equations(problem, fit)
     p = fit.evaluation.by_parameter.shape[2]
     without = solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     if known is not None:
         known.add_to(matrix, gradient, open_)
     sizes = solve_scaled(_bounded(matrix, gradient, p, open_)[0], gradient, open_)
-    # a step that the fit has without faults is none of theirs
+    # a step that the fit has without imperfections is none of theirs
     sizes[:p] -= without
     return columns, sizes
 
 
 def cleaned_prediction(fitted: Fitted, told: Prediction) -> Fit:
-    """What a machine foretells, without what faults may explain of it and may have made of its parameters."""
+    """What a machine predicts, without what imperfections may explain of it and may have made of its
+    parameters.
+    """
     return cleaned(told.problem, told.fit, _shared(fitted, told))
 
 
 def _shared(fitted: Fitted, told: Prediction) -> Beside:
-    """What training records know beside faults of the parameters that held-out records share with them, as a
-    step from those that foretold."""
+    """Step of the shared parameters that training records suggest beside imperfections."""
     shared = [i for i, one in enumerate(fitted.problem.free) if one.record is None]
-    known = beside_faults(fitted.problem, fitted.fit).of(shared)
-    return replace(known, shift=np.zeros_like(known.shift)) if told.beside_faults else known
+    known = with_imperfections(fitted.problem, fitted.fit).of(shared)
+    return replace(known, shift=np.zeros_like(known.shift)) if told.with_imperfections else known
 
 
-def beside_faults(problem: Problem, fit: Fit) -> Beside:
-    """Parameters of a fit as they would be, and be known, if the faults of a rig were fitted too.
+def with_imperfections(problem: Problem, fit: Fit) -> Beside:
+    """Parameters of a fit as they would be, and be known, if the imperfections of a rig were fitted too.
 
     Enlarged where the fit beside them is still worse than the noise.
     """
@@ -189,22 +191,24 @@ def beside_faults(problem: Problem, fit: Fit) -> Beside:
 
 
 def _equations(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Columns of parameters and faults, their normal equations beside the starts, and which may move."""
+    """Columns of parameters and imperfections, their normal equations beside the starts, and which may
+    move.
+    """
     evaluation = fit.evaluation
-    columns = np.concatenate([evaluation.by_parameter, fault_columns(problem, fit)], axis=2)
-    faults = columns.shape[2] - evaluation.by_parameter.shape[2]
+    columns = np.concatenate([evaluation.by_parameter, imperfection_columns(problem, fit)], axis=2)
+    imperfections = columns.shape[2] - evaluation.by_parameter.shape[2]
     return (
         columns,
         *fit.normal_equations(columns).total(),
-        np.r_[~fit.at_bound & fit.movable, np.ones(faults, bool)],
+        np.r_[~fit.at_bound & fit.movable, np.ones(imperfections, bool)],
     )
 
 
 def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> tuple[np.ndarray, float]:
-    """Normal equations of p parameters and of faults with their prior, and its precision.
+    """Normal equations of p parameters and of imperfections with their prior, and its precision.
 
-    It is made narrower until no fault is larger than such faults are: what takes a larger one is none.
-    """
+    It is made narrower until no imperfection is larger than such imperfections are: what takes a larger one
+    is none."""
     prior = 1.0
     while True:
         known = matrix + np.diag(np.r_[np.zeros(p), np.full(gradient.size - p, prior)])
@@ -225,65 +229,77 @@ def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -
 
 @dataclass(frozen=True)
 class Contest:
-    """A machine against another one that may have faults of a rig, linearised, in units of log-likelihood.
+    """A machine against another one with imperfections of a rig, in log-likelihood, linearised.
 
-    `gain`: what it explains of what the other one leaves over. For each usual size of faults, `faults`: the
+    `gain`: what it explains of what the other one leaves over. For each usual size of imperfections,
+    `imperfections`: the
     evidence of the other one with them over without them, and `beside`: what the machine explains then.
     """
 
     gain: float
-    faults: np.ndarray
+    imperfections: np.ndarray
     beside: np.ndarray
 
     def __add__(self, other: "Contest") -> "Contest":
         """Of two groups of records of one rig."""
-        return Contest(self.gain + other.gain, self.faults + other.faults, self.beside + other.beside)
+        return Contest(
+            self.gain + other.gain, self.imperfections + other.imperfections, self.beside + other.beside
+        )
 
     @property
     def lead(self) -> float:
-        """Evidence of the machine over the other one: a rig has faults of one size or it has none."""
-        return max(self.gain, float(np.max(self.faults + self.beside))) - max(0.0, float(self.faults.max()))
+        """Evidence of the machine over the other one: a rig has imperfections of one size or it has none."""
+        return max(self.gain, float(np.max(self.imperfections + self.beside))) - max(
+            0.0, float(self.imperfections.max())
+        )
 
 
-def share_beside_faults(one: Fitted, other: Fitted) -> float:
-    """Share of what one machine explains of what another leaves over that is evidence against faults too."""
+def share_with_imperfections(one: Fitted, other: Fitted) -> float:
+    """Share of what one machine explains of what another leaves over that is evidence against imperfections
+    too.
+    """
     return _share(_contest(one, other))
 
 
-def shares_beside_faults(
+def shares_with_imperfections(
     fitted: tuple[Fitted, Fitted], told: tuple[Prediction, Prediction]
 ) -> tuple[float, float]:
-    """The same in training, and of what two machines foretell: one rig made all the records."""
+    """The same in training, and of what two machines predict: one rig made all the records."""
     training, held_out = _contest(*fitted), _foretold_contest(told, fitted[1])
     return _share(training), _share(held_out, training)
 
 
-def weight_of_faults(fitted: Fitted, told: Prediction | None) -> tuple[float, float]:
-    """Log-likelihood by which faults of a rig beside a machine follow records better, those that were fitted
-    and those that it foretold; nothing where they do not pay for their freedom in training.
+def weight_of_imperfections(fitted: Fitted, told: Prediction | None) -> tuple[float, float]:
+    """Log-likelihood that imperfections of a rig gain beside a machine, on fitted and on predicted records.
+
+    Nothing where they do not pay for their freedom in training.
 
     The noise counts as known: what one machine leaves is held against what others leave.
     """
     training = _contest(fitted, fitted, noise_known=True)
-    size = int(np.argmax(training.faults))
-    if training.faults[size] <= 0:
+    size = int(np.argmax(training.imperfections))
+    if training.imperfections[size] <= 0:
         return 0.0, 0.0
     if told is None:
-        return float(training.faults[size]), 0.0
+        return float(training.imperfections[size]), 0.0
     held_out = _foretold_contest((told, told), fitted, noise_known=True)
-    return float(training.faults[size]), float(held_out.faults[size])
+    return float(training.imperfections[size]), float(held_out.imperfections[size])
 
 
-def evidence_of_faults(fitted: Fitted, told: Prediction) -> float:
-    """Evidence that a rig has faults where a machine is right but for them; 0 if nothing speaks for them."""
+def evidence_of_imperfections(fitted: Fitted, told: Prediction) -> float:
+    """Evidence that a rig has imperfections where a machine is right but for them; 0 if nothing speaks for
+    them.
+    """
     both = _contest(fitted, fitted) + _foretold_contest((told, told), fitted)
-    return max(0.0, float(both.faults.max()))
+    return max(0.0, float(both.imperfections.max()))
 
 
 def _foretold_contest(
     told: tuple[Prediction, Prediction], other: Fitted, noise_known: bool = False
 ) -> Contest:
-    """Of what they foretell; the other one is known as training records know it, without or beside faults."""
+    """Of what they predict; the other one is known as training records know it, without or beside
+    imperfections.
+    """
     beside = _shared(other, told[1])
     without = Beside(np.zeros(beside.shift.size), told[1].covariance)
     return _contest(*told, (without, beside), noise_known)
@@ -303,16 +319,16 @@ def _contest(
     known: tuple[Beside, Beside] | None = None,
     noise_known: bool = False,
 ) -> Contest:
-    """Hold a machine against another one whose parameters are `known` without and beside faults, or free.
+    """Compare a machine with one whose parameters are `known` without and beside imperfections, or free.
 
     Unless the noise is known, it counts as larger where the machine is worse than it.
     """
     evaluation, both = other.fit.evaluation, common(one, other)
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
-    faults = fault_columns(other.problem, other.fit)
-    p, q = evaluation.by_parameter.shape[2], faults.shape[2]
+    imperfections = imperfection_columns(other.problem, other.fit)
+    p, q = evaluation.by_parameter.shape[2], imperfections.shape[2]
     # what one of them does not follow is not a number
-    columns = np.concatenate([evaluation.by_parameter, faults, moved], axis=2)
+    columns = np.concatenate([evaluation.by_parameter, imperfections, moved], axis=2)
     columns[~both] = 0.0
     residual = np.where(both[:, None], evaluation.residual, 0.0)
     by_start = np.where(both[:, None, None], evaluation.by_start, 0.0)
@@ -332,7 +348,9 @@ def _contest(
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Normal equations of p parameters, of faults, and of what another machine explains, which is last."""
+    """Normal equations of p parameters, of imperfections, and of what another machine explains, which is
+    last.
+    """
 
     matrix: np.ndarray
     gradient: np.ndarray
@@ -340,12 +358,14 @@ class _Evidence:
     p: int
 
     def narrowest(self, known: Beside | None) -> float:
-        """Precision of faults with which none is larger than such faults are."""
+        """Precision of imperfections with which none is larger than such imperfections are."""
         matrix, gradient, open_ = self._known(known)
         return _bounded(matrix[:-1, :-1], gradient[:-1], self.p, open_[:-1])[1]
 
     def of(self, known: Beside | None, prior: float | None) -> tuple[float, float]:
-        """Log evidence (up to a constant) with faults of a precision, or none; what is explained then."""
+        """Log evidence (up to a constant) with imperfections of a precision, or none; what is explained
+        then.
+        """
         matrix, gradient, open_ = self._known(known)
         kept = np.ones(gradient.size, bool)
         logarithm = _surprise(known)

@@ -211,7 +211,7 @@ class _Curve:
     # what the machine without it has of the function already
     beside: np.ndarray
     # the fit that it began from
-    led: Fit
+    warm_started: Fit
 
     @classmethod
     def begun(
@@ -302,7 +302,9 @@ class _Curve:
         return self._parts(*found, freed, centre)
 
     def far_from(self, fitted: Fitted) -> bool:
-        """Whether records are followed so much worse than by a fitted machine that segments are caught."""
+        """Whether records are followed so much worse than by a fitted machine that segments are
+        in a local minimum.
+        """
         return self.fitted.fit.total > _CAUGHT * fitted.fit.total
 
     def gain(self, fitted: Fitted) -> float:
@@ -350,7 +352,9 @@ class _Curve:
             try:
                 tried = minimise(problem, values, fit.starts, most=_FOLLOW, fixed=fixed)
                 # a function that was far off leaves segments in wrong minima
-                tried = polished(self.data, problem, tried, self.data.last, _FOLLOW, fixed, rival=self.led)
+                tried = polished(
+                    self.data, problem, tried, self.data.last, _FOLLOW, fixed, rival=self.warm_started
+                )
             except SeparatrixError:
                 continue
             both = tried.good & fit.good

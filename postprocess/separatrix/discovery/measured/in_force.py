@@ -8,7 +8,7 @@ import numpy as np
 
 from separatrix.discovery.measured.preflight import Prepared, check_velocity, velocity_noise
 from separatrix.discovery.measured.records import Record
-from separatrix.discovery.measured.sensor_faults import check_clipped_force
+from separatrix.discovery.measured.sensor_imperfections import check_clipped_force
 from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
 from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError

@@ -13,7 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 from separatrix.discovery.measured.clock import pieces_of
 from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
-from separatrix.discovery.measured.sensor_faults import check_clipping, left_out
+from separatrix.discovery.measured.sensor_imperfections import check_clipping, left_out
 from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_sensor
 from separatrix.errors import SeparatrixError
 

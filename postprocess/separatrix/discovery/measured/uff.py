@@ -92,7 +92,7 @@ def _unit(name: str, one: dict, units: FileUnits | None) -> str:
     kind = kind_of(name)
     if units is None or kind == "phi":
         return label
-    if units.fault:
+    if units.problem:
         # no unit: refused, or the user says which
         return "unknown: code and factors of data set 164 disagree"
     length, force = units.length, units.force

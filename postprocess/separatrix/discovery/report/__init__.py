@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The story of a verdict: pages and figures."""
+"""The sections of the report of a verdict: pages and figures."""

@@ -13,7 +13,7 @@ from separatrix.discovery.options import Options
 from separatrix.discovery.report import figures, where_figures
 from separatrix.discovery.report.comparison import compare
 from separatrix.discovery.report.pages import Beside, Picture, Section, page_of, write_pdf
-from separatrix.discovery.report.story import depends_on, names, sections
+from separatrix.discovery.report.verdict_sections import depends_on, names, sections
 from separatrix.open import reading
 
 
@@ -27,17 +27,17 @@ def write_report(folder: Path, base: Path, options: Options | None = None) -> tu
     with reading(folder / "verdict.json"):
         verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
     with style.context(), h5py.File(folder / "details.h5", "r") as details:
-        story = illustrated(verdict, details)
+        parts = illustrated(verdict, details)
         if options.quick:
             motion = Section(
                 "motion", "What it means for the motion", ["No maps before and after in a quick look."]
             )
         else:
             motion = compare(Path(base), folder / "extended.toml", verdict, details, options.progress)
-        story = [motion if section.key == "motion" else section for section in story]
+        parts = [motion if section.key == "motion" else section for section in parts]
         title = f"Missing physics: {_title(verdict)}"
         made = folder / "report.html", folder / "report.pdf"
-        page = page_of(title, story)
+        page = page_of(title, parts)
         made[0].write_text(page, encoding="utf-8")
         lacking = write_pdf(made[1], page)
         if lacking:
@@ -57,8 +57,8 @@ def _title(verdict: dict) -> str:
 
 def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
     """All sections with the figures that need no further run."""
-    story = sections(verdict)
-    by_key = {section.key: section for section in story}
+    parts = sections(verdict)
+    by_key = {section.key: section for section in parts}
     visible = Options().visible
     _first_page(by_key["verdict"], verdict)
     _show(
@@ -119,7 +119,7 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "residuals in standard "
         "deviations of the noise; grey: 95 % of noise.",
     )
-    return story
+    return parts
 
 
 def _first_page(section: Section, verdict: dict) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The story of a verdict in words and tables; every number is one of verdict.json."""
+"""The sections of the report of a verdict in words and tables; every number is one of verdict.json."""
 
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
@@ -19,12 +19,12 @@ from separatrix.discovery.wording import (
 GATES = {
     "converged": "the fit converged",
     "detect": "the gain is larger than chance gives the best of all candidates",
-    "hold-out": "records that the fit never saw are foretold better",
+    "hold-out": "records that the fit never saw are predicted better",
     "separate": "no other effect does about as well",
     "admissible": "sign and size make sense, and differ from zero",
     "stable": "the effect pays in nearly every resampling of the record",
     "adequate": "what is left is noise",
-    "foretold": "held-out records are followed as well",
+    "predicted": "held-out records are followed as well",
     "drop": "each of the effects is needed beside the other",
 }
 
@@ -215,7 +215,7 @@ def _where(verdict: dict) -> Section:
     if not verdict["where"]:
         said: list = ["No bin of any map differs from zero by more than chance."]
     else:
-        no_gap = ["There is no gap: what follows is what noise and small faults of a rig leave."]
+        no_gap = ["There is no gap: what follows is what noise and small imperfections of a rig leave."]
         said = [
             *(no_gap if verdict["outcome"] == "none" else []),
             "In each bin a constant force is fitted to what the base machine leaves over. These bins "
@@ -255,7 +255,7 @@ def _missing(verdict: dict) -> Section:
             "d' is the linearised size of the effect over its standard error; training and held out are "
             "log-likelihoods "
             "gained over the base machine; the evidence counts their sum less one per parameter, and what "
-            "faults of a rig beside the effect add, where those were weighed.",
+            "imperfections of a rig beside the effect add, where those were weighed.",
         ]
     if verdict["not_tested"]:
         body += ["Not tested:", [f"{words(name)}: {why}." for name, why in verdict["not_tested"].items()]]

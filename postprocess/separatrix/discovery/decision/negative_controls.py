@@ -2,22 +2,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Candidates that are known to be wrong: each effect as it would act in other segments than its own.
 
-A decoy keeps the size and the shape of a signature and loses its bond to the motion. One that could be named
-would show that names come from what the base lacks altogether and not from the effect.
+A negative control keeps the size and the shape of a signature and loses its bond to the motion. One that
+could be named would show that names come from what the base lacks altogether and not from the effect.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.judge import family_wise
 from separatrix.discovery.decision.rounds import Round
+from separatrix.discovery.decision.scoring import family_wise
 from separatrix.discovery.fitting.screen import Signature, screen
 from separatrix.discovery.options import Options
 
 
-def decoys(found: Round, options: Options) -> dict:
-    """Return the number of decoys, the best one with its gain and p value, and whether it could be named."""
+def negative_controls(found: Round, options: Options) -> dict:
+    """Return the number of negative controls, the best one with its gain and p value, and whether it could
+    be named.
+    """
     base = found.base
     made = [_exchanged(one, base.problem.segments.record) for one in found.signatures]
     made = [one for one in made if np.any(one.columns)]
@@ -28,7 +30,7 @@ def decoys(found: Round, options: Options) -> dict:
     gains = {one.name: screened.gain[one.name] - one.columns.shape[2] for one in made}
     best = max(made, key=lambda one: gains[one.name])
     p = family_wise(2 * screened.gain[best.name] / scale, best.columns.shape[2], screened.tests)
-    real = max((one.training - one.parameters for one in found.judged), default=0.0)
+    real = max((one.training - one.parameters for one in found.scored), default=0.0)
     return {
         "tested": len(made),
         "best": best.name,

@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, flexible, judge, several
-from separatrix.discovery.decision.gates import foremost
-from separatrix.discovery.decision.judge import (
-    Judged,
+from separatrix.discovery.decision import decide, flexible, scoring, several
+from separatrix.discovery.decision.gates import best_of
+from separatrix.discovery.decision.scoring import (
+    ScoredCandidate,
     _together_clear,
     beyond_doubt,
-    foretells,
     held_out_bounds,
+    predicts,
     stable,
 )
 from separatrix.discovery.fitting.evaluation import Evaluation
@@ -42,22 +42,22 @@ def fitted(name: str, chi2: np.ndarray) -> Fitted:
     return Fitted((name,) if name else (), None, problem, fit(chi2), (0,))
 
 
-def judged(gains: np.ndarray, held_out: np.ndarray) -> Judged:
+def scored(gains: np.ndarray, held_out: np.ndarray) -> ScoredCandidate:
     """A candidate that gains so much log-likelihood by segment over a base with chi^2 of 100 in each."""
     one = fitted("coulomb", 100 - 2 * gains)
     prediction = SimpleNamespace(misfit=1.0)
-    return Judged(one, prediction, float(gains.sum()), float(held_out.sum()), held_out, 1)
+    return ScoredCandidate(one, prediction, float(gains.sum()), float(held_out.sum()), held_out, 1)
 
 
 def test_an_effect_that_a_few_segments_carry_needs_the_held_out_record():
     base = fitted("", np.full(COUNT, 100.0))
     few, even = np.zeros(COUNT), np.full(COUNT, 2.0)
     few[0] = 40.0
-    assert stable(judged(even, 0 * even), base, OPTIONS) > OPTIONS.inclusion
-    assert stable(judged(few, 0 * even), base, OPTIONS) < OPTIONS.inclusion
-    assert stable(judged(few, even), base, OPTIONS) > OPTIONS.inclusion
+    assert stable(scored(even, 0 * even), base, OPTIONS) > OPTIONS.inclusion
+    assert stable(scored(few, 0 * even), base, OPTIONS) < OPTIONS.inclusion
+    assert stable(scored(few, even), base, OPTIONS) > OPTIONS.inclusion
     # a record that was never fitted makes no name by itself
-    assert stable(judged(0.05 * few, even), base, OPTIONS) < OPTIONS.inclusion
+    assert stable(scored(0.05 * few, even), base, OPTIONS) < OPTIONS.inclusion
 
 
 def test_an_effect_that_few_segments_can_show_pays_without_the_best_of_them():
@@ -66,12 +66,12 @@ def test_an_effect_that_few_segments_can_show_pays_without_the_best_of_them():
     for gains, holds in (([9.0, 8.0, 7.0], True), ([30.0, 0.5, 0.2], False)):
         parts, told = np.zeros(COUNT), np.full(COUNT, 1e-6)
         parts[:3], told[:3] = gains, 1.0
-        one = judged(parts, np.zeros(COUNT))
+        one = scored(parts, np.zeros(COUNT))
         one.fitted.fit.reduced.matrix = told[:, None, None]
         assert (stable(one, base, OPTIONS) > OPTIONS.inclusion) == holds
         # what is by chance gained elsewhere is no second one
         parts[3:] = 0.2
-        one = judged(parts, np.zeros(COUNT))
+        one = scored(parts, np.zeros(COUNT))
         one.fitted.fit.reduced.matrix = told[:, None, None]
         assert (stable(one, base, OPTIONS) > OPTIONS.inclusion) == holds
 
@@ -79,33 +79,33 @@ def test_an_effect_that_few_segments_can_show_pays_without_the_best_of_them():
 def test_a_held_out_record_tells_an_effect_by_the_odds_of_a_name():
     """However much its segments differ: the bounds of so few by resampling are wide."""
     uneven = np.array([2.24, 2.17, 1.86, 1.37, 0.9, 0.4, 0.36, -0.37, -0.62, -0.79, -1.61, -1.66])
-    assert held_out_bounds(foretold(uneven, np.ones(12)), OPTIONS)[0][0] < 0
-    assert foretells(foretold(uneven, np.ones(12)), OPTIONS)
-    assert not foretells(foretold(uneven - 0.2, np.ones(12)), OPTIONS)
+    assert held_out_bounds(predicted(uneven, np.ones(12)), OPTIONS)[0][0] < 0
+    assert predicts(predicted(uneven, np.ones(12)), OPTIONS)
+    assert not predicts(predicted(uneven - 0.2, np.ones(12)), OPTIONS)
     # two that are followed by neither machine, and ten that agree
     apart = np.array([70.43, 7.58, 6.23, 5.86, 5.12, 4.71, 4.52, 3.97, 2.66, 2.62, 0.78, -62.82])
-    assert held_out_bounds(foretold(apart, np.ones(12)), OPTIONS)[0][0] < 0
-    assert foretells(foretold(apart, np.ones(12)), OPTIONS)
+    assert held_out_bounds(predicted(apart, np.ones(12)), OPTIONS)[0][0] < 0
+    assert predicts(predicted(apart, np.ones(12)), OPTIONS)
     # one segment alone may be one of a wrong minimum
     alone = np.array([7.0, *11 * [-0.1]])
-    assert not foretells(foretold(alone, np.ones(12)), OPTIONS)
+    assert not predicts(predicted(alone, np.ones(12)), OPTIONS)
     # impacts of one speed say nothing of how restitution falls with it; a doubtful effect is not proven so
-    silent, base = foretold(np.full(12, 0.1), np.ones(12)), fitted("", np.full(COUNT, 100.0))
+    silent, base = predicted(np.full(12, 0.1), np.ones(12)), fitted("", np.full(COUNT, 100.0))
     assert beyond_doubt(silent, base, OPTIONS)
     assert not beyond_doubt(silent, replace(base, fit=fit(np.full(COUNT, 100.0), decrement=50.0)), OPTIONS)
-    assert not beyond_doubt(foretold(np.zeros(12), np.ones(12)), base, OPTIONS)
+    assert not beyond_doubt(predicted(np.zeros(12), np.ones(12)), base, OPTIONS)
     silent.training = 5.0
     assert not beyond_doubt(silent, base, OPTIONS)
-    # whose noise is all that tells two machines apart that should foretell alike, and whose is not
+    # whose noise is all that tells two machines apart that should predict alike, and whose is not
     noise = np.array([*6 * [1.0], *6 * [-1.0]])
     for offset, information, holds in ((0.0, 1e-3, True), (0.0, 1e3, False), (-0.5, 1e-3, False)):
-        one = foretold(noise + offset, np.full(12, information))
+        one = predicted(noise + offset, np.full(12, information))
         assert beyond_doubt(one, base, OPTIONS) == holds
 
 
-def foretold(gains: np.ndarray, information: np.ndarray) -> Judged:
+def predicted(gains: np.ndarray, information: np.ndarray) -> ScoredCandidate:
     """A candidate that gains so much by held-out segment, each with so much information on it."""
-    one = judged(np.full(COUNT, 2.0), gains)
+    one = scored(np.full(COUNT, 2.0), gains)
     one.prediction.record = np.zeros(gains.size, int)
     one.prediction.fit = SimpleNamespace(reduced=SimpleNamespace(matrix=information[:, None, None]))
     return one
@@ -113,25 +113,25 @@ def foretold(gains: np.ndarray, information: np.ndarray) -> Judged:
 
 def test_segments_that_say_nothing_of_an_effect_do_not_spoil_its_bounds():
     everywhere, ones = np.repeat([4.0, 6.0], 8), np.ones(16)
-    low, high = held_out_bounds(foretold(everywhere, ones), OPTIONS)[0]
+    low, high = held_out_bounds(predicted(everywhere, ones), OPTIONS)[0]
     assert 64 <= low < 80 < high <= 96
     # without an impact restitution cannot show; a segment that the base cannot follow was not compared
     quiet = np.concatenate([everywhere, np.full(10, 1e-4)])
     silent = np.concatenate([ones, np.full(10, 1e-9)])
-    assert held_out_bounds(foretold(quiet, silent), OPTIONS)[0] == (low, high)
+    assert held_out_bounds(predicted(quiet, silent), OPTIONS)[0] == (low, high)
     lost = np.concatenate([everywhere, np.zeros(10)])
-    assert held_out_bounds(foretold(lost, np.ones(26)), OPTIONS)[0] == (low, high)
+    assert held_out_bounds(predicted(lost, np.ones(26)), OPTIONS)[0] == (low, high)
     # one segment that tells, of many: odds of 20 to 1, either way
     for gain, helps in ((50.0, True), (2.9, False), (-50.0, False)):
         one = np.array([gain, *12 * [0.0]])
-        low, high = held_out_bounds(foretold(one, np.ones(13)), OPTIONS)[0]
+        low, high = held_out_bounds(predicted(one, np.ones(13)), OPTIONS)[0]
         assert (low > 0) == helps
         assert (high > OPTIONS.harm) == (gain > -6)
 
 
-def contender(name: str, evidence: float) -> Judged:
+def contender(name: str, evidence: float) -> ScoredCandidate:
     one = fitted(name, np.full(COUNT, 47.0))
-    return Judged(one, None, evidence + 1, 0.0, np.zeros(0), 1)
+    return ScoredCandidate(one, None, evidence + 1, 0.0, np.zeros(0), 1)
 
 
 @pytest.mark.parametrize(("other", "behind", "own", "rivals"), [
@@ -139,14 +139,14 @@ def contender(name: str, evidence: float) -> Judged:
     ("stribeck", 3.1, 1.0, []),
     ("asymmetric_friction", 5.9, 1.0, ["asymmetric_friction"]),
     ("asymmetric_friction", 6.1, 1.0, []),
-    # small faults of a rig explain most of what tells them apart
+    # small imperfections of a rig explain most of what tells them apart
     ("stribeck", 20.0, 0.1, ["stribeck"]),
     ("stribeck", 40.0, 0.1, []),
 ])  # fmt: skip
 def test_two_names_of_one_motion_need_more_to_be_told_apart(monkeypatch, other, behind, own, rivals):
-    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: own)
+    monkeypatch.setattr(scoring, "share_with_imperfections", lambda *_: own)
     pool = [contender("offset_force", 50.0), contender(other, 50.0 - behind)]
-    best, close = foremost(pool, OPTIONS)
+    best, close = best_of(pool, OPTIONS)
     assert best.name == "offset_force"
     assert [one.name for one in close] == rivals
 
@@ -194,14 +194,14 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
     """20 segments of 50 samples: 0.05 of the noise of a sample is a chi^2 of 2.5."""
     base = fitted("", np.full(COUNT, 100.0))
     found = SimpleNamespace(base=base)
-    bench = SimpleNamespace(training=None, held_out=None, options=OPTIONS)
+    context = SimpleNamespace(training=None, held_out=None, options=OPTIONS)
     monkeypatch.setattr(decide, "missed", lambda data, fit, options: misses)
     gap = SimpleNamespace(closable=closable, p=p, mostly="velocity", fit=base.fit)
     effect = SimpleNamespace(training=gain / 2)
-    given = decide._give_up(bench, decide.Decision("none", [], [], [], [found], gap, None), effect)
+    given = decide._give_up(context, decide.Decision("none", [], [], [], [found], gap, None), effect)
     assert given.outcome == outcome
     # the same gap of the base, and no effect that stands out
-    other = decide._without_name(bench, decide.Decision("none", [], [], [], [found], gap, None))
+    other = decide._without_name(context, decide.Decision("none", [], [], [], [found], gap, None))
     assert other.outcome == ("none" if gain > 2.5 else outcome)
     (reason,) = given.reasons
     told = f"{np.sqrt(closable / 1000):.2g} of that of a sample (root mean square), p = {p:.2g}"
@@ -216,12 +216,12 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
 def test_a_table_of_friction_is_of_two_directions_unless_its_values_are_shared(name, also, two):
     one = fitted(name, np.full(COUNT, 47.0))
     one.problem.free = [Free(f"effect.{name}.force_1", 1.0, also=also)]
-    assert decide._of_two_directions(Judged(one, None, 0.0, 0.0, np.zeros(0), 1)) == two
+    assert decide._of_two_directions(ScoredCandidate(one, None, 0.0, 0.0, np.zeros(0), 1)) == two
 
 
-@pytest.mark.parametrize("foretells", [True, False])
-def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, foretells):
-    one = judged(np.full(COUNT, 2.0), np.full(COUNT, 2.0 if foretells else -2.0))
+@pytest.mark.parametrize("predicts", [True, False])
+def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, predicts):
+    one = scored(np.full(COUNT, 2.0), np.full(COUNT, 2.0 if predicts else -2.0))
 
     def pass_gates(_, best, *__):
         best.gates = dict.fromkeys(("detect", "stable", "converged", "admissible"), True)
@@ -230,32 +230,32 @@ def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, forete
     monkeypatch.setattr(decide, "ceiling", lambda *_: None)
     monkeypatch.setattr(decide, "flexible_member", lambda *_: (one, []))
     monkeypatch.setattr(decide, "pass_gates", pass_gates)
-    monkeypatch.setattr(decide, "judge_ceiling", lambda _, best: best.gates.update(adequate=True))
+    monkeypatch.setattr(decide, "score_ceiling", lambda _, best: best.gates.update(adequate=True))
     found = SimpleNamespace(base=one.fitted, screened=SimpleNamespace(tests=1.0))
-    bench = SimpleNamespace(scales=SimpleNamespace(mass=1.0))
-    assert (decide._shaped(bench, found) is not None) == foretells
+    context = SimpleNamespace(scales=SimpleNamespace(mass=1.0))
+    assert (decide._shaped(context, found) is not None) == predicts
 
 
 @pytest.mark.parametrize(("left", "named"), [
     ((1.0, 1.0), True),
-    # small faults of the rig explain what it leaves
+    # small imperfections of the rig explain what it leaves
     ((1.3, 1.0), True),
     ((1.3, 1.2), False),
 ])  # fmt: skip
 def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, left, named):
     """It has the freedom to follow the fitted ones where the missing force is no function at all."""
-    one = judged(np.full(COUNT, 5.0), np.ones(COUNT))
+    one = scored(np.full(COUNT, 5.0), np.ones(COUNT))
     told = Prediction(None, None, None, None, left[0], 1.0, None)
     one = replace(one, prediction=told)
     monkeypatch.setattr(decide, "cleaned_prediction", lambda *_: left[1])
     monkeypatch.setattr(decide, "misses", lambda told, *_: told.fit > 1.1)
     monkeypatch.setattr(decide, "_shaped", lambda *_: (one, []))
     monkeypatch.setattr(
-        decide, "conclude", lambda bench, decision, best, rivals: replace(decision, accepted=[best])
+        decide, "conclude", lambda context, decision, best, rivals: replace(decision, accepted=[best])
     )
     gap = decide.Decision("not-in-catalogue", [], [], [], [], None, None)
-    bench = SimpleNamespace(options=OPTIONS)
-    assert bool(decide._shape_alone(bench, gap, None).accepted) == named
+    context = SimpleNamespace(options=OPTIONS)
+    assert bool(decide._shape_alone(context, gap, None).accepted) == named
 
 
 def excess(size: float) -> SimpleNamespace:
@@ -283,10 +283,12 @@ def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatc
     monkeypatch.setattr(flexible, "knots_at", lambda member, seen, count: np.arange(count))
     monkeypatch.setattr(flexible, "fit_member", lambda *_: next(made))
     member = SimpleNamespace(seen=lambda _: None, values=("force",), knots="", effect="friction_curve")
-    found = SimpleNamespace(base=base, judged=[], foretold=None)
-    found.judge = lambda one, told: Judged(one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3)
-    bench = SimpleNamespace(options=OPTIONS, training=None, foretell=lambda *_: None)
-    best = flexible._fit_table(bench, found, member, base, True)
+    found = SimpleNamespace(base=base, scored=[], predicted=None)
+    found.score = lambda one, told: ScoredCandidate(
+        one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3
+    )
+    context = SimpleNamespace(options=OPTIONS, training=None, predict=lambda *_: None)
+    best = flexible._fit_table(context, found, member, base, True)
     assert best.fitted is few
     assert (few.finer is more) == (lost == 0)
 
@@ -311,22 +313,22 @@ def test_a_gap_that_a_segment_in_a_wrong_minimum_carries_is_none(monkeypatch, ca
     table, no = np.zeros((COUNT, 1)), np.zeros(COUNT, bool)
     flown = Evaluation(table, table, no, ~no, table, table, [], np.zeros(COUNT, int))
     base = replace(fitted("", chi2), fit=replace(fit(chi2, decrement=40.0), evaluation=flown))
-    bench = SimpleNamespace(options=OPTIONS, training=None, held_out=None, scales=SimpleNamespace(mass=1.0))
+    context = SimpleNamespace(options=OPTIONS, training=None, held_out=None, scales=SimpleNamespace(mass=1.0))
     decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], gap, None)
-    best = judged(np.full(COUNT, 1.0), np.zeros(COUNT))
-    assert decide._give_up(bench, decision, best).outcome == outcome
+    best = scored(np.full(COUNT, 1.0), np.zeros(COUNT))
+    assert decide._give_up(context, decision, best).outcome == outcome
 
 
 @pytest.mark.parametrize("gained", [0.5, 30.0])
 def test_the_base_is_fitted_again_from_a_lower_minimum_though_no_candidate_converged(monkeypatch, gained):
     base = fitted("", np.full(COUNT, 100.0))
-    one = judged(np.full(COUNT, gained / COUNT), np.zeros(COUNT))
+    one = scored(np.full(COUNT, gained / COUNT), np.zeros(COUNT))
     one.fitted.fit.decrement = 100.0
     lower = fit(np.full(COUNT, 100.0 - 2 * gained / COUNT))
     fits = iter([base.fit, lower])
     monkeypatch.setattr(decide, "shared_values", lambda *_: None)
     monkeypatch.setattr(decide, "minimise", lambda *_, **__: next(fits))
-    found = decide.renewed(SimpleNamespace(), SimpleNamespace(base=base, judged=[one]))
+    found = decide.renewed(SimpleNamespace(), SimpleNamespace(base=base, scored=[one]))
     assert (found is not None and found.fit is lower) == (gained > 1)
 
 
@@ -340,81 +342,83 @@ def test_a_kink_from_where_little_of_the_gain_is_missing_is_the_end_of_a_fit(
     decrement, exhausted, gain, settled
 ):
     """As Stribeck friction that gains 1300 and of which steps of no length gain the 12 that one promises."""
-    one = judged(np.full(COUNT, gain / COUNT), np.zeros(COUNT))
+    one = scored(np.full(COUNT, gain / COUNT), np.zeros(COUNT))
     one.fitted.fit.decrement, one.fitted.fit.exhausted = decrement, exhausted
     assert one.settled == settled
-    one.fitted.fit.caught = True
+    one.fitted.fit.in_local_minimum = True
     assert not one.settled
 
 
 @pytest.mark.parametrize(("training", "rivals"), [(-10.0, ["viscous"]), (-2.0, []), (5.0, [])])
 def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(monkeypatch, training, rivals):
-    """As of two drags of which one is 10 ahead where it was fitted, the other 20 where it was foretold."""
-    monkeypatch.setattr(judge, "share_beside_faults", lambda *_: 1.0)
-    monkeypatch.setattr(judge, "ahead", lambda one, other: 20.0)
+    """As of two drags of which one is 10 ahead where it was fitted, the other 20 where it was predicted."""
+    monkeypatch.setattr(scoring, "share_with_imperfections", lambda *_: 1.0)
+    monkeypatch.setattr(scoring, "ahead", lambda one, other: 20.0)
     pool = [contender("quadratic_drag", 1000.0), contender("viscous", 1000.0)]
     pool[0].training += training
     for one, held_out in zip(pool, (20.0, 0.0), strict=True):
         one.prediction, one.held_out = SimpleNamespace(), held_out
-    best, close = foremost(pool, OPTIONS)
+    best, close = best_of(pool, OPTIONS)
     assert best.name == "quadratic_drag"
     assert [one.name for one in close] == rivals
 
 
 @pytest.mark.parametrize("better", [80.0, 20.0])
 def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better):
-    """What a set is held against must not be caught in a minimum that the set left."""
+    """What a set is held against must not be in a local minimum in a minimum that the set left."""
     alone = [contender("second_barrier", 50.0), contender("sensor_gain", 40.0), contender("viscous", 30.0)]
-    led = contender("second_barrier", better)
+    warm_started = contender("second_barrier", better)
     names = ("second_barrier", "sensor_gain")
     whole = replace(alone[0], fitted=replace(alone[0].fitted, names=names))
-    first = SimpleNamespace(base=None, foretold=None, judged=list(alone), rank=lambda: None)
+    first = SimpleNamespace(base=None, predicted=None, scored=list(alone), rank=lambda: None)
     asked = []
 
-    def led_by(data, one, other):
+    def warm_started_by(data, one, other):
         asked.append(one.names)
-        return led.fitted if one.names == led.fitted.names else one
+        return warm_started.fitted if one.names == warm_started.fitted.names else one
 
-    monkeypatch.setattr(several, "led_by", led_by)
-    monkeypatch.setattr(several, "judged", lambda *_: led)
-    bench = SimpleNamespace(training=None, foretell=lambda *_: None)
-    part = several._led_by(bench, first, whole, alone[0])
+    monkeypatch.setattr(several, "warm_started_by", warm_started_by)
+    monkeypatch.setattr(several, "scored", lambda *_: warm_started)
+    context = SimpleNamespace(training=None, predict=lambda *_: None)
+    part = several._warm_started_by(context, first, whole, alone[0])
     assert asked == [("second_barrier",), ("sensor_gain",)]
-    assert part is (led if better > 50 else alone[0])
-    assert first.judged == [part, *alone[1:]]
+    assert part is (warm_started if better > 50 else alone[0])
+    assert first.scored == [part, *alone[1:]]
 
 
-@pytest.mark.parametrize(("information", "faults", "needed"), [
+@pytest.mark.parametrize(("information", "imperfections", "needed"), [
     (1e-3, 0.0, True),
     (1e3, 0.0, False),
-    # faults of the rig explain what it does
+    # imperfections of the rig explain what it does
     (1e-3, 79.0, False),
 ])  # fmt: skip
 def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_it(
-    monkeypatch, information, faults, needed
+    monkeypatch, information, imperfections, needed
 ):
     """As of restitution in impacts of one speed, which noise makes 0.5 worse there."""
 
     def one(*names, evidence):
-        return Judged(replace(base, names=names), SimpleNamespace(), evidence + 1, 0.0, np.zeros(0), 1)
+        return ScoredCandidate(
+            replace(base, names=names), SimpleNamespace(), evidence + 1, 0.0, np.zeros(0), 1
+        )
 
-    def weigh(bench, one):
-        if one.faults is None:
-            one.faults = (faults, 0.0)
+    def weigh(context, one):
+        if one.imperfections is None:
+            one.imperfections = (imperfections, 0.0)
 
     base = fitted("", np.full(COUNT, 100.0))
     whole = one("quadratic_drag", "restitution_slope", evidence=100.0)
-    whole.faults = (0.0, 0.0)
+    whole.imperfections = (0.0, 0.0)
     parts = {name: one(name, evidence=20.0) for name in whole.fitted.names}
     over = {
-        "restitution_slope": foretold(np.ones(12), np.ones(12)),
-        "quadratic_drag": foretold(np.array([*6 * [0.95], *6 * [-1.0]]), np.full(12, information)),
+        "restitution_slope": predicted(np.ones(12), np.ones(12)),
+        "quadratic_drag": predicted(np.array([*6 * [0.95], *6 * [-1.0]]), np.full(12, information)),
     }
     monkeypatch.setattr(several, "without", lambda *_: parts["restitution_slope"])
-    monkeypatch.setattr(several, "weigh_faults", weigh)
-    monkeypatch.setattr(several, "over_base", lambda bench, base, *_: over[base.names[0]])
-    bench = SimpleNamespace(options=OPTIONS)
-    assert several._all_needed(bench, None, whole, parts["quadratic_drag"]) == needed
+    monkeypatch.setattr(several, "weigh_imperfections", weigh)
+    monkeypatch.setattr(several, "over_base", lambda context, base, *_: over[base.names[0]])
+    context = SimpleNamespace(options=OPTIONS)
+    assert several._all_needed(context, None, whole, parts["quadratic_drag"]) == needed
 
 
 def test_each_of_several_effects_is_held_against_its_family(monkeypatch):
@@ -428,40 +432,40 @@ def test_each_of_several_effects_is_held_against_its_family(monkeypatch):
                                                       ("cubic_spring", 80.0))]  # fmt: skip
     tried = []
 
-    def fit_set(bench, first, names):
+    def fit_set(context, first, names):
         tried.append(tuple(names))
         return names
 
     monkeypatch.setattr(several, "fit_set", fit_set)
-    monkeypatch.setattr(several, "over_base", lambda bench, base, foretold, made: made)
+    monkeypatch.setattr(several, "over_base", lambda context, base, predicted, made: made)
     monkeypatch.setattr(several, "admissible", lambda *_: (True, ""))
-    first = SimpleNamespace(judged=alone, base=None, foretold=None)
-    bench = SimpleNamespace(options=OPTIONS)
+    first = SimpleNamespace(scored=alone, base=None, predicted=None)
+    context = SimpleNamespace(options=OPTIONS)
     whole = named("viscous", "cubic_spring")
-    assert list(several._swapped(bench, first, whole, [whole])) == [["quadratic_drag", "cubic_spring"]]
+    assert list(several._swapped(context, first, whole, [whole])) == [["quadratic_drag", "cubic_spring"]]
     assert tried == [("quadratic_drag", "cubic_spring")]
     known = [whole, named("cubic_spring", "quadratic_drag")]
-    assert list(several._swapped(bench, first, whole, known)) == []
+    assert list(several._swapped(context, first, whole, known)) == []
 
 
-@pytest.mark.parametrize(("decrement", "foretells", "outcome"), [
+@pytest.mark.parametrize(("decrement", "predicts", "outcome"), [
     (100.0, False, "none"),
     (100.0, True, "named"),
     (0.0, False, "ambiguous"),
 ])  # fmt: skip
 def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record(
-    monkeypatch, decrement, foretells, outcome
+    monkeypatch, decrement, predicts, outcome
 ):
     """As a contact that is as stiff as a rigid one, from where the base left a wrong minimum."""
     monkeypatch.setattr(decide, "_gap_of_base", lambda *_: ([], False))
     base = fitted("", np.full(COUNT, 60.0))
     base.fit.decrement = decrement
-    best = judged(np.full(COUNT, 5.0), np.zeros(COUNT))
-    best.gates = {"hold-out": foretells, "admissible": True, "converged": True}
+    best = scored(np.full(COUNT, 5.0), np.zeros(COUNT))
+    best.gates = {"hold-out": predicts, "admissible": True, "converged": True}
     decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
     options, data = replace(OPTIONS, adequate_chi2=2.0), SimpleNamespace(prepared=[])
-    bench = SimpleNamespace(options=options, training=data)
-    assert decide.conclude(bench, decision, best, []).outcome == outcome
+    context = SimpleNamespace(options=options, training=data)
+    assert decide.conclude(context, decision, best, []).outcome == outcome
 
 
 def test_forms_of_one_family_leave_the_family_in_no_doubt():

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The search again where small faults of the rig hide what is missing: with those fitted as well.
+"""The search again where small imperfections of the rig hide what is missing: with those fitted as well.
 
-A search holds every effect against faults that are linear beside the machine as it was fitted without them.
+A search holds every effect against imperfections that are linear beside the machine as it was fitted without
+them.
 Where they explain hundreds of times what an effect does, the error of that hides it, or is taken for another.
 """
 
@@ -11,17 +12,23 @@ from dataclasses import replace
 import numpy as np
 
 from separatrix.discovery.decision.decide import Decision, decide
-from separatrix.discovery.decision.judge import Judged
-from separatrix.discovery.decision.rounds import Bench
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_forces import FAULT
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import as_nuisances, faults_of, usual_acceleration, weight_of_faults
+from separatrix.discovery.fitting.rig import (
+    as_nuisances,
+    imperfections_of,
+    usual_acceleration,
+    weight_of_imperfections,
+)
 
-# log-likelihood in training, and its share of the gap, from which on faults of a rig may hide an effect
+# log-likelihood in training, and its share of the gap, from which on imperfections of a rig may hide an
+# effect
 _HIDING, _HIDING_SHARE = 10.0, 0.3
 # how often the motion that they act along is that of the machine beside them
 _TIMES = 2
@@ -29,20 +36,20 @@ _TIMES = 2
 _BEGUN, _ENDED = 0.85, 0.89
 
 
-def decide_beside_faults(bench: Bench, base: Fitted) -> tuple[Bench, Decision]:
-    """Decide, and again with the faults of the rig fitted where that gave no name and they explain much.
+def decide_with_imperfections(context: SearchContext, base: Fitted) -> tuple[SearchContext, Decision]:
+    """Decide; again with the imperfections of the rig fitted where that gave no name and they explain much.
 
     The second answer stands if it is a name; what it was asked on comes with it.
     """
-    first = decide(bench, base)
-    if not _may_hide(bench, first):
-        return bench, first
-    bench.options.progress("searching beside faults of the rig", _BEGUN)
-    found = _with_faults(bench, first.rounds[0].base, first.foretold)
+    first = decide(context, base)
+    if not _may_hide(context, first):
+        return context, first
+    context.options.progress("searching beside imperfections of the rig", _BEGUN)
+    found = _with_imperfections(context, first.rounds[0].base, first.predicted)
     if found is None:
-        return bench, first
+        return context, first
     second = decide(*found)
-    return (found[0], second) if _sure(second) and _small(second.accepted[0]) else (bench, first)
+    return (found[0], second) if _sure(second) and _small(second.accepted[0]) else (context, first)
 
 
 def _sure(decision: Decision) -> bool:
@@ -53,8 +60,10 @@ def _sure(decision: Decision) -> bool:
     return decision.equivalent and all(passed for gate, passed in gates if gate != "separate")
 
 
-def _small(one: Judged) -> bool:
-    """Whether no fault beside a machine is as large as faults may be: what asks for more is none."""
+def _small(one: ScoredCandidate) -> bool:
+    """Whether no imperfection beside a machine is as large as imperfections may be: what asks for more is
+    none.
+    """
     pairs: list[tuple[Problem, Fit]] = [(one.fitted.problem, one.fitted.fit)]
     if one.prediction is not None:
         pairs.append((one.prediction.problem, one.prediction.fit))
@@ -65,44 +74,50 @@ def _small(one: Judged) -> bool:
     )
 
 
-def _may_hide(bench: Bench, decision: Decision) -> bool:
-    """Whether there is no name and faults explain much of what the machine leaves where it was fitted."""
+def _may_hide(context: SearchContext, decision: Decision) -> bool:
+    """Whether there is no name and imperfections explain much of what the machine leaves where it was
+    fitted.
+    """
     base = decision.rounds[0].base
-    if _sure(decision) or bench.options.quick or isinstance(base.problem, CoordinateProblem):
+    if _sure(decision) or context.options.quick or isinstance(base.problem, CoordinateProblem):
         return False
     if base.problem.in_force or not base.fit.good.any():
         return False
-    weight, _ = weight_of_faults(base, None)
+    weight, _ = weight_of_imperfections(base, None)
     return weight > max(_HIDING, _HIDING_SHARE * 0.5 * base.fit.excess)
 
 
-def _with_faults(bench: Bench, base: Fitted, told: Prediction | None) -> tuple[Bench, Fitted] | None:
-    """Records with faults of their rig, and the machine fitted to them beside those; None if it is lost."""
+def _with_imperfections(
+    context: SearchContext, base: Fitted, told: Prediction | None
+) -> tuple[SearchContext, Fitted] | None:
+    """Records with imperfections of their rig, and the machine fitted to them beside those; None if it is
+    lost.
+    """
     machine, values, followed = base.problem.free, base.fit.values, base.fit.good.sum()
-    progress = bench.options.progress
+    progress = context.options.progress
     options = replace(
-        bench.options, progress=lambda text, at: progress(text, _BEGUN + (_ENDED - _BEGUN) * at)
+        context.options, progress=lambda text, at: progress(text, _BEGUN + (_ENDED - _BEGUN) * at)
     )
     for turn in range(_TIMES):
         usual = usual_acceleration(base.problem, base.fit)
-        tables = faults_of(base.problem, base.fit, usual)
-        training, held_out = bench.training.with_faults(tables), bench.held_out
+        tables = imperfections_of(base.problem, base.fit, usual)
+        training, held_out = context.training.with_imperfections(tables), context.held_out
         if held_out is not None:
-            told = told if turn == 0 else bench.foretell(base, told)
-            held_out = held_out.with_faults(faults_of(told.problem, told.fit, usual))
+            told = told if turn == 0 else context.predict(base, told)
+            held_out = held_out.with_imperfections(imperfections_of(told.problem, told.fit, usual))
         problem = training.problem(base.model, training.last, [*machine, *as_nuisances(tables)])
         values = np.concatenate([values, np.zeros(len(problem.free) - values.size)])
         fit = minimise(problem, values, base.fit.starts, patient=True)
         if fit.good.sum() < followed:
             return None
         training.base_starts = fit.starts
-        bench = replace(bench, training=training, held_out=held_out)
+        context = replace(context, training=training, held_out=held_out)
         base, values = replace(base, problem=problem, fit=fit), fit.values
-    return replace(bench, options=options), base
+    return replace(context, options=options), base
 
 
 def in_words(fitted: Fitted) -> list[str]:
-    """How large the faults are that were fitted beside a machine, in a sentence; none if none were."""
+    """How large the imperfections are that were fitted beside a machine, in a sentence; none if none were."""
     sizes = {
         (one.path, one.record): FAULT * abs(value)
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
@@ -114,6 +129,6 @@ def in_words(fitted: Fitted) -> list[str]:
     drive = max((size for (_, record), size in sizes.items() if record is None), default=0.0)
     of_drive = f", and harmonics of the drive of up to {drive:.2g} of the acceleration" if drive else ""
     return [
-        f"small faults of the rig are fitted beside every machine, without which no effect stood out: a "
-        f"sensor that is curved by up to {sensor:.2g} of the signal{of_drive}"
+        f"small imperfections of the rig are fitted beside every machine, without which no effect stood out: "
+        f"a sensor that is curved by up to {sensor:.2g} of the signal{of_drive}"
     ]

@@ -14,7 +14,7 @@ from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_toget
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.places import usual_speed
 from separatrix.discovery.fitting.refit import Fitted, gain_over
-from separatrix.discovery.fitting.rig import share_beside_faults
+from separatrix.discovery.fitting.rig import share_with_imperfections
 from separatrix.discovery.options import Options
 
 _BLOCKS = 2
@@ -24,18 +24,18 @@ _FEW = 5
 _SILENT = 0.01
 # log-likelihood of an effect that no held-out record can show
 _DOUBTLESS = 10.0
-# p value of so many segments in which a held-out record is foretold better
+# p value of so many segments in which a held-out record is predicted better
 _CHANCE = 0.05
-# share of what faults of a rig do that is not linear
+# share of what imperfections of a rig do that is not linear
 _LINEAR = 0.2
-# what faults add where they were not weighed
+# what imperfections add where they were not weighed
 _NO_FAULTS = (0.0, 0.0)
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
 _KINK_SHARE = 0.01
 
 
 @dataclass
-class Judged:
+class ScoredCandidate:
     """A candidate with what it gained: log-likelihood in training, log score on held-out records."""
 
     fitted: Fitted
@@ -47,16 +47,16 @@ class Judged:
     p: float = 1.0
     gates: dict[str, bool] = field(default_factory=dict)
     ceiling: Ceiling | None = None
-    # share of the gain that small faults of a rig do not explain
+    # share of the gain that small imperfections of a rig do not explain
     own: float = 1.0
-    # the same of what is gained on held-out records, and what the base foretold there
+    # the same of what is gained on held-out records, and what the base predicted there
     own_foretold: float = 1.0
-    foretold: Prediction | None = None
+    predicted: Prediction | None = None
     # what it leaves, if it is adequate
     leaves: str = ""
-    # log-likelihood that faults of a rig beside it add, where it was fitted and where it foretold; None where
-    # that was not asked
-    faults: tuple[float, float] | None = None
+    # log-likelihood that imperfections of a rig beside it add, where it was fitted and where it predicted;
+    # None where that was not asked
+    imperfections: tuple[float, float] | None = None
 
     @property
     def name(self) -> str:
@@ -67,58 +67,58 @@ class Judged:
     def settled(self) -> bool:
         """Whether the fit is at its end: converged, or at a kink from where little of the gain is missing."""
         fit = self.fitted.fit
-        kink = fit.exhausted and not fit.caught and fit.decrement < _KINK_SHARE * 2 * self.training
+        kink = fit.exhausted and not fit.in_local_minimum and fit.decrement < _KINK_SHARE * 2 * self.training
         return bool(fit.converged or kink)
 
     @property
     def evidence(self) -> float:
         """Log-likelihood gained, less one per parameter (Akaike), plus the score on what was not fitted.
 
-        Where they were weighed, with faults of a rig beside it.
+        Where they were weighed, with imperfections of a rig beside it.
         """
         return self.fitted_evidence + self.foretold_evidence
 
     @property
     def own_evidence(self) -> float:
-        """The same without faults."""
+        """The same without imperfections."""
         return self.training - self.parameters + self.held_out
 
     @property
     def fitted_evidence(self) -> float:
         """Of the records that were fitted."""
-        return self.training - self.parameters + (self.faults or _NO_FAULTS)[0]
+        return self.training - self.parameters + (self.imperfections or _NO_FAULTS)[0]
 
     @property
     def foretold_evidence(self) -> float:
-        """Of the records that were foretold."""
-        return self.held_out + (self.faults or _NO_FAULTS)[1]
+        """Of the records that were predicted."""
+        return self.held_out + (self.imperfections or _NO_FAULTS)[1]
 
 
-def judged(
-    base: Fitted, foretold: Prediction | None, fitted: Fitted, prediction: Prediction | None
-) -> Judged:
+def scored(
+    base: Fitted, predicted: Prediction | None, fitted: Fitted, prediction: Prediction | None
+) -> ScoredCandidate:
     """Evidence of a candidate over the base."""
     training, _ = gain_over(fitted, base)
     parts = np.zeros(0)
-    if prediction is not None and foretold is not None:
-        parts = gained_together(prediction, foretold)
+    if prediction is not None and predicted is not None:
+        parts = gained_together(prediction, predicted)
     live = max(1, int((~fitted.fit.at_bound[list(fitted.added)]).sum()))
-    return Judged(fitted, prediction, training, float(parts.sum()), parts, live, foretold=foretold)
+    return ScoredCandidate(fitted, prediction, training, float(parts.sum()), parts, live, predicted=predicted)
 
 
-def lead(one: Judged, other: Judged) -> float:
+def lead(one: ScoredCandidate, other: ScoredCandidate) -> float:
     """Evidence of one candidate over another, of the same base, held against each other."""
     if one.prediction is None or other.prediction is None:
         return one.evidence - other.evidence
     fitted = one.fitted_evidence - other.fitted_evidence
-    of_faults = (one.faults or _NO_FAULTS)[1] - (other.faults or _NO_FAULTS)[1]
+    of_faults = (one.imperfections or _NO_FAULTS)[1] - (other.imperfections or _NO_FAULTS)[1]
     return fitted + ahead(one.prediction, other.prediction) + of_faults
 
 
-def detection(one: Judged, tested: float, inflation: float) -> float:
+def detection(one: ScoredCandidate, tested: float, inflation: float) -> float:
     """Family-wise p value of what a candidate gained, for candidates worth so many independent tests.
 
-    What small faults of the rig may explain of it is no gain.
+    What small imperfections of the rig may explain of it is no gain.
     """
     gained = one.own * one.training + one.own_foretold * one.held_out
     return family_wise(2 * gained / inflation, one.parameters, tested)
@@ -130,7 +130,7 @@ def family_wise(gain: float, parameters: int, tested: float) -> float:
     return float(-np.expm1(tested * np.log1p(-min(single, 1 - 1e-16))))
 
 
-def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, float]]:
+def held_out_bounds(one: ScoredCandidate, options: Options) -> dict[int, tuple[float, float]]:
     """Lower and upper 5 % bound of the gain in each held-out record, over the misfit, by block bootstrap.
 
     Segments that one of the machines cannot follow are not drawn, nor those in which the effect does not act,
@@ -152,11 +152,11 @@ def held_out_bounds(one: Judged, options: Options) -> dict[int, tuple[float, flo
     return bounds
 
 
-def foretells(one: Judged, options: Options) -> bool:
+def predicts(one: ScoredCandidate, options: Options) -> bool:
     """Whether a held-out record by itself tells an effect from nothing, by the odds of a name, and not by one
     segment alone.
 
-    What a right base foretells is beaten by more than log(1/p) with a probability of p at most (Ville),
+    What a right base predicts is beaten by more than log(1/p) with a probability of p at most (Ville),
     however unlike the segments are. It has to be beaten without the best segment too, or in so many of them
     that this is no chance (sign test).
     """
@@ -174,10 +174,10 @@ def foretells(one: Judged, options: Options) -> bool:
     return False
 
 
-def beyond_doubt(one: Judged, base: Fitted, options: Options) -> bool:
+def beyond_doubt(one: ScoredCandidate, base: Fitted, options: Options) -> bool:
     """Whether fitted records tell an effect of which held-out ones say nothing.
 
-    They are foretold alike, or no worse than by chance where no gain is to be expected: half of the
+    They are predicted alike, or no worse than by chance where no gain is to be expected: half of the
     information on the effect. Over a base that is not at its minimum they say something.
     """
     parts, misfit = one.held_out_parts, one.prediction.misfit
@@ -189,7 +189,7 @@ def beyond_doubt(one: Judged, base: Fitted, options: Options) -> bool:
     return bool(compared and (alike or silent) and base.fit.converged and doubtless)
 
 
-def _foretold_information(one: Judged) -> np.ndarray:
+def _foretold_information(one: ScoredCandidate) -> np.ndarray:
     """What each held-out segment says of what was added, over its size."""
     fitted, prediction = one.fitted, one.prediction
     shared = [i for i, free in enumerate(fitted.problem.free) if free.record is None]
@@ -198,7 +198,7 @@ def _foretold_information(one: Judged) -> np.ndarray:
     return _information(fitted, prediction.fit.reduced.matrix, added, places)
 
 
-def _telling(one: Judged) -> np.ndarray:
+def _telling(one: ScoredCandidate) -> np.ndarray:
     """Whether both machines follow a held-out segment and it has information on what was added."""
     prediction, information = one.prediction, _foretold_information(one)
     tells = np.zeros(information.size, bool)
@@ -226,7 +226,7 @@ def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> n
     return parts[index].sum(axis=(1, 2))
 
 
-def stable(one: Judged, base: Fitted, options: Options) -> float:
+def stable(one: ScoredCandidate, base: Fitted, options: Options) -> float:
     """Share of block bootstraps of the segments in which the effect pays for its parameters.
 
     Only segments that have information on the effect are drawn; where they are few, it has to pay without the
@@ -246,9 +246,9 @@ def stable(one: Judged, base: Fitted, options: Options) -> float:
     rest = min(0.0, float(parts[~tells].sum()))
     proven = one.held_out_parts.size and gain - one.parameters > options.separation
     if tells.sum() < _FEW:
-        foretold = one.held_out_parts.sum() / one.prediction.misfit if proven else 0.0
+        predicted = one.held_out_parts.sum() / one.prediction.misfit if proven else 0.0
         others = parts[tells].sum() - parts[tells].max(initial=0.0)
-        return float(others + rest + foretold > one.parameters)
+        return float(others + rest + predicted > one.parameters)
     random = np.random.default_rng([options.seed, 12])
     sums = rest + _block_sums(parts[tells], random, options.bootstraps)
     if proven:
@@ -284,37 +284,37 @@ def _together_clear(fitted: Fitted, places: list[int]) -> bool:
     return bool(values @ information @ values > chi2.ppf(0.95, len(places)))
 
 
-def clear_of(best: Judged, other: Judged, options: Options) -> bool:
-    """Whether a candidate beats another one clearly, also where that is given small faults of the rig.
+def clear_of(best: ScoredCandidate, other: ScoredCandidate, options: Options) -> bool:
+    """Whether a candidate beats another one clearly, also where that is given small imperfections of the rig.
 
     Records that were fitted and records that were not must not clearly contradict each other.
     """
     least = margin(best, other, options)
     over = lead(best, other)
     fitted = best.fitted_evidence - other.fitted_evidence
-    if any(best.faults or _NO_FAULTS) and any(other.faults or _NO_FAULTS):
+    if any(best.imperfections or _NO_FAULTS) and any(other.imperfections or _NO_FAULTS):
         # both have them already, as far as they are linear
-        unsure = _LINEAR * max(sum(best.faults), sum(other.faults))
+        unsure = _LINEAR * max(sum(best.imperfections), sum(other.imperfections))
         return over >= least and min(fitted, over - fitted) > -max(least, unsure)
     if over < least or min(fitted, over - fitted) <= -least:
         return False
-    return over * share_beside_faults(best.fitted, other.fitted) >= least
+    return over * share_with_imperfections(best.fitted, other.fitted) >= least
 
 
-def margin(best: Judged, other: Judged, options: Options) -> float:
+def margin(best: ScoredCandidate, other: ScoredCandidate, options: Options) -> float:
     """Evidence by which a candidate must beat another one: more where the two are names of one motion."""
     scale = options.separation * max(1.0, best.fitted.fit.reduced_chi2)
     return scale * (options.equivalent if equivalent(best, other) else 1.0)
 
 
-def equivalent(one: Judged, other: Judged) -> bool:
+def equivalent(one: ScoredCandidate, other: ScoredCandidate) -> bool:
     """Whether what two fits do not share is two names of the same motion."""
     mine, theirs = set(one.fitted.names), set(other.fitted.names)
     left, right = mine - theirs, theirs - mine
     return len(left) == len(right) == 1 and right.pop() in effect_of(left.pop()).confused
 
 
-def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
+def admissible(one: ScoredCandidate, base: Fitted, options: Options) -> tuple[bool, str]:
     """Signs and bounds: the effect is inside of its own, is not nothing, and leaves the drive sensible."""
     fit, free = one.fitted.fit, one.fitted.problem.free
     base_good = int(base.fit.good.sum())
@@ -343,13 +343,13 @@ def admissible(one: Judged, base: Fitted, options: Options) -> tuple[bool, str]:
 NOISE, LITTLE, LARGER_NOISE = "noise", "little of the gap", "larger noise"
 
 
-def adequate(one: Judged, options: Options) -> str:
+def adequate(one: ScoredCandidate, options: Options) -> str:
     """What an adequate machine leaves; '' if it is not adequate.
 
     `noise`: the fit is like noise and a flexible force explains nothing more, or less than the effect does
     and nothing that is sizeable. `little of the gap`: no more than a share of it, however significant.
-    `larger noise`: somewhat more than noise, of which no force explains anything. Small faults of a rig count
-    as noise.
+    `larger noise`: somewhat more than noise, of which no force explains anything. Small imperfections of a
+    rig count as noise.
     """
     fit = one.ceiling.fit
     gained = max(0.0, 2 * one.training)
@@ -373,8 +373,10 @@ def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None
     return gain > least**2 * fit.samples
 
 
-def _all_closed(one: Judged, options: Options) -> bool:
-    """Whether the gap is closed but for a share that has another reason, where it was fitted and foretold."""
+def _all_closed(one: ScoredCandidate, options: Options) -> bool:
+    """Whether the gap is closed but for a share that has another reason, where it was fitted and
+    predicted.
+    """
     left = max(one.ceiling.closable, one.ceiling.fit.excess, 0.0)
     if left > options.remaining * (2 * one.training + left):
         return False
