@@ -77,12 +77,12 @@ contains
   end subroutine set_beside
 
   !> A start of a side.
-  pure function start_beside(beside, side, place) result(y)
+  pure function start_beside(beside, side, offset) result(y)
     type(beside_t), intent(in) :: beside
     integer, intent(in) :: side
-    real(wp), intent(in) :: place
+    real(wp), intent(in) :: offset
     real(wp) :: y(size(beside%direction))
-    y = beside%saddle%points(:, 1) + merge(1, -1, side == 1)*first_step*exponential(place*logarithm(beside%growth))* &
+    y = beside%saddle%points(:, 1) + merge(1, -1, side == 1)*first_step*exponential(offset*logarithm(beside%growth))* &
       beside%direction
   end function start_beside
 
@@ -114,17 +114,17 @@ contains
   end subroutine settle
 
   !> Whether a start of a side comes to an attractor within `turns` of the orbit.
-  pure logical function arrives(beside, side, settles, place, turns)
+  pure logical function arrives(beside, side, settles, offset, turns)
     type(beside_t), intent(in) :: beside
     integer, intent(in) :: side, turns
     type(cycle_points_t), intent(in) :: settles
-    real(wp), intent(in) :: place
+    real(wp), intent(in) :: offset
     type(walk_t) :: walk
     real(wp) :: y(size(beside%direction))
     integer :: j, k
     logical :: ok
     arrives = .false.
-    call begin_walk(beside%machines%centre, start_beside(beside, side, place), walk, ok)
+    call begin_walk(beside%machines%centre, start_beside(beside, side, offset), walk, ok)
     if (.not. ok) return
     do k = 1, turns*beside%saddle%periods
       call walk_on(beside%machines%centre, walk, y, ok)

@@ -6,7 +6,8 @@
 module bifurcation_curve
   use body_family, only: family_t
   use branch_point, only: label_gr, label_gr_fold, label_pd, label_sn, label_stick, no_label, point_t
-  use curve_equations, only: at_zero, beside_like, correct, curve_plan_t, curve_point_t, looked_at, move, place_t, set_place, &
+  use curve_equations, only: at_zero, beside_like, correct, curve_plan_t, curve_point_t, looked_at, move, curve_position_t, &
+    set_position, &
     set_tangent, unknowns
   use inverse_interpolation, only: weights_at_zero
   use kinds, only: wp
@@ -54,7 +55,7 @@ contains
     type(point_t), intent(in) :: point
     real(wp), intent(in) :: value
     type(curve_t), intent(out) :: curve
-    type(place_t) :: start
+    type(curve_position_t) :: start
     type(curve_point_t), allocatable :: back(:), further(:)
     real(wp), allocatable :: along(:)
     logical :: ok
@@ -64,7 +65,7 @@ contains
     start%now%orbit = point%orbit
     start%now%free = value
     start%label = curve%label
-    call set_place(family, plan, start, ok)
+    call set_position(family, plan, start, ok)
     if (.not. ok) return
     allocate (along(unknowns(start%now)), source=0.0_wp)
     along(size(along)) = 1
@@ -86,7 +87,7 @@ contains
     type(curve_t), intent(in) :: curve
     type(point_t), intent(in) :: point
     real(wp), intent(in) :: value
-    type(place_t) :: there
+    type(curve_position_t) :: there
     real(wp), allocatable :: along(:)
     logical :: ok
     integer :: i, k
@@ -100,7 +101,7 @@ contains
       end associate
       there%label = curve%label
       there%monitor = margin_t()
-      call set_place(family, plan, there, ok)
+      call set_position(family, plan, there, ok)
       if (.not. ok) cycle
       there%now%free = value
       along = [(0.0_wp, k=1, unknowns(there%now) - 1), 1.0_wp]
@@ -113,61 +114,61 @@ contains
   end function passes
 
   !> The point `length` further.
-  subroutine step_on(family, plan, place, length, next, ok)
+  subroutine step_on(family, plan, position, length, next, ok)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(in) :: place
+    type(curve_position_t), intent(in) :: position
     real(wp), intent(in) :: length
-    type(place_t), intent(out) :: next
+    type(curve_position_t), intent(out) :: next
     logical, intent(out) :: ok
-    next = place
+    next = position
     next%now%second = no_label
-    call move(next, length*place%tangent)
-    call correct(family, plan, next, place%tangent, ok)
-    if (ok) call set_tangent(family, plan, next, place%tangent, ok)
+    call move(next, length*position%tangent)
+    call correct(family, plan, next, position%tangent, ok)
+    if (ok) call set_tangent(family, plan, next, position%tangent, ok)
   end subroutine step_on
 
   !> From a point to the end of a range, or to where another condition vanishes and the events are others beyond.
   subroutine trace_one_way(family, plan, start, points)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(in) :: start
+    type(curve_position_t), intent(in) :: start
     type(curve_point_t), allocatable, intent(out) :: points(:)
-    type(place_t) :: place, next
+    type(curve_position_t) :: position, next
     type(margin_t) :: before(2), after(2)
     real(wp) :: step
     logical :: ok
-    place = start
-    points = [place%now]
+    position = start
+    points = [position%now]
     step = first_step
-    before = looked_at(family, plan, place)
+    before = looked_at(family, plan, position)
     do while (size(points) < most_points)
-      call step_on(family, plan, place, step, next, ok)
-      if (ok) ok = sum(next%tangent*place%tangent) > least_cosine
+      call step_on(family, plan, position, step, next, ok)
+      if (ok) ok = sum(next%tangent*position%tangent) > least_cosine
       if (.not. ok) then
         step = step/2
         if (step < smallest_step) return
         cycle
       end if
       if (.not. is_within(plan, next%now)) then
-        call end_at_range(family, plan, place, step, points)
+        call end_at_range(family, plan, position, step, points)
         return
       end if
       after = looked_at(family, plan, next)
       if (after(1)%value < 0 .and. before(1)%value > at_zero) then
-        call locate(family, plan, place, step, 1, after(1), next, ok)
+        call locate(family, plan, position, step, 1, after(1), next, ok)
         if (ok) points = [points, next%now]
         return
       end if
       ! Beyond a margin that was at zero before, or was not there: no motion of the machine.
       if (after(1)%value < -at_zero) return
       if (max(abs(before(2)%value), abs(after(2)%value)) < huge(1.0_wp) .and. before(2)%value*after(2)%value < 0) then
-        call locate(family, plan, place, step, 2, after(2), next, ok)
+        call locate(family, plan, position, step, 2, after(2), next, ok)
         if (ok) points = [points, next%now]
-        call step_on(family, plan, place, step, next, ok)
+        call step_on(family, plan, position, step, next, ok)
       end if
       points = [points, next%now]
-      place = next
+      position = next
       before = after
       step = min(largest_step, 1.4_wp*step)
     end do
@@ -182,20 +183,20 @@ contains
   end function is_within
 
   !> The last point within the ranges, by halving.
-  subroutine end_at_range(family, plan, place, step, points)
+  subroutine end_at_range(family, plan, position, step, points)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(in) :: place
+    type(curve_position_t), intent(in) :: position
     real(wp), intent(in) :: step
     type(curve_point_t), allocatable, intent(inout) :: points(:)
-    type(place_t) :: tried, last
+    type(curve_position_t) :: tried, last
     real(wp) :: low, high
     logical :: ok
     integer :: i
     low = 0
     high = step
     do i = 1, most_secants
-      call step_on(family, plan, place, (low + high)/2, tried, ok)
+      call step_on(family, plan, position, (low + high)/2, tried, ok)
       if (ok) ok = is_within(plan, tried%now)
       if (ok) then
         low = (low + high)/2
@@ -209,29 +210,29 @@ contains
   end subroutine end_at_range
 
   !> The point of codimension two within a step, where the margin or the test beside the curve that is like `passed` is zero.
-  !> Multipliers are large where an impact has no speed, so that the place is interpolated between points on both sides of it.
-  subroutine locate(family, plan, place, step, which, passed, there, ok)
+  !> Multipliers are large where an impact has no speed, so that the position is interpolated between points on both sides of it.
+  subroutine locate(family, plan, position, step, which, passed, there, ok)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(in) :: place
+    type(curve_position_t), intent(in) :: position
     real(wp), intent(in) :: step
     integer, intent(in) :: which
     type(margin_t), intent(in) :: passed
-    type(place_t), intent(out) :: there
+    type(curve_position_t), intent(out) :: there
     logical, intent(out) :: ok
-    type(place_t) :: node
-    real(wp) :: low, high, f_low, f_high, s, f, distance, value(nodes), all(unknowns(place%now), nodes), weight(nodes)
+    type(curve_position_t) :: node
+    real(wp) :: low, high, f_low, f_high, s, f, distance, value(nodes), all(unknowns(position%now), nodes), weight(nodes)
     integer :: i, k, n, states
     low = 0
     high = step
-    f_low = beside_like(family, plan, place, which, passed)
+    f_low = beside_like(family, plan, position, which, passed)
     f_high = passed%value
     do i = 1, most_secants
       s = low + (high - low)*min(max(f_low/(f_low - f_high), 0.1_wp), 0.9_wp)
-      call step_on(family, plan, place, s, node, ok)
+      call step_on(family, plan, position, s, node, ok)
       ! By chance too near to a graze.
       if (.not. ok) s = s + 0.02_wp*(high - low)
-      if (.not. ok) call step_on(family, plan, place, s, node, ok)
+      if (.not. ok) call step_on(family, plan, position, s, node, ok)
       if (.not. ok) return
       f = beside_like(family, plan, node, which, passed)
       if (abs(f) < node_value) exit
@@ -249,7 +250,7 @@ contains
     distance = min(node_value*(high - low)/abs(f_high - f_low), 0.3_wp*largest_step)
     n = size(all, 1)
     do k = 1, nodes
-      call step_on(family, plan, place, s + (2*k - nodes - 1)*distance, node, ok)
+      call step_on(family, plan, position, s + (2*k - nodes - 1)*distance, node, ok)
       if (.not. ok) return
       value(k) = beside_like(family, plan, node, which, passed)
       all(:, k) = [node%now%orbit%y, node%now%orbit%events%time, node%now%orbit%parameter, node%now%free]
@@ -262,7 +263,7 @@ contains
     there%now%orbit%events%time = matmul(all(states + 1:n - 2, :), weight)
     there%now%orbit%parameter = sum(all(n - 1, :)*weight)
     there%now%free = sum(all(n, :)*weight)
-    there%now%second = label_of(place%label, which, passed)
+    there%now%second = label_of(position%label, which, passed)
   end subroutine locate
 
   !> Label of the second condition.

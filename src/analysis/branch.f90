@@ -111,7 +111,7 @@ contains
       known = size(points)
       call go_on(family, plan, trace, points, ending)
       if (ending /= no_label) exit
-      if (present(watch)) call watch%tell_point(size(points), trace%now%orbit%parameter)
+      if (present(watch)) call watch%report_point(size(points), trace%now%orbit%parameter)
       if (known > 3) call close_up(family, first, before, trace, known, points, ending)
     end do
     if (ending == no_label) ending = label_long
@@ -214,7 +214,7 @@ contains
     end associate
   end function halves_differ
 
-  !> Whether the halves of an orbit may have changed places: in between it was one of half the period.
+  !> Whether the halves of an orbit may have changed positions: in between it was one of half the period.
   pure logical function swaps_halves(trace, next)
     type(trace_t), intent(in) :: trace, next
     swaps_halves = modulo(trace%now%orbit%periods, 2) == 0

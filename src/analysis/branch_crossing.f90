@@ -133,10 +133,10 @@ contains
     call weights_at_zero(value, weight, ok)
     if (.not. ok) return
     there = node
-    associate (orbit => there%now%orbit, place => matmul(all, weight))
-      orbit%y = place(:size(orbit%y))
-      orbit%events%time = place(size(orbit%y) + 1:n - 1)
-      orbit%parameter = place(n)
+    associate (orbit => there%now%orbit, position => matmul(all, weight))
+      orbit%y = position(:size(orbit%y))
+      orbit%events%time = position(size(orbit%y) + 1:n - 1)
+      orbit%parameter = position(n)
       there%now%tangent = matmul(tangents, weight)
       there%now%tangent = there%now%tangent/norm2(there%now%tangent)
       call machine_neighbourhood(family, orbit%parameter, there%machines, error)

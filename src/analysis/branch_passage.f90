@@ -231,7 +231,7 @@ contains
     end select
   end function is_genuine
 
-  !> Label of the place where a margin is zero.
+  !> Label of the crossed_event where a margin is zero.
   pure integer function label_of_margin(margin) result(label)
     type(margin_t), intent(in) :: margin
     select case (margin%kind)
@@ -255,12 +255,12 @@ contains
     type(orbit_t), intent(out) :: changed
     logical, intent(out) :: known
     type(orbit_t) :: before
-    real(wp) :: place(size(at%margins%list)), nil
+    real(wp) :: crossed_event(size(at%margins%list)), nil
     integer :: i
     changed = at%now%orbit
     known = .true.
-    place = -1
-    do i = 1, size(place)
+    crossed_event = -1
+    do i = 1, size(crossed_event)
       associate (one => at%margins%list(i))
         if (one%kind /= passed%kind) cycle
         nil = merge(touching, together, is_touch(at%now%orbit, one))
@@ -269,17 +269,17 @@ contains
         if (one%kind == of_impact) then
           if (at%now%orbit%events(one%event)%kind == event_separation) cycle
         end if
-        place(i) = one%event
+        crossed_event(i) = one%event
         ! After an event that comes with its number turned round.
-        if (one%event < 0) place(i) = -one%event - 0.5_wp
-        if (one%kind == of_slip .and. one%event >= 0) place(i) = one%event + 0.5_wp
+        if (one%event < 0) crossed_event(i) = -one%event - 0.5_wp
+        if (one%kind == of_slip .and. one%event >= 0) crossed_event(i) = one%event + 0.5_wp
       end associate
     end do
-    if (all(place < 0)) known = .false.
+    if (all(crossed_event < 0)) known = .false.
     ! From the last on, so that the numbers of the others stay.
-    do while (any(place >= 0) .and. known)
-      i = maxloc(place, 1)
-      place(i) = -1
+    do while (any(crossed_event >= 0) .and. known)
+      i = maxloc(crossed_event, 1)
+      crossed_event(i) = -1
       before = changed
       if (stops_later(at, at%margins%list(i))) then
         changed = with_slip(at%machines%centre, before, at%margins%list(i)%event)
@@ -320,7 +320,7 @@ contains
     end if
     ok = any(abs(along) > 0)
     if (.not. ok) return
-    ! What goes with the third power of the length of a slip is told by its equations where that is not too short.
+    ! What goes with the third power of the length of a slip is resolved by its equations where that is not too short.
     if (has_slip_in_stick(beyond%now%orbit)) along = slip_room*along
     call enter_apart(family, at, along, no_passage, beyond, ok)
     if (ok) beyond%step = 0.1_wp*step
@@ -335,7 +335,7 @@ contains
     logical, intent(out) :: ok
     type(trace_t) :: start, there, tried(2)
     real(wp) :: look, beyond_step, along(size(beyond%now%orbit%y) + size(beyond%now%orbit%events) + 1)
-    logical :: fits(2), found, told
+    logical :: fits(2), found, resolved
     integer :: way, tries, steps
     start%machines = at%machines
     start%now%orbit = beyond%now%orbit
@@ -347,7 +347,7 @@ contains
     along = start%now%tangent
     look = first_look*step
     found = .false.
-    told = .false.
+    resolved = .false.
     do tries = 1, 4
       do way = 1, 2
         start%now%tangent = merge(1, -1, way == 1)*along
@@ -359,14 +359,14 @@ contains
         there = tried(findloc(fits, .true., 1))
         beyond_step = max(look, 0.1_wp*step)
         found = .true.
-        told = .not. all(fits)
+        resolved = .not. all(fits)
         ! So near the point both sides may be on it within rounding: a longer look tells them apart.
         if (.not. all(fits) .and. all(there%margins%list%value > no_passage)) exit
       end if
       look = 10*look
     end do
     ! Where both sides seem to be on it at every look nothing tells which the branch goes on to.
-    ok = told
+    ok = resolved
     if (.not. ok) return
     beyond = there
     beyond%step = beyond_step

@@ -58,7 +58,7 @@ contains
 
   contains
 
-    !> Whether points of the step come before the place that was found.
+    !> Whether points of the step come before the position that was found.
     pure elemental logical function is_before(point)
       type(point_t), intent(in) :: point
       is_before = same_sequence(point%orbit, there%now%orbit)

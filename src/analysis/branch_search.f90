@@ -54,7 +54,7 @@ module branch_search
     type(branch_t), allocatable :: branches(:)
     !> Branches of equilibria of a machine without a clock.
     type(equilibria_t), allocatable :: equilibria(:)
-    !> Rows that give place and speed of what is watched from a section point; whether the section is a time of the drive.
+    !> Rows that give position and speed of what is watched from a section point; whether the section is a time of the drive.
     real(wp), allocatable :: watch(:, :)
     logical :: has_clock = .true.
     !> Who is told how far the search is, if any.

@@ -20,18 +20,18 @@ module branch_vanishing
 contains
 
   !> How far the section is from the middle of the cycle, in natural sizes.
-  pure real(wp) function swing_of(trace) result(swing)
+  pure real(wp) function amplitude_of(trace) result(amplitude)
     type(trace_t), intent(in) :: trace
     real(wp) :: rows(2, size(trace%now%orbit%y))
     rows = watched_rows(trace%machines%centre)
-    swing = (sum(rows(1, :)*trace%now%orbit%y) - (trace%now%x_max + trace%now%x_min)/2)/trace%machines%centre%size_of(1)
-  end function swing_of
+    amplitude = (sum(rows(1, :)*trace%now%orbit%y) - (trace%now%x_max + trace%now%x_min)/2)/trace%machines%centre%size_of(1)
+  end function amplitude_of
 
   !> Whether the cycle of a machine without a clock has shrunk to nothing between a point and the next.
   pure logical function has_vanished(trace, next)
     type(trace_t), intent(in) :: trace, next
     has_vanished = .not. trace%machines%centre%has_clock
-    if (has_vanished) has_vanished = swing_of(trace)*swing_of(next) < 0
+    if (has_vanished) has_vanished = amplitude_of(trace)*amplitude_of(next) < 0
   end function has_vanished
 
   !> Ends a branch with the smallest cycle that is found within `length`.
@@ -50,7 +50,7 @@ contains
     low = 0
     high = length
     do i = 1, most_halvings
-      if (abs(swing_of(there)) < nearest) exit
+      if (abs(amplitude_of(there)) < nearest) exit
       middle = (low + high)/2
       call step_to(family, trace, middle, tried, ok, steps)
       if (ok) ok = .not. has_vanished(trace, tried)

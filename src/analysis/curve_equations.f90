@@ -21,7 +21,7 @@ module curve_equations
   implicit none
   private
 
-  public :: set_place, unknowns, correct, set_tangent, move, looked_at, beside_like
+  public :: set_position, unknowns, correct, set_tangent, move, looked_at, beside_like
 
   integer, parameter :: most_newton = 15
   !> Steps of the differences and of Newton's method at the end, in natural sizes.
@@ -46,14 +46,14 @@ module curve_equations
   end type curve_plan_t
 
   !> Where a trace of a curve is; `monitor` is the margin that is zero on it, without one the test of its label.
-  type, public :: place_t
+  type, public :: curve_position_t
     type(curve_point_t) :: now
     integer :: label = no_label
     type(margin_t) :: monitor
     real(wp), allocatable :: tangent(:)
     !> Natural sizes of the unknowns: state, instants, both parameters.
     real(wp), allocatable :: sizes(:)
-  end type place_t
+  end type curve_position_t
 
 contains
 
@@ -79,40 +79,40 @@ contains
 
   !> Sizes of the unknowns of a point, and the margin that is zero there; a fold and a doubling have none. One of an event is taken
   !> before one between events.
-  subroutine set_place(family, plan, place, ok)
+  subroutine set_position(family, plan, position, ok)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(inout) :: place
+    type(curve_position_t), intent(inout) :: position
     logical, intent(out) :: ok
     class(hybrid_t), allocatable :: machine
     type(margins_t) :: margins
     real(wp), allocatable :: miss(:), slopes(:, :)
     integer :: i, n
-    call machine_at(family, plan, place%now, machine, ok)
+    call machine_at(family, plan, position%now, machine, ok)
     if (.not. ok) return
-    n = unknowns(place%now) - 2
-    place%sizes = [machine%size_of, [(machine%size_of_time(), i=1, size(place%now%orbit%events))], plan%highest - plan%lowest]
-    if (place%label == label_sn .or. place%label == label_pd) return
+    n = unknowns(position%now) - 2
+    position%sizes = [machine%size_of, [(machine%size_of_time(), i=1, size(position%now%orbit%events))], plan%highest - plan%lowest]
+    if (position%label == label_sn .or. position%label == label_pd) return
     allocate (miss(n), slopes(n, n))
-    call shoot(machine, place%now%orbit, miss, slopes)
-    margins = margins_of_machine(machine, place%now%orbit)
+    call shoot(machine, position%now%orbit, miss, slopes)
+    margins = margins_of_machine(machine, position%now%orbit)
     ok = .false.
     do i = 1, size(margins%list)
       associate (one => margins%list(i))
         if (.not. abs(one%value) < at_zero .or. one%kind == of_order .or. one%kind == of_release) cycle
-        if ((place%label == label_gr) .neqv. (one%kind == of_impact .or. one%kind == of_gap)) cycle
-        if (ok .and. (is_between(one) .or. .not. is_between(place%monitor))) cycle
+        if ((position%label == label_gr) .neqv. (one%kind == of_impact .or. one%kind == of_gap)) cycle
+        if (ok .and. (is_between(one) .or. .not. is_between(position%monitor))) cycle
         ok = .true.
-        place%monitor = one
+        position%monitor = one
       end associate
     end do
-  end subroutine set_place
+  end subroutine set_position
 
   !> What must be zero on the curve: the orbit does not close, and the monitor; then, beside, what is looked at: the least of the
   !> other margins, and the other test of multipliers.
-  subroutine residual(machine, place, left, beside, ok)
+  subroutine residual(machine, position, left, beside, ok)
     class(hybrid_t), intent(in) :: machine
-    type(place_t), intent(inout) :: place
+    type(curve_position_t), intent(inout) :: position
     real(wp), intent(out) :: left(:)
     type(margin_t), intent(out), optional :: beside(2)
     logical, intent(out) :: ok
@@ -120,17 +120,17 @@ contains
     real(wp) :: slopes(size(left) - 1, size(left) - 1), test(2), touch
     integer :: i, n
     n = size(left) - 1
-    call shoot(machine, place%now%orbit, left(:n), slopes)
-    margins = margins_of_machine(machine, place%now%orbit, &
-                                 events_only=.not. (present(beside) .or. is_between(place%monitor)))
+    call shoot(machine, position%now%orbit, left(:n), slopes)
+    margins = margins_of_machine(machine, position%now%orbit, &
+                                 events_only=.not. (present(beside) .or. is_between(position%monitor)))
     test = huge(1.0_wp)
-    if (place%monitor%kind == 0) test = tests(machine, place%now%orbit, margins)
-    if (place%monitor%kind == 0) left(n + 1) = merge(test(1), test(2), place%label == label_sn)
-    if (place%monitor%kind /= 0) left(n + 1) = huge(1.0_wp)
+    if (position%monitor%kind == 0) test = tests(machine, position%now%orbit, margins)
+    if (position%monitor%kind == 0) left(n + 1) = merge(test(1), test(2), position%label == label_sn)
+    if (position%monitor%kind /= 0) left(n + 1) = huge(1.0_wp)
     touch = -huge(touch)
-    if (place%monitor%kind /= 0) then
+    if (position%monitor%kind /= 0) then
       do i = 1, size(margins%list)
-        if (.not. same_meaning(margins%list(i), place%monitor)) cycle
+        if (.not. same_meaning(margins%list(i), position%monitor)) cycle
         left(n + 1) = margins%list(i)%value
         touch = margins%list(i)%time
       end do
@@ -140,14 +140,14 @@ contains
     beside = margin_t()
     do i = 1, size(margins%list)
       associate (one => margins%list(i))
-        if (one%kind == of_order .or. same_meaning(one, place%monitor)) cycle
+        if (one%kind == of_order .or. same_meaning(one, position%monitor)) cycle
         ! A graze is an impact without speed and a turning point without a gap.
-        if (any(one%kind == [of_impact, of_gap]) .and. one%joint == place%monitor%joint .and. &
+        if (any(one%kind == [of_impact, of_gap]) .and. one%joint == position%monitor%joint .and. &
             abs(one%time - touch) < one_touch*machine%period) cycle
         if (one%value < beside(1)%value) beside(1) = one
       end associate
     end do
-    if (place%monitor%kind == 0) beside(2)%value = merge(test(2), test(1), place%label == label_sn)
+    if (position%monitor%kind == 0) beside(2)%value = merge(test(2), test(1), position%label == label_sn)
   end subroutine residual
 
   !> The products of 1 - m and of 1 + m over the multipliers m, times the speeds of the impacts: smooth also where one has none.
@@ -171,37 +171,37 @@ contains
   end function tests
 
   !> Moves all unknowns by a change in natural sizes.
-  subroutine move(place, change)
-    type(place_t), intent(inout) :: place
+  subroutine move(position, change)
+    type(curve_position_t), intent(inout) :: position
     real(wp), intent(in) :: change(:)
     real(wp) :: by(size(change))
     integer :: n
     n = size(change)
-    by = change*place%sizes
-    call move_along(place%now%orbit, by(:n - 1))
-    place%now%free = place%now%free + by(n)
+    by = change*position%sizes
+    call move_along(position%now%orbit, by(:n - 1))
+    position%now%free = position%now%free + by(n)
   end subroutine move
 
   !> The equations and their derivatives by all unknowns, by differences of fourth order, each over its largest; `rows` are the
   !> factors.
-  subroutine linearise(family, plan, place, left, slopes, ok, rows)
+  subroutine linearise(family, plan, position, left, slopes, ok, rows)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(inout) :: place
+    type(curve_position_t), intent(inout) :: position
     real(wp), intent(out) :: left(:), slopes(:, :)
     logical, intent(out) :: ok
     real(wp), intent(out), optional :: rows(:)
-    type(place_t) :: near
+    type(curve_position_t) :: near
     class(hybrid_t), allocatable :: machine, there
     real(wp) :: values(size(left), -2:2), change(size(left) + 1)
     integer :: i, k
-    call machine_at(family, plan, place%now, machine, ok)
-    if (ok) call residual(machine, place, left, ok=ok)
+    call machine_at(family, plan, position%now, machine, ok)
+    if (ok) call residual(machine, position, left, ok=ok)
     if (.not. ok) return
     do k = 1, size(change)
       do i = -2, 2
         if (i == 0) cycle
-        near = place
+        near = position
         change = 0
         change(k) = i*difference
         call move(near, change)
@@ -228,10 +228,10 @@ contains
   end subroutine linearise
 
   !> Newton's method across `along`.
-  subroutine correct(family, plan, place, along, ok)
+  subroutine correct(family, plan, position, along, ok)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(inout) :: place
+    type(curve_position_t), intent(inout) :: position
     real(wp), intent(in) :: along(:)
     logical, intent(out) :: ok
     class(hybrid_t), allocatable :: machine
@@ -246,10 +246,10 @@ contains
     do i = 1, most_newton
       ! The derivatives are taken anew only where the steps do not shrink fast.
       if (.not. fresh) then
-        call linearise(family, plan, place, right(:n - 1), slopes(:n - 1, :), ok, rows(:n - 1))
+        call linearise(family, plan, position, right(:n - 1), slopes(:n - 1, :), ok, rows(:n - 1))
       else
-        call machine_at(family, plan, place%now, machine, ok)
-        if (ok) call residual(machine, place, right(:n - 1), ok=ok)
+        call machine_at(family, plan, position%now, machine, ok)
+        if (ok) call residual(machine, position, right(:n - 1), ok=ok)
         right = right*rows
       end if
       if (.not. ok) return
@@ -258,7 +258,7 @@ contains
       call solve(slopes, -right, change, ok)
       if (ok) ok = all(abs(change) < 0.5_wp)
       if (.not. ok) return
-      call move(place, change)
+      call move(position, change)
       before = length
       length = norm2(change)
       fresh = i == 1 .or. length < 0.2_wp*before
@@ -267,56 +267,56 @@ contains
     ok = length < converged_step
   end subroutine correct
 
-  subroutine set_tangent(family, plan, place, along, ok)
+  subroutine set_tangent(family, plan, position, along, ok)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(inout) :: place
+    type(curve_position_t), intent(inout) :: position
     real(wp), intent(in) :: along(:)
     logical, intent(out) :: ok
     real(wp), dimension(size(along)) :: left, right
     real(wp) :: slopes(size(along), size(along))
     integer :: n
     n = size(along)
-    place%tangent = along
-    call linearise(family, plan, place, left(:n - 1), slopes(:n - 1, :), ok)
+    position%tangent = along
+    call linearise(family, plan, position, left(:n - 1), slopes(:n - 1, :), ok)
     if (.not. ok) return
     slopes(n, :) = along
     right = 0
     right(n) = 1
-    call solve(slopes, right, place%tangent, ok)
-    place%tangent = place%tangent/norm2(place%tangent)
+    call solve(slopes, right, position%tangent, ok)
+    position%tangent = position%tangent/norm2(position%tangent)
   end subroutine set_tangent
 
-  !> What lies beside a curve at a place: the least of the other margins, and the other test of multipliers.
-  function looked_at(family, plan, place) result(beside)
+  !> What lies beside a curve at a position: the least of the other margins, and the other test of multipliers.
+  function looked_at(family, plan, position) result(beside)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(in) :: place
+    type(curve_position_t), intent(in) :: position
     type(margin_t) :: beside(2)
     class(hybrid_t), allocatable :: machine
-    type(place_t) :: copy
-    real(wp) :: left(unknowns(place%now) - 1)
+    type(curve_position_t) :: copy
+    real(wp) :: left(unknowns(position%now) - 1)
     logical :: ok
-    copy = place
+    copy = position
     call machine_at(family, plan, copy%now, machine, ok)
     if (ok) call residual(machine, copy, left, beside, ok)
   end function looked_at
 
   !> Value of what is beside a curve: a margin like one, or the other test.
-  real(wp) function beside_like(family, plan, place, which, margin) result(value)
+  real(wp) function beside_like(family, plan, position, which, margin) result(value)
     type(family_t), intent(in) :: family
     type(curve_plan_t), intent(in) :: plan
-    type(place_t), intent(in) :: place
+    type(curve_position_t), intent(in) :: position
     integer, intent(in) :: which
     type(margin_t), intent(in) :: margin
     class(hybrid_t), allocatable :: machine
-    type(place_t) :: copy
+    type(curve_position_t) :: copy
     type(margin_t) :: beside(2)
     type(margins_t) :: margins
-    real(wp) :: left(unknowns(place%now) - 1)
+    real(wp) :: left(unknowns(position%now) - 1)
     logical :: ok
     integer :: i
-    copy = place
+    copy = position
     value = huge(value)
     call machine_at(family, plan, copy%now, machine, ok)
     if (.not. ok) return

@@ -23,7 +23,7 @@ module cycle_reached
   integer, parameter :: most_newton = 12
   !> Of a motion that has not come back yet: the longest cycle that it may come to, in how many sections the distance must shrink,
   !> taken as the largest of so many, and by how much, as a logarithm, the multiplier lets it at least.
-  integer, parameter :: longest = 32, watched_sections = 20000, stretch = 256
+  integer, parameter :: longest = 32, watched_sections = 20000, block = 256
   real(wp), parameter :: least_decay = 0.05_wp
 
 contains
@@ -84,7 +84,7 @@ contains
     real(wp) :: here(size(start)), image(size(start)), farthest(2), decay
     integer :: i, mode, rounds
     rounds = watched_sections/period
-    decay = -(rounds - stretch)*log(min(1.0_wp, max(tiny(1.0_wp), multiplier)))
+    decay = -(rounds - block)*log(min(1.0_wp, max(tiny(1.0_wp), multiplier)))
     approaches = decay >= least_decay .and. distance(machines%centre, point, start) <= beside_cycle
     if (.not. approaches) return
     here = start
@@ -93,8 +93,8 @@ contains
       call fly_sections(machines%centre, here, period, .false., image, events, mode, tally, approaches)
       if (.not. approaches) return
       here = image
-      if (i <= stretch) farthest(1) = max(farthest(1), distance(machines%centre, point, here))
-      if (i > rounds - stretch) farthest(2) = max(farthest(2), distance(machines%centre, point, here))
+      if (i <= block) farthest(1) = max(farthest(1), distance(machines%centre, point, here))
+      if (i > rounds - block) farthest(2) = max(farthest(2), distance(machines%centre, point, here))
     end do
     approaches = farthest(2) <= max(on_cycle, exp(-decay/2)*farthest(1))
   end function approaches

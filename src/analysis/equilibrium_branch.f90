@@ -86,7 +86,7 @@ contains
     real(wp), intent(in) :: start(:)
     real(wp) :: y(size(start))
     y = start
-    y(structure%places + 1:structure%places + structure%frame%speeds) = 0
+    y(structure%positions + 1:structure%positions + structure%frame%speeds) = 0
   end function at_rest
 
   pure function along_parameter(point, way) result(direction)

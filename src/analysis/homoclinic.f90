@@ -61,7 +61,7 @@ contains
     integer :: i, side, further, low, high
     logical :: ok
     allocate (contacts(0))
-    looks = places_to_look(line)
+    looks = positions_to_search(line)
     allocate (verdicts(2, size(looks)), source=not_known)
     allocate (along(size(line(1)%orbit%y), 0:size(looks)), source=0.0_wp)
     do i = 1, size(looks)
@@ -123,7 +123,7 @@ contains
   end subroutine put_in_order
 
   !> Points of a branch where it is a saddle whose sides stay apart: the ends of each such piece, and others spread evenly.
-  pure function places_to_look(line) result(looks)
+  pure function positions_to_search(line) result(looks)
     type(point_t), intent(in) :: line(:)
     integer, allocatable :: looks(:)
     logical :: directed(0:size(line) + 1), chosen(size(line))
@@ -137,7 +137,7 @@ contains
       chosen(i) = directed(i) .and. (modulo(n, every) == 0 .or. .not. (directed(i - 1) .and. directed(i + 1)))
     end do
     looks = pack([(i, i=1, size(line))], chosen)
-  end function places_to_look
+  end function positions_to_search
 
   pure logical function is_directed(point)
     type(point_t), intent(in) :: point

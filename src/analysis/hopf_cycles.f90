@@ -62,21 +62,21 @@ contains
     end do
   end subroutine begin_cycle
 
-  !> The state on the cycle where the watched place is largest, over its size there, in natural sizes.
+  !> The state on the cycle where the watched position is largest, over its size there, in natural sizes.
   pure function at_maximum(structure, point) result(along)
     type(structure_t), intent(in) :: structure
     type(equilibrium_t), intent(in) :: point
     real(wp) :: along(size(point%y)), rows(2, size(point%y))
     complex(wp), allocatable :: values(:), vectors(:, :)
-    complex(wp) :: place
+    complex(wp) :: position
     integer :: k
     call eigen_of(structure, point, values, vectors)
     k = minloc(abs(real(values)), 1)
     rows = watched_rows(structure)
-    place = sum(rows(1, :)*structure%size_of*vectors(:, k))
+    position = sum(rows(1, :)*structure%size_of*vectors(:, k))
     along = 0
-    if (.not. abs(place) > 0) return
-    along = real(vectors(:, k)/place, wp)*structure%size_of(1)
+    if (.not. abs(position) > 0) return
+    along = real(vectors(:, k)/position, wp)*structure%size_of(1)
     if (.not. maxval(abs(along)) < 1e3_wp) along = 0
   end function at_maximum
 

@@ -27,7 +27,8 @@ module invariant_sets
   integer, parameter :: most_levels = 80, most_points = 6000
   !> Of natural sizes: distance from the saddle at which a set begins, and between neighbours.
   real(wp), parameter :: first_step = 1e-6_wp, spacing = 1e-2_wp
-  !> Largest angle between neighbouring chords [rad] where these are longer than the share of the spacing; least step of the place.
+  !> Largest angle between neighbouring chords [rad] where these are longer than the share of the spacing; least step of the
+  !> position.
   real(wp), parameter :: most_angle = 0.3_wp, straight = 0.1_wp, least_step = 1e-9_wp
 
   !> One side of a set.
@@ -39,9 +40,9 @@ module invariant_sets
     integer, allocatable :: piece(:)
   end type set_t
 
-  !> A point of a level: its place 0 to 1 along the level; `there` is false where the map or its preimage is not to be had.
+  !> A point of a level: its position 0 to 1 along the level; `there` is false where the map or its preimage is not to be had.
   type :: node_t
-    real(wp) :: place = 0, y(2) = 0
+    real(wp) :: position = 0, y(2) = 0
     logical :: there = .true.
   end type node_t
 
@@ -132,10 +133,10 @@ contains
   end subroutine set_growth
 
   !> A point beside the saddle, along the eigenvector.
-  pure type(node_t) function base(growth, place)
+  pure type(node_t) function base(growth, position)
     type(growth_t), intent(in) :: growth
-    real(wp), intent(in) :: place
-    base = node_t(place=place, y=growth%origin + first_step*growth%factor**place*growth%direction)
+    real(wp), intent(in) :: position
+    base = node_t(position=position, y=growth%origin + first_step*growth%factor**position*growth%direction)
   end function base
 
   pure elemental logical function is_inside(growth, node) result(inside)
@@ -183,10 +184,10 @@ contains
         cycle
       end if
       associate (nodes => levels(k)%nodes)
-        node%place = nodes(i)%place + (nodes(i + 1)%place - nodes(i)%place)/2
+        node%position = nodes(i)%position + (nodes(i + 1)%position - nodes(i)%position)/2
         guess = merge_guess(nodes(i), nodes(i + 1))
       end associate
-      call map_node(machines, body, growth, point_at(machines, body, growth, levels, k - 1, node%place), guess, node)
+      call map_node(machines, body, growth, point_at(machines, body, growth, levels, k - 1, node%position), guess, node)
       levels(k)%nodes = [levels(k)%nodes(:i), node, levels(k)%nodes(i + 1:)]
     end do
   end subroutine next_level
@@ -202,7 +203,7 @@ contains
     type(node_t) :: from, node
     integer :: missing
     missing = merge(i + 1, i, levels(k)%nodes(i)%there)
-    from = point_at(machines, body, growth, levels, k - 1, levels(k)%nodes(missing)%place)
+    from = point_at(machines, body, growth, levels, k - 1, levels(k)%nodes(missing)%position)
     call map_node(machines, body, growth, from, levels(k)%nodes(2*i + 1 - missing), node)
     found = node%there
     if (found) levels(k)%nodes(missing) = node
@@ -224,26 +225,26 @@ contains
     if (one%there .and. other%there) guess%y = (one%y + other%y)/2
   end function merge_guess
 
-  !> The point of a level at a place, computed through all levels below it, beside the neighbours there.
-  recursive function point_at(machines, body, growth, levels, k, place) result(node)
+  !> The point of a level at a position, computed through all levels below it, beside the neighbours there.
+  recursive function point_at(machines, body, growth, levels, k, position) result(node)
     type(neighbourhood_t), intent(in) :: machines
     type(one_body_t), intent(in) :: body
     type(growth_t), intent(in) :: growth
     type(level_t), intent(in) :: levels(0:)
     integer, intent(in) :: k
-    real(wp), intent(in) :: place
+    real(wp), intent(in) :: position
     type(node_t) :: node, below
     integer :: i
     if (k == 0) then
-      node = base(growth, place)
+      node = base(growth, position)
       return
     end if
-    i = count(levels(k)%nodes%place <= place)
-    if (abs(levels(k)%nodes(i)%place - place) <= 0) then
+    i = count(levels(k)%nodes%position <= position)
+    if (abs(levels(k)%nodes(i)%position - position) <= 0) then
       node = levels(k)%nodes(i)
       return
     end if
-    below = point_at(machines, body, growth, levels, k - 1, place)
+    below = point_at(machines, body, growth, levels, k - 1, position)
     call map_node(machines, body, growth, below, merge_guess(levels(k)%nodes(i), levels(k)%nodes(i + 1)), node)
   end function point_at
 
@@ -256,7 +257,7 @@ contains
     type(node_t), intent(inout) :: node
     type(tally_t) :: tally
     real(wp) :: slopes(2, 2)
-    node = node_t(place=from%place, y=from%y, there=.false.)
+    node = node_t(position=from%position, y=from%y, there=.false.)
     if (.not. is_inside(growth, from)) return
     if (growth%stable) then
       call preimage_beside(machines, body, growth%scan, from%y, guess%y, node%y, node%there)
@@ -275,11 +276,11 @@ contains
     integer, intent(in) :: i
     real(wp) :: length, one(2), other(2)
     needs = .false.
-    if (nodes(i + 1)%place - nodes(i)%place < least_step) return
+    if (nodes(i + 1)%position - nodes(i)%position < least_step) return
     if (.not. (nodes(i)%there .or. nodes(i + 1)%there)) return
     if (nodes(i)%there .neqv. nodes(i + 1)%there) then
       ! The end is located, more coarsely.
-      needs = nodes(i + 1)%place - nodes(i)%place > 1e-4_wp
+      needs = nodes(i + 1)%position - nodes(i)%position > 1e-4_wp
       return
     end if
     ! Beyond the window only the way out matters.

@@ -76,7 +76,7 @@ contains
       if (ending == no_label) return
     end if
     if (.not. goes_on) then
-      ! Two events that change places are none, if the motion goes on.
+      ! Two events that change positions are none, if the motion goes on.
       if (here(1)%label == no_label) here%label = label_not_known
       ending = here(1)%label
     else if (is_touch(at%now%orbit, passed)) then

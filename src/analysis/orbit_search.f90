@@ -56,7 +56,7 @@ contains
     integer :: i, n
     if (.not. allocated(found%orbits)) allocate (found%orbits(0))
     do i = 1, size(starts, 2)
-      if (present(watch)) call watch%tell_start()
+      if (present(watch)) call watch%report_start()
       call settle(machines, starts(:, i), longest, found, settled, n)
       found%starts = found%starts + 1
       if (n < 0) found%lost = found%lost + 1
@@ -65,7 +65,7 @@ contains
       call try_newton(family, machines, value, settled, n, found)
     end do
     do i = 1, size(starts, 2)
-      if (present(watch)) call watch%tell_start()
+      if (present(watch)) call watch%report_start()
       do n = 1, min(2, longest)
         call try_newton(family, machines, value, starts(:, i), n, found)
       end do

@@ -41,7 +41,7 @@ contains
     end do
   end subroutine mark_symmetry
 
-  !> Whether half a period later every place is as far on the other side of its middle, with the opposite velocity.
+  !> Whether half a period later every position is as far on the other side of its middle, with the opposite velocity.
   pure logical function is_symmetric(machine, orbit)
     class(hybrid_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
@@ -55,7 +55,7 @@ contains
       other = state_at(machine, orbit, (1 + instants(i))*half)
       twice = one + other
       if (i == 1) first = twice
-      if (i == 1) first(machine%places + 1:) = 0
+      if (i == 1) first(machine%positions + 1:) = 0
       is_symmetric = maxval(abs(twice - first)/machine%size_of) < same_orbit
       if (.not. is_symmetric) return
     end do

@@ -19,7 +19,7 @@ module part_of_branch
 
 contains
 
-  !> Whether all points of a branch, or with `mirror` [m] their mirror images about that place, lie between points of another.
+  !> Whether all points of a branch, or with `mirror` [m] their mirror images about that position, lie between points of another.
   pure logical function lies_on(part, whole, family, mirror)
     type(branch_t), intent(in) :: part, whole
     type(family_t), intent(in) :: family
@@ -38,9 +38,9 @@ contains
     end do
   end function lies_on
 
-  !> The chord on which a place lies, from the one found last.
-  pure subroutine find_chord(place, ends, last, found)
-    real(wp), intent(in) :: place(:), ends(:, :)
+  !> The chord on which a position lies, from the one found last.
+  pure subroutine find_chord(position, ends, last, found)
+    real(wp), intent(in) :: position(:), ends(:, :)
     integer, intent(inout) :: last
     logical, intent(out) :: found
     real(wp) :: step(features), away(features), share
@@ -50,7 +50,7 @@ contains
     do k = 0, chords - 1
       at = 1 + modulo(last - 1 + k, chords)
       step = ends(:, at + 1) - ends(:, at)
-      away = place - ends(:, at)
+      away = position - ends(:, at)
       share = 0
       if (norm2(step) > 0) share = min(max(sum(away*step)/sum(step**2), 0.0_wp), 1.0_wp)
       found = norm2(away - share*step) <= off_chord*norm2(step) + rounding
@@ -60,24 +60,24 @@ contains
   end subroutine find_chord
 
   !> The parameter, the extremes, and sums of the states before the events: none depends on where the orbit begins, and in a graze
-  !> none jumps but that of the places. In natural sizes.
-  pure function features_of(point, family, mirror) result(place)
+  !> none jumps but that of the positions. In natural sizes.
+  pure function features_of(point, family, mirror) result(position)
     type(point_t), intent(in) :: point
     type(family_t), intent(in) :: family
     real(wp), intent(in), optional :: mirror
-    real(wp) :: place(features)
+    real(wp) :: position(features)
     integer :: k
     associate (orbit => point%orbit, sizes => family%sizes)
-      place(:3) = [orbit%parameter/family%parameter_size, [point%x_min, point%x_max]/sizes(1)]
-      place(4) = 0
+      position(:3) = [orbit%parameter/family%parameter_size, [point%x_min, point%x_max]/sizes(1)]
+      position(4) = 0
       do k = 1, size(orbit%events)
-        place(4) = place(4) + orbit%events(k)%arrival(1)/sizes(1)
+        position(4) = position(4) + orbit%events(k)%arrival(1)/sizes(1)
       end do
-      place(5) = event_speeds(orbit, sizes)
+      position(5) = event_speeds(orbit, sizes)
       if (.not. present(mirror)) return
-      place(2:3) = 2*mirror/sizes(1) - place([3, 2])
-      place(4) = 2*size(orbit%events)*mirror/sizes(1) - place(4)
-      place(5) = -place(5)
+      position(2:3) = 2*mirror/sizes(1) - position([3, 2])
+      position(4) = 2*size(orbit%events)*mirror/sizes(1) - position(4)
+      position(5) = -position(5)
     end associate
   end function features_of
 

@@ -27,7 +27,7 @@ module periodic_orbit
   !> Newton's method has converged when a step, in natural sizes, is below this.
   real(wp), parameter :: converged_step = 1e-11_wp
   !> Where the equations hold to this, steps up to the other length are of rounding alone, as the equations tell no more.
-  real(wp), parameter :: rounding_of_equations = 5e-14_wp, told_by_rounding = 1e-9_wp
+  real(wp), parameter :: rounding_of_equations = 5e-14_wp, settled_by_rounding = 1e-9_wp
   !> Newton's steps with the same derivatives by the parameter.
   integer, parameter :: newton_between = 4
   !> Orbits whose points on the section are within this in natural sizes are one.
@@ -227,9 +227,9 @@ contains
       if (ok) exit
       near_enough = .false.
       if (present(roughly)) near_enough = roughly .and. norm2(miss) < rounding_of_equations
-      if (near_enough .and. length < told_by_rounding .and. length >= 0.5_wp*before) exit
+      if (near_enough .and. length < settled_by_rounding .and. length >= 0.5_wp*before) exit
     end do
-    ok = ok .or. length < converged_step .or. (near_enough .and. length < told_by_rounding)
+    ok = ok .or. length < converged_step .or. (near_enough .and. length < settled_by_rounding)
     if (ok .and. moved) call machine_neighbourhood(family, orbit%parameter, machines, error)
     ok = ok .and. .not. allocated(error)
     if (.not. ok) return

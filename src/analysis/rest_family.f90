@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Where dry friction holds joints at rest a structure without a clock has a continuum of equilibria, a family: the joints that are
-!> held, and between which places the watched coordinate may rest.
+!> held, and between which positions the watched coordinate may rest.
 module rest_family
   use body_family, only: family_t
   use equilibrium, only: correct_equilibrium, equilibrium_t
@@ -25,15 +25,15 @@ module rest_family
   type, public :: rest_family_t
     !> Names of the joints that dry friction holds, with commas; '' for none.
     character(len=:), allocatable :: joints
-    !> Between which places [m] the watched coordinate may rest if no stop is in the way; `known` for linear machines.
+    !> Between which positions [m] the watched coordinate may rest if no stop is in the way; `known` for linear machines.
     logical :: known = .false.
     real(wp) :: low = 0, high = 0
   end type rest_family_t
 
 contains
 
-  !> The family of a machine at the value `parameter`. The place is affine in the forces of the joints held, each within what breaks
-  !> it away: its extremes are at the corners, from the equilibria with sliding forces one way and the other.
+  !> The family of a machine at the value `parameter`. The position is affine in the forces of the joints held, each within what
+  !> breaks it away: its extremes are at the corners, from the equilibria with sliding forces one way and the other.
   subroutine find_rest_family(family, parameter, found)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: parameter
@@ -53,13 +53,13 @@ contains
       associate (machine => structure%frame%moving%machine)
         found%joints = join([(machine%joints(held(i))%name, i=1, count_held)], ', ')
         if (count_held == 0 .or. count_held > most_held .or. .not. (plain .and. machine%linear)) return
-        call place_of(machines, structure, phase, corner, ok)
+        call position_of(machines, structure, phase, corner, ok)
         if (.not. ok) return
         middle = corner
         half = 0
         do i = 1, count_held
           phase(held(i)) = -1
-          call place_of(machines, structure, phase, other, ok)
+          call position_of(machines, structure, phase, other, ok)
           if (.not. ok) return
           phase(held(i)) = 1
           associate (friction => machine%joints(held(i))%friction)
@@ -77,11 +77,11 @@ contains
   contains
 
     !> Where the watched coordinate is at rest in a mode.
-    subroutine place_of(machines, structure, phase, place, ok)
+    subroutine position_of(machines, structure, phase, position, ok)
       type(neighbourhood_t), intent(in) :: machines
       type(structure_t), intent(in) :: structure
       integer, intent(in) :: phase(:)
-      real(wp), intent(out) :: place
+      real(wp), intent(out) :: position
       logical, intent(out) :: ok
       type(neighbourhood_t) :: own
       type(equilibrium_t) :: point
@@ -93,8 +93,8 @@ contains
       along(structure%n + 1) = 1
       call correct_equilibrium(family, own, point, along, ok)
       rows = watched_rows(structure)
-      place = sum(rows(1, :)*point%y)
-    end subroutine place_of
+      position = sum(rows(1, :)*point%y)
+    end subroutine position_of
 
   end subroutine find_rest_family
 

@@ -32,7 +32,7 @@ module saddle_search
     integer :: periods = 0
     !> Points on the section (columns), period by period: of one body x [m], v [m/s] at crank angle 0.
     real(wp), allocatable :: points(:, :)
-    !> Of each of them the place [m] and the speed [m/s] of what is watched.
+    !> Of each of them the position [m] and the speed [m/s] of what is watched.
     real(wp), allocatable :: watched(:, :)
     !> Over the period of the orbit, the largest modulus first, and the derivative of the map they belong to, at the first point.
     complex(wp), allocatable :: multipliers(:)
@@ -196,7 +196,7 @@ contains
     if (moves) moves = norm2(machine%slope(mode, 0.0_wp, point)/machine%size_of)*machine%size_of_time() > all_but_at_rest
   end function moves
 
-  !> Adds an orbit unless it is among `saddles`; `number` is its place there.
+  !> Adds an orbit unless it is among `saddles`; `number` is its position there.
   pure subroutine add_saddle(machine, saddle, saddles, number)
     class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddle

@@ -8,25 +8,25 @@ module search_watch
 
   type, abstract, public :: search_watch_t
   contains
-    procedure(tell_start), deferred :: tell_start
-    procedure(tell_point), deferred :: tell_point
+    procedure(report_start), deferred :: report_start
+    procedure(report_point), deferred :: report_point
   end type search_watch_t
 
   abstract interface
     !> Another start was tried at a value of the parameter.
-    subroutine tell_start(self)
+    subroutine report_start(self)
       import :: search_watch_t
       class(search_watch_t), intent(inout) :: self
-    end subroutine tell_start
+    end subroutine report_start
 
     !> The branch under way has this many points, the last at this value of the parameter.
-    subroutine tell_point(self, points, parameter)
+    subroutine report_point(self, points, parameter)
       use kinds, only: wp
       import :: search_watch_t
       class(search_watch_t), intent(inout) :: self
       integer, intent(in) :: points
       real(wp), intent(in) :: parameter
-    end subroutine tell_point
+    end subroutine report_point
   end interface
 
 end module search_watch

@@ -135,7 +135,7 @@ contains
       part = 1 + int((int(i - 1, int64)*batches)/sections)
       where (growth > 0) batch(part, :) = batch(part, :) + log_of(growth)
       call note_events(structure, events, spectrum)
-      if (i <= size(series)) series(i) = place_of(structure, state)
+      if (i <= size(series)) series(i) = position_of(structure, state)
       if (i == size(series)) spectrum%point = coordinates_of(structure, state)
     end do
     spectrum%known = .true.
@@ -179,7 +179,7 @@ contains
     type(multibody_state_t), intent(inout) :: state
     real(wp), dimension(structure%frame%moving%machine%n) :: q, v
     associate (moving => structure%frame%moving)
-      if (structure%places == size(q) .and. structure%frame%speeds == size(q)) return
+      if (structure%positions == size(q) .and. structure%frame%speeds == size(q)) return
       call lay_out(moving, multibody_point(moving, state), q, v)
       state%q(:size(q)) = q
       state%v(:size(v)) = v
@@ -237,15 +237,15 @@ contains
   end subroutine advance_with_frame
 
   !> The watched position; what may be anywhere is watched by what does not run away.
-  pure real(wp) function place_of(structure, state) result(place)
+  pure real(wp) function position_of(structure, state) result(position)
     type(structure_t), intent(in) :: structure
     type(multibody_state_t), intent(in) :: state
     real(wp) :: point(structure%n)
-    place = state%q(structure%frame%moving%machine%watched)
-    if (structure%places == structure%frame%moving%machine%n) return
+    position = state%q(structure%frame%moving%machine%watched)
+    if (structure%positions == structure%frame%moving%machine%n) return
     point = coordinates_of(structure, state)
-    place = point(1)
-  end function place_of
+    position = point(1)
+  end function position_of
 
   !> Means and standard errors of the batches (one column per exponent) of a motion of so long a duration [s] that leaves as many
   !> directions as are `left`.
@@ -289,7 +289,7 @@ contains
         end do
         if (unit == 0) growth(k) = norm2(frame(:, k))
         if (norm2(frame(:, k)) > 1e-12_wp*rest) exit
-        ! A direction that is lost: any other goes on in its place.
+        ! A direction that is lost: any other goes on in its position.
         unit = unit + 1
         frame(:, k) = 0
         frame(min(unit, size(growth)), k) = 1
@@ -310,7 +310,7 @@ contains
   pure logical function has_exact_sum(structure)
     type(structure_t), intent(in) :: structure
     associate (machine => structure%frame%moving%machine)
-      has_exact_sum = machine%linear .and. structure%has_clock .and. structure%places == machine%n .and. &
+      has_exact_sum = machine%linear .and. structure%has_clock .and. structure%positions == machine%n .and. &
                       .not. any(machine%joints%kind == joint_soft) .and. size(structure%frame%elastic) == 0
       if (size(machine%joints) > 0) has_exact_sum = has_exact_sum .and. &
         .not. any(machine%joints%kind == joint_contact .and. machine%joints%contact%kind /= 0)
@@ -371,7 +371,7 @@ contains
     real(wp), intent(in) :: y(:)
     type(multibody_state_t) :: state
     real(wp) :: slope(structure%n), s, u, given
-    associate (machine => structure%frame%moving%machine, p => structure%places)
+    associate (machine => structure%frame%moving%machine, p => structure%positions)
       state = state_in(structure, mode, event%time, y(:structure%n))
       slope = structure%slope(mode, event%time, y(:structure%n))
       call joint_motion(machine, event%joint, state%q, state%v, event%time, &

@@ -107,7 +107,7 @@ contains
       select case (event%guard)
       case (meets_upper, meets_lower, leaves)
         margin%kind = of_impact
-        margin%value = -rate/size_of(machine%places + 1)
+        margin%value = -rate/size_of(machine%positions + 1)
       case (slide_ends)
         call note_stop(machine, event, margin)
       case (slides_up, slides_down, lets_go)
@@ -184,7 +184,7 @@ contains
       t = from + (until - from)*i/count_looks
       y = start
       if (i > 0) call machine%fly(mode, last_t, last, t, y)
-      call note_place(machine, y, margins)
+      call note_position(machine, y, margins)
       do g = 1, count_guards
         if (list(g)%meaning == turns_round) cycle
         probe%joint = list(g)%joint
@@ -210,7 +210,7 @@ contains
     end do
   end subroutine look_along
 
-  pure subroutine note_place(machine, y, margins)
+  pure subroutine note_position(machine, y, margins)
     type(structure_t), intent(in) :: machine
     real(wp), intent(in) :: y(:)
     type(margins_t), intent(inout) :: margins
@@ -218,7 +218,7 @@ contains
     x = sum(machine%watched(1, :)*y)
     margins%x_max = max(margins%x_max, x)
     margins%x_min = min(margins%x_min, x)
-  end subroutine note_place
+  end subroutine note_position
 
   !> Where the rate of a guard changes its sign after the state `start` at `low`, by the Illinois form of the secant rule, and its
   !> value there.
@@ -257,7 +257,7 @@ contains
       margin%value = value/machine%size_of(1)
     case (slide_ends)
       margin%kind = of_slip
-      margin%value = value/machine%size_of(machine%places + 1)
+      margin%value = value/machine%size_of(machine%positions + 1)
     case (slides_up, slides_down)
       margin%kind = of_hold
       margin%side = merge(1, -1, probe%guard == slides_up)

@@ -21,7 +21,7 @@ module aperiodic
   implicit none
   private
 
-  public :: watch_long, tell_family, outlast, meets_chaos, add_aperiodic
+  public :: watch_long, find_family, outlast, meets_chaos, add_aperiodic
 
   !> Drive periods over which the motion is watched, and batches of them whose mean drifts are compared.
   integer, parameter :: box_periods = 512, batches = 16
@@ -36,7 +36,7 @@ module aperiodic
   !> One of a family of cycles comes back to this, in units of the motion's size, and has a multiplier that is 1 to that.
   real(wp), parameter :: comes_back = 1e-10_wp, neutral = 1 - unattractive
   !> Share of a coordinate by which boxes of one motion may be apart.
-  real(wp), parameter :: same_place = 1e-12_wp
+  real(wp), parameter :: same_position = 1e-12_wp
 
 contains
 
@@ -55,7 +55,7 @@ contains
     integer(int64) :: slips
     integer :: i, reason
     known = .false.
-    tally%wants_v_max = .true.
+    tally%needs_v_max = .true.
     call begin_tally(moving, section, tally)
     call watch_anew(returns)
     found%coordinates = coordinates_of(moving)
@@ -87,7 +87,7 @@ contains
   !> Whether a motion of half range `amplitude` [m] that `watch_long` did not know, now at `section`, is one of a family of cycles
   !> of at most `max_period` drive periods: it comes back to rounding, and has a multiplier +1. Beside a fold of cycles it does not
   !> come back so well.
-  pure subroutine tell_family(moving, section, amplitude, max_period, found)
+  pure subroutine find_family(moving, section, amplitude, max_period, found)
     type(motion_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     real(wp), intent(in) :: amplitude
@@ -115,7 +115,7 @@ contains
     found%kind = kind_family
     found%multiplier = 1
     found%duration = period*moving%machine%period
-  end subroutine tell_family
+  end subroutine find_family
 
   !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the catalogue
   !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly, as `returns` tells.
@@ -250,7 +250,7 @@ contains
     end if
   end function belong_together
 
-  !> What the cycles of a family have at most: of the places and speeds; of the distance to stops at least.
+  !> What the cycles of a family have at most: of the positions and speeds; of the distance to stops at least.
   pure subroutine widen_features(one, all_of_them)
     type(features_t), intent(in) :: one
     type(features_t), intent(inout) :: all_of_them
@@ -268,7 +268,7 @@ contains
     real(wp) :: box(most_coordinates, 2), room(most_coordinates)
     box = box_near(a%points(:, :2), b)
     ! Motions that rounding alone keeps from coming back have boxes of no size.
-    room = same_place*maxval(abs(b%points(:, :2)), dim=2)
+    room = same_position*maxval(abs(b%points(:, :2)), dim=2)
     boxes_meet = all(box(:, 1) <= b%points(:, 2) + room .and. box(:, 2) >= b%points(:, 1) - room)
   end function boxes_meet
 

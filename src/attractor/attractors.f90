@@ -70,9 +70,10 @@ module attractors
     integer :: coordinates = 2
     !> The first coordinate repeats after this [rad]; 0 = never.
     real(wp) :: turn = 0
-    !> A motion between stops, which it does not touch: it may be anywhere. The coordinates are those after the first `places`.
-    logical :: any_place = .false.
-    integer :: places = 0
+    !> A motion between stops, which it does not touch: it may be anywhere. The coordinates are those after the first
+    !> `positions`.
+    logical :: any_position = .false.
+    integer :: positions = 0
     !> A cycle of a machine without a clock: its section is where the watched coordinate turns round, see `turn_section`.
     logical :: by_event = .false.
     !> Time that one cycle takes, of a family each [s]; 0 of what is none.
@@ -153,7 +154,7 @@ contains
     if (present(by_event)) events = by_event
     do k = 1, size(catalogue)
       associate (attractor => catalogue(k))
-        if (attractor%any_place .or. (attractor%by_event .neqv. events)) cycle
+        if (attractor%any_position .or. (attractor%by_event .neqv. events)) cycle
         if (attractor%rests) then
           if (.not. slipped) found = k
         else
@@ -191,7 +192,7 @@ contains
   end function squared_distance
 
   !> Index of the motion that is not periodic whose box of section points holds `point` and in which the events of `regime`
-  !> occur, first those of the same regime, or of two bodies that go on moving as one, or that has been reached at any place;
+  !> occur, first those of the same regime, or of two bodies that go on moving as one, or that has been reached at any position;
   !> 0 if none.
   pure integer function find_box(catalogue, point, regime) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
@@ -202,9 +203,9 @@ contains
     do k = 1, size(catalogue)
       if (catalogue(k)%features%regime /= regime) cycle
       if (catalogue(k)%rests .and. regime == regime_stuck) found = k
-      if (catalogue(k)%any_place) then
+      if (catalogue(k)%any_position) then
         do i = 1, catalogue(k)%period
-          if (squared_distance(catalogue(k), i, point(catalogue(k)%places + 1:)) <= catalogue(k)%capture_radius**2) found = k
+          if (squared_distance(catalogue(k), i, point(catalogue(k)%positions + 1:)) <= catalogue(k)%capture_radius**2) found = k
         end do
       end if
       if (found == 0 .and. in_box(catalogue(k), point)) found = k
@@ -262,8 +263,8 @@ contains
         real(attractor%coordinates, wp), merge(1.0_wp, 0.0_wp, attractor%rests), real(f%regime, wp), real(f%word, wp), &
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
         f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
-        merge(1.0_wp, 0.0_wp, attractor%any_place), real(attractor%kind, wp), attractor%turn, &
-        f%rotation, merge(1.0_wp, 0.0_wp, attractor%by_event), attractor%duration, real(attractor%places, wp), &
+        merge(1.0_wp, 0.0_wp, attractor%any_position), real(attractor%kind, wp), attractor%turn, &
+        f%rotation, merge(1.0_wp, 0.0_wp, attractor%by_event), attractor%duration, real(attractor%positions, wp), &
         attractor%scale, real(attractor%multipliers), aimag(attractor%multipliers)]
     end associate
     if (allocated(attractor%points)) packed(packed_scalars + 1:) = &
@@ -284,12 +285,12 @@ contains
     attractor%multiplier = packed(15)
     attractor%capture_radius = packed(16)
     attractor%section = packed(17:20)
-    attractor%any_place = packed(21) > 0
+    attractor%any_position = packed(21) > 0
     attractor%kind = nint(packed(22))
     attractor%turn = packed(23)
     attractor%by_event = packed(25) > 0
     attractor%duration = packed(26)
-    attractor%places = nint(packed(27))
+    attractor%positions = nint(packed(27))
     attractor%scale = packed(28:27 + most_coordinates)
     attractor%multipliers = cmplx(packed(28 + most_coordinates:27 + 2*most_coordinates), &
                                   packed(28 + 2*most_coordinates:packed_scalars), wp)

@@ -49,8 +49,8 @@ contains
   end function attractor_reached_at
 
   !> Whether a motion on the section, with what was counted since its window began, has settled at one of a family of cycles, each
-  !> at a place of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is left
-  !> of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it
+  !> at a position of its own between the stops, and stays there: it is in the neighbourhood verified without stops, and what is
+  !> left of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it
   !> misses the stops.
   pure logical function stays_in_family(moving, catalogue, section, tally)
     type(motion_t), intent(in) :: moving
@@ -60,15 +60,15 @@ contains
     real(wp) :: point(most_coordinates), drift
     integer :: k, i, n
     stays_in_family = .false.
-    if (tally%impacts > 0 .or. .not. any(catalogue%any_place)) return
+    if (tally%impacts > 0 .or. .not. any(catalogue%any_position)) return
     point = section_point(moving, section)
     do k = 1, size(catalogue)
-      associate (attractor => catalogue(k), after => catalogue(k)%places + 1)
-        if (.not. attractor%any_place .or. attractor%multiplier >= 1) cycle
+      associate (attractor => catalogue(k), after => catalogue(k)%positions + 1)
+        if (.not. attractor%any_position .or. attractor%multiplier >= 1) cycle
         n = attractor%coordinates
         do i = 1, attractor%period
           if (squared_distance(attractor, i, point(after:)) > attractor%capture_radius**2) cycle
-          drift = attractor%scale(speed_number(moving) - attractor%places) &
+          drift = attractor%scale(speed_number(moving) - attractor%positions) &
                   *attractor%period*moving%machine%period/(1 - attractor%multiplier) &
                   *sum(abs(point(after:after + n - 1) - attractor%points(:n, i))/attractor%scale(:n))
           stays_in_family = stays_clear(moving, section, tally, attractor%period, 2*drift)

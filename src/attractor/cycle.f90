@@ -39,20 +39,20 @@ contains
 
   !> Image of a section point (its coordinates, SI) after `periods` drive periods and what happened on the
   !> way; `ok` is false if the trajectory had to be given up. `duration` [s] is the time that it took.
-  pure subroutine map_point(moving, point, periods, image, tally, ok, wants_v_max, duration)
+  pure subroutine map_point(moving, point, periods, image, tally, ok, needs_v_max, duration)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
     real(wp), intent(out) :: image(:)
     type(tally_t), intent(out) :: tally
     logical, intent(out) :: ok
-    logical, intent(in), optional :: wants_v_max
+    logical, intent(in), optional :: needs_v_max
     real(wp), intent(out), optional :: duration
     type(section_state_t) :: section
     real(wp) :: reached(most_coordinates)
     integer :: i, reason
     section = section_at(moving, point)
-    if (present(wants_v_max)) tally%wants_v_max = wants_v_max
+    if (present(needs_v_max)) tally%needs_v_max = needs_v_max
     call begin_tally(moving, section, tally)
     reason = 0
     if (present(duration)) duration = 0

@@ -4,7 +4,7 @@
 !> Builds the catalogue of attractors of one machine from a sample of starts. Serial and in a fixed order; frozen
 !> before any trajectory of a map is labelled.
 module discover
-  use aperiodic, only: add_aperiodic, meets_chaos, outlast, tell_family, watch_long
+  use aperiodic, only: add_aperiodic, meets_chaos, outlast, find_family, watch_long
   use attractors, only: attractor_t, find_box, find_capture, kind_chaotic, kind_not_known, kind_rest, longest_period, &
     make_points, most_coordinates, regime_at_rest, regime_non_impact
   use capture, only: attractor_reached, attractor_reached_at
@@ -31,13 +31,13 @@ module discover
   !> Relative distance at which a section point counts as a return to an earlier one.
   real(wp), parameter :: return_tolerance = 0.05_wp
 
-  !> What a stretch of a motion showed: its regime and half range [m], whether it was converged, given up, or came back exactly.
-  type :: stretch_t
+  !> What a segment of a motion showed: its regime and half range [m], whether it was converged, given up, or came back exactly.
+  type :: segment_t
     integer :: regime = 0
     real(wp) :: amplitude = 0
     logical :: known = .false., ok = .true.
     type(returns_t) :: returns
-  end type stretch_t
+  end type segment_t
 
 contains
 
@@ -54,7 +54,7 @@ contains
     logical, intent(in), optional :: within_span
     type(section_state_t) :: section
     type(attractor_t) :: found
-    type(stretch_t) :: stretch
+    type(segment_t) :: segment
     real(wp) :: patience
     integer :: i
     logical :: ok, longer
@@ -66,16 +66,16 @@ contains
       section = start_section(moving, starts(:, i))
       patience = span%duration
       do
-        call settle(moving, catalogue, patience, section, stretch)
-        if (stretch%known .or. .not. stretch%ok) exit
-        call identify(moving, section, stretch%returns, max_period, found, ok)
+        call settle(moving, catalogue, patience, section, segment)
+        if (segment%known .or. .not. segment%ok) exit
+        call identify(moving, section, segment%returns, max_period, found, ok)
         if (ok) then
           if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
-        if (find_box(catalogue, section_point(moving, section), stretch%regime) > 0) exit
+        if (find_box(catalogue, section_point(moving, section), segment%regime) > 0) exit
         if (2*patience > span%extension*span%duration) then
-          call look_longer(moving, max_period, longer, stretch, section, catalogue)
+          call look_longer(moving, max_period, longer, segment, section, catalogue)
           exit
         end if
         patience = 2*patience
@@ -85,17 +85,17 @@ contains
 
   !> The end of patience: the motion without impact of a linear oscillator is known without it; any other is watched for a fixed
   !> number of periods more if it may take `longer`, and if it has come to no cycle then, it is not periodic, or not known.
-  pure subroutine look_longer(moving, max_period, longer, stretch, section, catalogue)
+  pure subroutine look_longer(moving, max_period, longer, segment, section, catalogue)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: max_period
     logical, intent(in) :: longer
-    type(stretch_t), intent(in) :: stretch
+    type(segment_t), intent(in) :: segment
     type(section_state_t), intent(inout) :: section
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     type(attractor_t) :: found, cycle_found
     type(returns_t) :: returns
     logical :: known, ok, lasts, forgets
-    if (is_linear(moving) .and. stretch%regime == regime_non_impact) then
+    if (is_linear(moving) .and. segment%regime == regime_non_impact) then
       call motion_without_impact(moving, found, ok)
       if (ok) then
         if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
@@ -106,14 +106,14 @@ contains
     lasts = .false.
     forgets = .false.
     do
-      call watch_long(moving, catalogue, stretch%amplitude, section, found, returns, known, ok)
+      call watch_long(moving, catalogue, segment%amplitude, section, found, returns, known, ok)
       if (known .or. .not. ok) return
       call identify(moving, section, returns, max_period, cycle_found, ok)
       if (ok) then
         if (.not. holds(moving, catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
         return
       end if
-      if (.not. has_no_clock(moving)) call tell_family(moving, section, stretch%amplitude, min(max_period, longest_period), found)
+      if (.not. has_no_clock(moving)) call find_family(moving, section, segment%amplitude, min(max_period, longest_period), found)
       if (lasts .or. found%kind /= kind_chaotic .or. meets_chaos(catalogue, found)) exit
       call outlast(moving, catalogue, section, returns, known, forgets, ok)
       if (known .or. .not. ok) return
@@ -166,7 +166,7 @@ contains
     if (.not. is_undriven(moving)) return
     if (ok) then
       call take_as_one_point(moving, found)
-      call tell_equilibrium(found)
+      call find_equilibrium(found)
     else
       call recognise_equilibrium(moving, section, found, ok)
       if (.not. ok .and. has_no_clock(moving)) call recognise_by_event(moving, section, min(max_period, longest_period), found, ok)
@@ -184,7 +184,7 @@ contains
     call refine_cycle(moving, point(:coordinates_of(moving)), 1, found, ok)
     if (.not. ok) return
     found%section = section_state(moving, found%points(:, 1))
-    call tell_equilibrium(found)
+    call find_equilibrium(found)
     ok = found%kind == kind_rest .and. find_capture([found], point, .true.) > 0
   end subroutine recognise_equilibrium
 
@@ -202,7 +202,7 @@ contains
   end subroutine take_as_one_point
 
   !> A motion that does not change from one time to any later one: an equilibrium.
-  pure subroutine tell_equilibrium(found)
+  pure subroutine find_equilibrium(found)
     type(attractor_t), intent(inout) :: found
     if (found%rests .or. found%features%amplitude > 1e-9_wp*found%scale(1)) return
     found%kind = kind_rest
@@ -214,7 +214,7 @@ contains
       f%amplitude = 0
       f%v_max = 0
     end associate
-  end subroutine tell_equilibrium
+  end subroutine find_equilibrium
 
   !> The limit cycle of a machine without a clock at which a settled state is, by its returns to where it turns round.
   pure subroutine recognise_by_event(moving, section, max_period, found, ok)
@@ -241,8 +241,8 @@ contains
   pure logical function holds(moving, catalogue, found)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:), found
-    if (found%any_place) then
-      holds = find_box(catalogue, [spread(0.0_wp, 1, found%places), found%points(:, 1)], found%features%regime) > 0
+    if (found%any_position) then
+      holds = find_box(catalogue, [spread(0.0_wp, 1, found%positions), found%points(:, 1)], found%features%regime) > 0
     else if (found%by_event) then
       holds = find_capture(catalogue, found%points(:, 1), .true., by_event=.true.) > 0
     else
@@ -251,12 +251,12 @@ contains
   end function holds
 
   !> Runs for `patience` [s] unless converged before, or back at a state from which a completed chatter has led to it again.
-  pure subroutine settle(moving, catalogue, patience, section, stretch)
+  pure subroutine settle(moving, catalogue, patience, section, segment)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: patience
     type(section_state_t), intent(inout) :: section
-    type(stretch_t), intent(out) :: stretch
+    type(segment_t), intent(out) :: segment
     type(tally_t) :: tally
     integer(int64) :: slips
     integer :: i, reason
@@ -266,16 +266,16 @@ contains
       slips = tally%slips
       whole = .not. section%state%time > 0 .and. rest_lasts(moving)
       call advance_section_period(moving, section, tally, reason)
-      stretch%ok = reason == 0
-      if (.not. stretch%ok) return
-      stretch%known = attractor_reached(moving, catalogue, section, .not. whole .or. tally%slips > slips) > 0
-      if (stretch%known) return
-      call watch_returns(moving, section, tally%chatters, stretch%returns)
-      if (stretch%returns%period > 0 .and. stretch%returns%chattered) exit
+      segment%ok = reason == 0
+      if (.not. segment%ok) return
+      segment%known = attractor_reached(moving, catalogue, section, .not. whole .or. tally%slips > slips) > 0
+      if (segment%known) return
+      call watch_returns(moving, section, tally%chatters, segment%returns)
+      if (segment%returns%period > 0 .and. segment%returns%chattered) exit
     end do
     associate (features => features_over(moving, tally, 1.0_wp))
-      stretch%regime = features%regime
-      stretch%amplitude = features%amplitude
+      segment%regime = features%regime
+      segment%amplitude = features%amplitude
     end associate
   end subroutine settle
 
@@ -290,7 +290,7 @@ contains
     type(tally_t) :: tally
     real(wp) :: points(most_coordinates, 0:2*longest_period)
     type(motion_t) :: free
-    integer :: i, p, reason, n, first, places
+    integer :: i, p, reason, n, first, positions
     later = section
     call begin_tally(moving, later, tally)
     points(:, 0) = section_point(moving, later)
@@ -315,21 +315,21 @@ contains
       found%section = section_state(moving, points(:, 0))
       return
     end if
-    places = 0
-    if (tally%impacts == 0) call without_stops(moving, free, places)
-    first = places + 1
+    positions = 0
+    if (tally%impacts == 0) call without_stops(moving, free, positions)
+    first = positions + 1
     associate (sizes => scales_of(moving, (tally%x_max - tally%x_min)/2))
       do p = 1, max_period
         if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), turn_of(moving))) cycle
-        if (places == 0) then
+        if (positions == 0) then
           call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
           if (ok) found%section = section_state(moving, found%points(:, 1))
         else
           call refine_cycle(free, points(first:n, 2*max_period), p, found, ok)
-          found%any_place = .true.
-          found%places = places
+          found%any_position = .true.
+          found%positions = positions
           if (ok) ok = comes_back(moving, free, found)
-          if (ok) found%section = section_state(moving, [points(:places, 2*max_period), found%points(:, 1)])
+          if (ok) found%section = section_state(moving, [points(:positions, 2*max_period), found%points(:, 1)])
         end if
         if (ok) return
       end do
@@ -337,7 +337,7 @@ contains
     ok = .false.
   end subroutine recognise
 
-  !> Whether a cycle of the machine without stops ends at the place where it began: else it drifts towards a stop.
+  !> Whether a cycle of the machine without stops ends at the position where it began: else it drifts towards a stop.
   pure logical function comes_back(moving, free, cycle)
     type(motion_t), intent(in) :: moving, free
     type(attractor_t), intent(in) :: cycle
@@ -351,7 +351,7 @@ contains
       call advance_section_period(free, section, unused, reason)
     end do
     after = section_point(moving, section)
-    comes_back = all(abs(after(:cycle%places) - before(:cycle%places)) <= 1e-9_wp*maxval(cycle%scale(:cycle%coordinates)))
+    comes_back = all(abs(after(:cycle%positions) - before(:cycle%positions)) <= 1e-9_wp*maxval(cycle%scale(:cycle%coordinates)))
   end function comes_back
 
   !> Whether every one of a run of section points comes back after `p` periods.

@@ -103,7 +103,7 @@ contains
     end do
     call make_points(attractor, attractor%period)
     attractor%metric([(i*(i + 1)/2, i=1, n)], :) = 1
-    tally%wants_v_max = .true.
+    tally%needs_v_max = .true.
     call collect(moving, first, attractor%period, points(:, :attractor%period), chattered(:attractor%period), tally, found)
     attractor%points = points(:, :attractor%period - 1)
     attractor%duration = attractor%period*moving%machine%period

@@ -5,7 +5,7 @@
 module sampling
   use kinds, only: wp
   use motion, only: motion_t
-  use motion_state, only: place_of, tally_t
+  use motion_state, only: position_of, tally_t
   use section, only: advance_section, advance_section_period, driver_now, start_section, section_state_t
   implicit none
   private
@@ -36,7 +36,7 @@ contains
         section_time = section_time + moving%machine%period
       end do
       if (reason == 0) call advance_section(moving, section, times(i) - section_time, tally, reason)
-      x(i) = place_of(section%state)
+      x(i) = position_of(section%state)
       associate (now => driver_now(moving, section))
         driver(i) = now(1)
       end associate

@@ -9,7 +9,7 @@ module single_trajectory
   use kinds, only: int64, wp
   use motion, only: motion_t
   use motion_features, only: features_over
-  use motion_state, only: log_t, place_of, tally_t
+  use motion_state, only: log_t, position_of, tally_t
   use section, only: advance_past_event, advance_section, advance_section_period, begin_tally, energy_now, record_end, &
     section_point, start_section, section_state_t
   use status, only: reason_settled, reason_time_over
@@ -316,7 +316,7 @@ contains
       if (outcome%window%regime == regime_non_impact .and. in_balance(moving, trajectory)) outcome%window%regime = regime_at_rest
       call note_state(trajectory, outcome)
       trajectory%phase = merge(phase_over, phase_extension, ended .or. trajectory%converged > 0 .or. .not. can_converge)
-      trajectory%tally%wants_v_max = .false.
+      trajectory%tally%needs_v_max = .false.
     case default
       trajectory%phase = phase_over
     end select
@@ -335,7 +335,7 @@ contains
   pure subroutine note_state(trajectory, outcome)
     type(trajectory_state_t), intent(in) :: trajectory
     type(outcome_t), intent(inout) :: outcome
-    outcome%x = place_of(trajectory%state)
+    outcome%x = position_of(trajectory%state)
     outcome%v = trajectory%state%v
     outcome%impacts = trajectory%impacts + trajectory%tally%impacts
     outcome%events = trajectory%tally%events
@@ -351,7 +351,7 @@ contains
     trajectory%impacts = trajectory%impacts + trajectory%tally%impacts
     trajectory%last_impact_speed = latest_impact_speed(trajectory)
     trajectory%grazing_margin = min(trajectory%grazing_margin, trajectory%tally%grazing_margin)
-    trajectory%tally%wants_v_max = .true.
+    trajectory%tally%needs_v_max = .true.
     call begin_tally(moving, trajectory%section_state_t, trajectory%tally)
   end subroutine open_window
 

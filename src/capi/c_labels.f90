@@ -144,7 +144,8 @@ contains
       associate (one => self%attractors(index + 1), f => self%attractors(index + 1)%features)
         numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
                    one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
-                   margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, one%any_place), &
+                   margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, &
+                   one%any_position), &
                    real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, has_driver(self%prepared%ensemble%moving)), &
                    real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)

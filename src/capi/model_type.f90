@@ -35,7 +35,7 @@ contains
     type(model_t), intent(out) :: model
     type(error_t), allocatable, intent(out) :: error
     character(len=1) :: no_overrides(0)
-    call load_case(path, no_overrides, model%the_case, error, wants_sweep=.false.)
+    call load_case(path, no_overrides, model%the_case, error, needs_sweep=.false.)
     if (.not. allocated(error)) model%parameters = list_parameters(model%the_case%laws)
   end subroutine read_model
 
@@ -48,7 +48,7 @@ contains
     character(len=:), allocatable :: name
     name = 'case'
     if (len(directory) > 0) name = directory//'/case'
-    call load_case_text(text, name, no_overrides, model%the_case, error, wants_sweep=.false.)
+    call load_case_text(text, name, no_overrides, model%the_case, error, needs_sweep=.false.)
     if (.not. allocated(error)) model%parameters = list_parameters(model%the_case%laws)
   end subroutine model_from_text
 

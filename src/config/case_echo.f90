@@ -119,7 +119,7 @@ contains
       continue
     else if (law%family == part_family) then
       if (part_kind(law%name) /= 'body') text = text//line('law', quoted(part_law(law%name)))
-      text = text//ends_text(law, place_names(laws))
+      text = text//ends_text(law, reference_point_names(laws))
     else if (law%family /= effect_family .and. law%name /= 'structure') then
       text = text//line('law', quoted(trim(law%name)))
     end if
@@ -182,12 +182,12 @@ contains
     if (len(text) > 0) text = newline//'['//path_of(structure)//'.point]'//newline//text
   end function points_text
 
-  !> Names of the places of a machine of several bodies and structures.
-  pure function place_names(laws) result(names)
+  !> Names of the reference points of a machine of several bodies and structures.
+  pure function reference_point_names(laws) result(names)
     type(law_choice_t), intent(in) :: laws(:)
     character(len=label_length), allocatable :: names(:)
     names = pack(laws%label, index(laws%name, 'body:') == 1 .or. index(laws%name, 'point:') == 1)
-  end function place_names
+  end function reference_point_names
 
   !> Whether the case has the table of a law: of several bodies, only those that it wrote.
   pure logical function is_written(the_case, i)

@@ -56,7 +56,7 @@ contains
     integer :: i, at
     placed = key
     do i = 1, size(entries)
-      at = place_end(entries(i)%entry)
+      at = name_end(entries(i)%entry)
       if (at == 0) cycle
       named = list_of(entries(i)%entry)//'.'//entries(i)%entry%string
       if (is_or_is_below(key, named)) placed = entries(i)%entry%path(:at)//key(len(named) + 1:)
@@ -64,11 +64,11 @@ contains
   end function placed
 
   !> Where the place of an element ends in the path of its name, axis[1].name; 0 for every other entry.
-  pure integer function place_end(entry)
+  pure integer function name_end(entry)
     type(toml_entry_t), intent(in) :: entry
-    place_end = index(entry%path, '].name', back=.true.)
-    if (place_end + 5 /= len(entry%path) .or. .not. allocated(entry%string)) place_end = 0
-  end function place_end
+    name_end = index(entry%path, '].name', back=.true.)
+    if (name_end + 5 /= len(entry%path) .or. .not. allocated(entry%string)) name_end = 0
+  end function name_end
 
   !> The list that a path with a place belongs to.
   pure function list_of(entry)
@@ -98,7 +98,7 @@ contains
       problem = 'found the key '''//key//''', allowed letters, digits, _ and the index of a list'
     end if
     do i = 1, len(key)
-      if (key(i:i) == ']' .and. place_of(entries, key(1:i)) == 0) then
+      if (key(i:i) == ']' .and. index_of(entries, key(1:i)) == 0) then
         problem = 'there is no element '''//key(1:i)//''' to change'
       else if (key(i:i) == '.' .and. is_list(entries, key(1:i - 1))) then
         problem = 'there is no element '''//key//''' to change; allowed '//elements(entries, key(1:i - 1))
@@ -111,7 +111,7 @@ contains
     type(source_entry_t), intent(in) :: entries(:)
     character(len=*), intent(in) :: path
     integer :: at
-    at = place_of(entries, path)
+    at = index_of(entries, path)
     is_list = .false.
     if (at > 0) is_list = entries(at)%entry%kind == toml_array
   end function is_list
@@ -124,7 +124,7 @@ contains
     integer :: i
     text = path//'[1] ...'
     do i = size(entries), 1, -1
-      if (place_end(entries(i)%entry) == 0) cycle
+      if (name_end(entries(i)%entry) == 0) cycle
       if (list_of(entries(i)%entry) == path) text = path//'.'//entries(i)%entry%string//', '//text
     end do
   end function elements
@@ -142,7 +142,7 @@ contains
       added(i)%entry%path = key//values(i)%path(2:)
       added(i)%override = override
     end do
-    at = place_of(entries, key)
+    at = index_of(entries, key)
     if (at == 0) at = size(entries) + 1
     do i = 1, size(kept)
       kept(i) = .not. is_or_is_below(entries(i)%entry%path, key)
@@ -151,14 +151,14 @@ contains
   end subroutine put
 
   !> Position of a path in the entries, 0 if it is absent.
-  pure integer function place_of(entries, path)
+  pure integer function index_of(entries, path)
     type(source_entry_t), intent(in) :: entries(:)
     character(len=*), intent(in) :: path
-    do place_of = 1, size(entries)
-      if (entries(place_of)%entry%path == path) return
+    do index_of = 1, size(entries)
+      if (entries(index_of)%entry%path == path) return
     end do
-    place_of = 0
-  end function place_of
+    index_of = 0
+  end function index_of
 
   !> Whether `path` is `above` or lies in it: 'drive.sine[2]' is below 'drive.sine' and 'drive'.
   pure logical function is_or_is_below(path, above)

@@ -34,32 +34,32 @@ module case_reader
 contains
 
   !> Reads the file `path`, puts the overrides ('key.path=value' in TOML syntax, blank-padded) on top
-  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it. With `wants_sweep` false a table [sweep] that
+  !> and validates. Code 66: the file cannot be read; 65: anything wrong in it. With `needs_sweep` false a table [sweep] that
   !> lacks what a sweep needs is left out. `structure_file` reads HDF5 files of structures.
-  subroutine load_case(path, overrides, the_case, error, wants_sweep, structure_file)
+  subroutine load_case(path, overrides, the_case, error, needs_sweep, structure_file)
     character(len=*), intent(in) :: path, overrides(:)
     type(case_t), intent(out) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    logical, intent(in), optional :: wants_sweep
+    logical, intent(in), optional :: needs_sweep
     procedure(structure_file_reader), optional :: structure_file
     character(len=:), allocatable :: text
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call load_case_text(text, path, overrides, the_case, error, wants_sweep, structure_file)
+    call load_case_text(text, path, overrides, the_case, error, needs_sweep, structure_file)
   end subroutine load_case
 
   !> The same for a text that is already in memory; `name` stands for the file in messages.
-  subroutine load_case_text(text, name, overrides, the_case, error, wants_sweep, structure_file)
+  subroutine load_case_text(text, name, overrides, the_case, error, needs_sweep, structure_file)
     character(len=*), intent(in) :: text, name, overrides(:)
     type(case_t), intent(out) :: the_case
     type(error_t), allocatable, intent(out) :: error
-    logical, intent(in), optional :: wants_sweep
+    logical, intent(in), optional :: needs_sweep
     procedure(structure_file_reader), optional :: structure_file
     type(case_source_t) :: source
     the_case%path = name
     the_case%raw_text = text
     the_case%title = ''
-    if (present(wants_sweep)) the_case%sweep%wanted = wants_sweep
+    if (present(needs_sweep)) the_case%sweep%wanted = needs_sweep
     call open_source(source, text, name, overrides, error)
     if (allocated(error)) return
     if (present(structure_file)) source%structure_file => structure_file

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The text of a case while it is read: its entries with overrides applied, the keys that may
-!> occur, and the problems found so far with their places.
+!> occur, and the problems found so far with their positions.
 module case_source
   use case_overrides, only: apply_override, is_or_is_below, source_entry_t
   use errors, only: error_t, fail
@@ -152,12 +152,12 @@ contains
     character(len=*), intent(in), optional :: shown
     logical, intent(in), optional :: missing, file_missing
     type(problem_t) :: new
-    character(len=:), allocatable :: above, place
+    character(len=:), allocatable :: above, location
     integer :: line
-    call place_of_key(source, path, place, line)
+    call location_of_key(source, path, location, line)
     above = path
     if (present(shown)) above = shown
-    new = problem_t(line, path, place//': key '''//above//''': '//problem)
+    new = problem_t(line, path, location//': key '''//above//''': '//problem)
     if (present(missing)) new%missing = missing
     if (present(file_missing)) new%file_missing = file_missing
     call insert(source, new)
@@ -165,10 +165,10 @@ contains
 
   !> Where the key `path`, or the table that lacks it, comes from: file and line, or the `--set` that gave it; `line` is 0 without
   !> any, `huge` for an override.
-  pure subroutine place_of_key(source, path, place, line)
+  pure subroutine location_of_key(source, path, location, line)
     type(case_source_t), intent(in) :: source
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: place
+    character(len=:), allocatable, intent(out) :: location
     integer, intent(out) :: line
     character(len=:), allocatable :: above
     integer :: at
@@ -178,23 +178,23 @@ contains
       if (at > 0 .or. len(above) == 0) exit
       above = above(1:max(scan(above, '.[', back=.true.) - 1, 0))
     end do
-    place = source%name
+    location = source%name
     line = 0
     if (at == 0) return
     line = source%entries(at)%entry%line
-    place = place//':'//to_text(line)
+    location = location//':'//to_text(line)
     if (.not. allocated(source%entries(at)%override)) return
     line = huge(line)
-    place = '--set '//source%entries(at)%override
-  end subroutine place_of_key
+    location = '--set '//source%entries(at)%override
+  end subroutine location_of_key
 
   !> Where a key comes from, in the words of messages.
-  pure function origin_of(source, path) result(place)
+  pure function origin_of(source, path) result(location)
     type(case_source_t), intent(in) :: source
     character(len=*), intent(in) :: path
-    character(len=:), allocatable :: place
+    character(len=:), allocatable :: location
     integer :: line
-    call place_of_key(source, path, place, line)
+    call location_of_key(source, path, location, line)
   end function origin_of
 
   !> Takes back what is missing below a table; `lacks` tells whether anything was.

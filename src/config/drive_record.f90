@@ -35,14 +35,14 @@ contains
     real(wp), allocatable :: force(:), cosine(:), sine(:)
     real(wp) :: interval, mean, left
     integer :: harmonics, i
-    logical :: harmonics_said
+    logical :: harmonics_text
     found = find(source, path//'.record') > 0
     if (.not. found) return
     file = ''
     call take_text(source, path//'.record', file)
     harmonics = usual_harmonics
     call know(source, path//'.periodic')
-    harmonics_said = find(source, path//'.harmonics') > 0
+    harmonics_text = find(source, path//'.harmonics') > 0
     call take_integer(source, path//'.harmonics', 1, harmonics, highest=most_harmonics)
     do i = 1, size(others)
       call know(source, path//'.'//trim(others(i)))
@@ -64,9 +64,9 @@ contains
     call series_of(force, min(harmonics, (size(force) - 1)/2), mean, cosine, sine, left)
     if (find(source, path//'.periodic') == 0) call assume(source, path//'.record has the period '// &
                                                          to_text(interval*size(force), 6)//' s')
-    if (.not. harmonics_said) call assume(source, path//'.harmonics = '//to_text(size(cosine))//' (they leave '// &
+    if (.not. harmonics_text) call assume(source, path//'.harmonics = '//to_text(size(cosine))//' (they leave '// &
                                           to_text(100*left, 2)//' %)')
-    if (left > most_left .and. .not. harmonics_said) then
+    if (left > most_left .and. .not. harmonics_text) then
       call report(source, path//'.record', 'found a record of which '//to_text(usual_harmonics)//' harmonics leave '// &
                   to_text(nint(100*left))//' %, allowed with the number of harmonics said: '//path//'.harmonics, 1 to '// &
                   to_text(most_harmonics))

@@ -78,7 +78,7 @@ contains
     end do
   end subroutine check_names
 
-  !> Columns of results are named after the places, and after the coordinates of structures, with _ for a dot.
+  !> Columns of results are named after the positions, and after the coordinates of structures, with _ for a dot.
   subroutine check_columns(source, names, structures)
     type(case_source_t), intent(inout) :: source
     character(len=label_length), intent(in) :: names(:)
@@ -106,18 +106,18 @@ contains
       column = replace_all(trim(name), '.', '_')
     end function column_of
 
-    !> No place has the column of coordinate number `number` of a structure.
+    !> No entry has the column of coordinate number `number` of a structure.
     subroutine check_coordinate(column, structure, number)
       character(len=*), intent(in) :: column, structure
       integer, intent(in) :: number
-      integer :: place, dot
-      do place = 1, size(names)
-        if (column_of(names(place)) /= column) cycle
-        dot = index(names(place), '.')
+      integer :: entry, dot
+      do entry = 1, size(names)
+        if (column_of(names(entry)) /= column) cycle
+        dot = index(names(entry), '.')
         if (dot == 0) then
-          call report(source, 'body.'//trim(names(place)), 'found a body'//also(structure, number))
+          call report(source, 'body.'//trim(names(entry)), 'found a body'//also(structure, number))
         else
-          call report(source, 'structure.'//names(place)(:dot - 1)//'.point.'//trim(names(place)(dot + 1:)), &
+          call report(source, 'structure.'//names(entry)(:dot - 1)//'.point.'//trim(names(entry)(dot + 1:)), &
                       'found a point'//also(structure, number))
         end if
       end do

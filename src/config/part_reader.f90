@@ -26,7 +26,7 @@ module part_reader
   !> Tables of parts, in the order in which they are kept; laws where a table gives none.
   character(len=8), parameter :: kinds_of_parts(5) = ['body    ', 'spring  ', 'friction', 'contact ', 'drive   ']
   character(len=8), parameter :: default_law(5) = ['mass    ', 'linear  ', 'coulomb ', '        ', '        ']
-  !> Names of the places between which joints act: bodies, then points of structures.
+  !> Names of the reference points between which joints act: bodies, then points of structures.
   type :: bodies_t
     character(len=label_length), allocatable :: names(:)
     !> Displacement of one per force at another by the modes that structures leave out [m/N].
@@ -91,11 +91,11 @@ contains
       end do
       choices = [choices, structures]
     end do
-    call read_positions(source, choices)
+    call read_reference_points(source, choices)
   end subroutine read_parts
 
   !> Positions and velocities of the parts, once all joints tell which of them are angles.
-  subroutine read_positions(source, choices)
+  subroutine read_reference_points(source, choices)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(inout) :: choices(:)
     type(parameter_row_t), allocatable :: rows(:)
@@ -110,7 +110,7 @@ contains
         call take_row(source, path_of(choices(i)), rows(k), is_angle, choices(i)%parameters(k)%values)
       end do
     end do
-  end subroutine read_positions
+  end subroutine read_reference_points
 
   !> Keys of a table without the name of a part, as one body has them.
   subroutine refuse_keys(source, kind)

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Bytes at places of a file that exists. Errors have code 74.
+!> Bytes at positions of a file that exists. Errors have code 74.
 module byte_file
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char
   use bindings, only: c_close_bytes, c_open_bytes, c_read_bytes, c_write_bytes
@@ -37,25 +37,25 @@ contains
     call test_status(number, exit_io, 'cannot open', path, error)
   end subroutine open_bytes
 
-  !> Reads what lies at a place (from 0).
-  subroutine read_bytes(self, bytes, place, error)
+  !> Reads what lies at a offset (from 0).
+  subroutine read_bytes(self, bytes, offset, error)
     class(byte_file_t), intent(in) :: self
     integer(int8), intent(out), contiguous, target :: bytes(:)
-    integer(int64), intent(in) :: place
+    integer(int64), intent(in) :: offset
     type(error_t), allocatable, intent(out) :: error
     integer(c_int) :: number
-    number = c_read_bytes(self%descriptor, c_loc(bytes), size(bytes, kind=int64), place)
+    number = c_read_bytes(self%descriptor, c_loc(bytes), size(bytes, kind=int64), offset)
     call test_status(number, exit_io, 'cannot read', self%path, error)
   end subroutine read_bytes
 
-  !> Writes at a place (from 0).
-  subroutine write_bytes(self, bytes, place, error)
+  !> Writes at a offset (from 0).
+  subroutine write_bytes(self, bytes, offset, error)
     class(byte_file_t), intent(in) :: self
     integer(int8), intent(in), contiguous, target :: bytes(:)
-    integer(int64), intent(in) :: place
+    integer(int64), intent(in) :: offset
     type(error_t), allocatable, intent(out) :: error
     integer(c_int) :: number
-    number = c_write_bytes(self%descriptor, c_loc(bytes), size(bytes, kind=int64), place)
+    number = c_write_bytes(self%descriptor, c_loc(bytes), size(bytes, kind=int64), offset)
     call test_status(number, exit_io, 'cannot write', self%path, error)
   end subroutine write_bytes
 

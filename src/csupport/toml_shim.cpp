@@ -47,7 +47,7 @@ struct Document {
   }
 };
 
-// A place that toml11's report underlines.
+// A offset that toml11's report underlines.
 struct Mark {
   int line = 0;
   int column = 0;
@@ -102,7 +102,7 @@ void flatten(const Value &value, const std::string &path, Document &document) {
   }
 }
 
-// The places that a report marks: a line "  12 | text" followed by "     |   ^--- hint".
+// The positions that a report marks: a line "  12 | text" followed by "     |   ^--- hint".
 std::vector<Mark> marks_of(const std::string &report) {
   std::vector<Mark> marks;
   std::istringstream lines(report);

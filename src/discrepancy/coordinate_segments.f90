@@ -20,10 +20,10 @@ module coordinate_segments
 
   public :: propagate_coordinates
 
-  !> Samples of all segments, one after the other: places and then velocities of all coordinates (rows).
+  !> Samples of all segments, one after the other: positions and then velocities of all coordinates (rows).
   type, public :: coordinate_samples_t
     real(wp), allocatable :: motion(:, :)
-    !> Derivatives: first directions, then places, velocities and crank angle of the start; then as `motion`.
+    !> Derivatives: first directions, then positions, velocities and crank angle of the start; then as `motion`.
     real(wp), allocatable :: slope(:, :, :)
   end type coordinate_samples_t
 
@@ -44,14 +44,14 @@ module coordinate_segments
     integer :: reason = 0, count = 0
     !> Start of the segment on the clock of the log [s].
     real(wp) :: origin = 0
-    !> Rows of `impact` in `coordinate_report_t`; places and velocities (rows) at the samples.
+    !> Rows of `impact` in `coordinate_report_t`; positions and velocities (rows) at the samples.
     real(wp), allocatable :: impact(:, :), motion(:, :)
   end type run_t
 
 contains
 
-  !> Flies every segment of a structure: `start` = places [m], velocities [m/s], crank angle [rad] by column, its samples are at
-  !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. Elastic friction has slid so far that its spring is stretched
+  !> Flies every segment of a structure: `start` = positions [m], velocities [m/s], crank angle [rad] by column, its samples
+  !> are at `times(first(i) + 1:first(i + 1))` [s], ascending from 0. Elastic friction has slid so far that its spring is stretched
   !> by all of the friction. Segments that cannot be flown, and steady ones: as in `propagate`.
   pure subroutine propagate_coordinates(family, start, first, times, derivatives, samples, report)
     type(family_t), intent(in) :: family

@@ -63,7 +63,7 @@ module variants
     type(variant_t), allocatable :: further(:), back(:)
     !> Components of the directions along bias, gain and delay of the sensor, by column.
     real(wp), allocatable :: of_sensor(:, :)
-    !> Steps of places [m], velocities [m/s] and crank angle [rad] of a start.
+    !> Steps of positions [m], velocities [m/s] and crank angle [rad] of a start.
     real(wp) :: start_step(3) = 0
     !> Distance to a barrier [m] and speed of an impact [m/s] below which a motion grazes: there a step changes the speed of
     !> the impact by more than a hundredth.
@@ -94,7 +94,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(plan_t) :: plan
     real(wp) :: share
-    integer :: i, place
+    integer :: i, at
     plan = plan_t(laws, options, chosen, values, directions)
     call build(plan, values, .false., family%moving, error)
     if (allocated(error)) return
@@ -111,10 +111,10 @@ contains
     allocate (family%further(size(directions, 2)), family%back(size(directions, 2)))
     allocate (family%of_sensor(size(sensor_paths), size(directions, 2)), source=0.0_wp)
     do i = 1, size(sensor_paths)
-      place = findloc(chosen%path == sensor_paths(i), .true., dim=1)
-      if (place == 0) cycle
-      family%of_sensor(i, :) = directions(place, :)
-      plan%directions(place, :) = 0
+      at = findloc(chosen%path == sensor_paths(i), .true., dim=1)
+      if (at == 0) cycle
+      family%of_sensor(i, :) = directions(at, :)
+      plan%directions(at, :) = 0
     end do
     do i = 1, size(directions, 2)
       if (.not. any(abs(plan%directions(:, i)) > 0)) cycle
@@ -168,7 +168,7 @@ contains
     moving%transit%available = .false.
   end subroutine build
 
-  !> The neighbours along direction `which`. If the first cannot be built, the other takes its place.
+  !> The neighbours along direction `which`. If the first cannot be built, the other takes its at.
   pure subroutine build_neighbours(plan, which, exact, further, back, error)
     type(plan_t), intent(in) :: plan
     integer, intent(in) :: which

@@ -8,7 +8,7 @@ module basin_driver
   use case_check, only: require_axes
   use case_setup, only: automatic_tile, grid_of, output_path, points_of_tile, span_of, tile_of_blocks
   use case_type, only: case_t
-  use catalogue_report, only: list_attractors, missed_text, not_known_text, tell_found
+  use catalogue_report, only: list_attractors, missed_text, not_known_text, report_found
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
   use endings, only: judge_reasons, report_reasons
@@ -210,7 +210,7 @@ contains
     end if
     source = 'discovered'
     if (len(session%command%catalogue) > 0) source = 'taken from '//session%command%catalogue
-    call tell_found(session%journal, work%catalogues, source)
+    call report_found(session%journal, work%catalogues, source)
     not_known = not_known_text(work%catalogues, work%span%extension)
     if (len(not_known) > 0) call session%journal%line('warning', not_known)
     missed = missed_text(work%catalogues, session%the_case%attractors%sample)

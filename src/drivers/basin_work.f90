@@ -40,7 +40,7 @@ module basin_work
   contains
     procedure :: compute => compute_basin_points
     procedure :: note => note_basin_point
-    procedure :: tell_apart => tell_apart_basin_points
+    procedure :: distinguish => distinguish_basin_points
     procedure :: points_from => basin_points_from
     procedure :: stands => basin_point_stands
   end type basin_work_t
@@ -84,7 +84,7 @@ contains
   end subroutine basin_points_from
 
   !> Points of one cell are to have the same attractor, and to settle about equally fast.
-  subroutine tell_apart_basin_points(self, index, values, marks, settling, error)
+  subroutine distinguish_basin_points(self, index, values, marks, settling, error)
     class(basin_work_t), intent(inout) :: self
     integer, intent(in) :: index(:, :)
     real(wp), intent(in) :: values(:, :)
@@ -102,7 +102,7 @@ contains
       self%period_slice = slice
       settling(i) = values(i, settling_value)/self%period
     end do
-  end subroutine tell_apart_basin_points
+  end subroutine distinguish_basin_points
 
   subroutine note_basin_point(self, index, values)
     class(basin_work_t), intent(inout) :: self

@@ -33,7 +33,7 @@ module boundary_audit
 
   !> The points of a file, and the piece of each.
   type :: points_t
-    real(wp), allocatable :: place(:, :), below(:), above(:), error(:), across(:)
+    real(wp), allocatable :: position(:, :), below(:), above(:), error(:), across(:)
     integer, allocatable :: piece(:)
   end type points_t
 
@@ -166,7 +166,7 @@ contains
     call reader%read_columns(names, table, error)
     if (.not. allocated(error)) call reader%read_columns([character(len=8) :: '/first', '/points'], pieces, error)
     if (allocated(error)) return
-    points%place = transpose(table(:, :2))
+    points%position = transpose(table(:, :2))
     points%below = table(:, 3)
     points%above = table(:, 4)
     points%error = table(:, 5)
@@ -192,7 +192,7 @@ contains
     type(case_t), intent(in) :: the_case
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: starts(3 + size(grid%others), 2), place(2)
+    real(wp) :: starts(3 + size(grid%others), 2), position(2)
     integer :: labels(2), wanted(2), side, w
     logical :: confirmed, exact
     wanted = nint([points%below(k), points%above(k)])
@@ -209,13 +209,13 @@ contains
     end if
     do w = 1, size(widths)
       do side = 1, 2
-        place = points%place(:, k)
+        position = points%position(:, k)
         associate (along => nint(points%across(k)) + 1)
-          place(along) = place(along) + (2*side - 3)*widths(w)*points%error(k)
+          position(along) = position(along) + (2*side - 3)*widths(w)*points%error(k)
         end associate
-        starts(:, side) = start_at(grid, axes, here, place)
+        starts(:, side) = start_at(grid, axes, here, position)
       end do
-      call ask_reference(laws_at(grid, axes, here, points%place(:, k)), ensemble, catalogue, the_case, starts(:3, :), wanted, &
+      call ask_reference(laws_at(grid, axes, here, points%position(:, k)), ensemble, catalogue, the_case, starts(:3, :), wanted, &
                          confirmed, error)
       if (allocated(error)) return
       if (confirmed) exit
@@ -238,14 +238,14 @@ contains
     index = here
     do i = 1, 2
       associate (values => grid%axes(axes(i))%values)
-        index(axes(i)) = minloc(abs(values - points%place(i, k)), 1)
-        if (i == along) index(axes(i)) = max(1, min(size(values) - 1, count(values <= points%place(i, k))))
+        index(axes(i)) = minloc(abs(values - points%position(i, k)), 1)
+        if (i == along) index(axes(i)) = max(1, min(size(values) - 1, count(values <= points%position(i, k))))
       end associate
     end do
     from = point_start(grid, index)
     associate (values => grid%axes(axes(along))%values, at => index(axes(along)))
       pieces = (values(at + 1) - values(at))/(2*points%error(k))
-      low = (points%place(along, k) - points%error(k) - values(at))/(values(at + 1) - values(at))
+      low = (points%position(along, k) - points%error(k) - values(at))/(values(at + 1) - values(at))
       at = at + 1
     end associate
     to = point_start(grid, index)
@@ -280,11 +280,11 @@ contains
     same = .true.
   end subroutine ask_reference
 
-  !> The start at a place of the plane: starts go evenly along an axis.
-  pure function start_at(grid, axes, here, place) result(start)
+  !> The start at a position of the plane: starts go evenly along an axis.
+  pure function start_at(grid, axes, here, position) result(start)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: axes(2), here(:)
-    real(wp), intent(in) :: place(2)
+    real(wp), intent(in) :: position(2)
     real(wp) :: start(3 + size(grid%others)), corner(3 + size(grid%others)), further(3 + size(grid%others))
     integer :: index(size(here)), i, n
     corner = point_start(grid, here)
@@ -295,23 +295,23 @@ contains
         index = here
         index(axes(i)) = n
         further = point_start(grid, index)
-        start = start + (place(i) - values(1))/(values(n) - values(1))*(further - corner)
+        start = start + (position(i) - values(1))/(values(n) - values(1))*(further - corner)
       end associate
     end do
   end function start_at
 
   !> The laws of the machine there, with the starts of further bodies in them.
-  pure function laws_at(grid, axes, here, place) result(laws)
+  pure function laws_at(grid, axes, here, position) result(laws)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: axes(2), here(:)
-    real(wp), intent(in) :: place(2)
+    real(wp), intent(in) :: position(2)
     type(law_choice_t), allocatable :: laws(:)
     integer :: i, k
     logical :: known
     laws = point_laws(grid, here)
     do k = 4, size(grid%start_axis)
       i = findloc(axes, grid%start_axis(k), 1)
-      if (i > 0) call change_parameter(laws, grid%start_names(k), place(i), known)
+      if (i > 0) call change_parameter(laws, grid%start_names(k), position(i), known)
     end do
   end function laws_at
 

@@ -257,7 +257,7 @@ contains
     integer :: k
     do k = 1, 2
       call schema%add_variable(axis_dimension(grid%axes(axes(k))%name), type_float64, ['point'], units=grid%axes(axes(k))%unit, &
-                               long_name=trim(grid%axes(axes(k))%name)//' of the boundary', data=points%place(k))
+                               long_name=trim(grid%axes(axes(k))%name)//' of the boundary', data=points%position(k))
     end do
     call schema%add_variable('across', type_int8, ['point'], units='1', flag_values=[-1, 0, 1], &
       flag_meanings='junction first_axis second_axis', long_name='axis along which the point was found', &

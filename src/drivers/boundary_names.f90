@@ -190,7 +190,7 @@ contains
     integer, intent(in) :: points(:), first
     real(wp), allocatable, intent(out) :: rows(:)
     real(wp), allocatable :: own(:)
-    real(wp) :: starts(3 + size(grid%others), 2), place(machines%centre%n)
+    real(wp) :: starts(3 + size(grid%others), 2), position(machines%centre%n)
     type(saddle_t) :: saddle
     integer :: k, edge
     allocate (own(0))
@@ -200,9 +200,9 @@ contains
           starts = side_starts(grid, plane, plane%intervals(point%interval))
           call track_edge(machines, labeller, starts, [point%below, point%above], edge, saddle)
         end associate
-        place = 0
-        if (saddle%periods > 0) place = saddle%points(:, 1)
-        own = [own, real(k, wp), real(edge, wp), real(saddle%periods, wp), place]
+        position = 0
+        if (saddle%periods > 0) position = saddle%points(:, 1)
+        own = [own, real(k, wp), real(edge, wp), real(saddle%periods, wp), position]
         call session%journal%progress(int(k, int64))
       end do
       call team%allgather(own, rows)

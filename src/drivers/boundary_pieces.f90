@@ -50,8 +50,8 @@ contains
         if (names%edge(line%points(last + 1)) /= edge_not_known) exit
       end do
       i = last + 1
-      before = place_of(first - 1)
-      after = place_of(last + 1)
+      before = position_of(first - 1)
+      after = position_of(last + 1)
       if (first == last .and. plane%points(line%points(first))%along == 0) then
         if (before == 0) before = after
         if (after == 0) after = before
@@ -66,14 +66,14 @@ contains
   contains
 
     !> Point at a position of the line; 0 beyond an end.
-    pure integer function place_of(position)
+    pure integer function position_of(position)
       integer, intent(in) :: position
-      place_of = 0
-      if (line%closed) place_of = line%points(1 + modulo(position - 1, n))
-      if (position >= 1 .and. position <= n) place_of = line%points(position)
-      if (place_of == 0) return
-      if (names%edge(place_of) == edge_not_known) place_of = 0
-    end function place_of
+      position_of = 0
+      if (line%closed) position_of = line%points(1 + modulo(position - 1, n))
+      if (position >= 1 .and. position <= n) position_of = line%points(position)
+      if (position_of == 0) return
+      if (names%edge(position_of) == edge_not_known) position_of = 0
+    end function position_of
 
   end subroutine bridge
 

@@ -132,7 +132,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(plane_t), intent(inout) :: plane
     logical, allocatable :: wanted(:, :)
-    integer, allocatable :: labels(:), places(:, :)
+    integer, allocatable :: labels(:), chosen_cells(:, :)
     real(wp), allocatable :: starts(:, :)
     integer :: i, j, k
     do
@@ -147,28 +147,28 @@ contains
       end do
       wanted = wanted .and. plane%inferred
       if (.not. any(wanted)) return
-      allocate (places(2, count(wanted)))
+      allocate (chosen_cells(2, count(wanted)))
       k = 0
       do j = 1, size(wanted, 2)
         do i = 1, size(wanted, 1)
           if (.not. wanted(i, j)) cycle
           k = k + 1
-          places(:, k) = [i, j]
+          chosen_cells(:, k) = [i, j]
         end do
       end do
       allocate (starts(3 + size(grid%others), k), labels(k))
       do k = 1, size(labels)
-        starts(:, k) = plane_starts(grid, plane, places(1, k), places(2, k))
+        starts(:, k) = plane_starts(grid, plane, chosen_cells(1, k), chosen_cells(2, k))
       end do
       call share_labels(session, kept, plane, starts, labels)
       do k = 1, size(labels)
-        associate (label => plane%labels(places(1, k), places(2, k)))
+        associate (label => plane%labels(chosen_cells(1, k), chosen_cells(2, k)))
           if (label /= labels(k)) plane%corrected = plane%corrected + 1
           label = labels(k)
-          plane%inferred(places(1, k), places(2, k)) = .false.
+          plane%inferred(chosen_cells(1, k), chosen_cells(2, k)) = .false.
         end associate
       end do
-      deallocate (wanted, places, starts, labels)
+      deallocate (wanted, chosen_cells, starts, labels)
     end do
   end subroutine correct_labels
 

@@ -88,7 +88,7 @@ contains
     side_of = merge(1, -1, modulo(n, 2) == 0)
   end function side_of
 
-  !> Grows the sides from number `first` on (from 0), each on one rank: number, ending, points, their places and pieces.
+  !> Grows the sides from number `first` on (from 0), each on one rank: number, ending, points, their positions and pieces.
   subroutine grow_part(session, machines, saddles, first, low, high, part)
     type(session_t), intent(inout) :: session
     type(neighbourhood_t), intent(in) :: machines

@@ -18,8 +18,8 @@ module branch_watch
     integer(int64) :: tried = 0
   contains
     procedure :: begin
-    procedure :: tell_start
-    procedure :: tell_point
+    procedure :: report_start
+    procedure :: report_point
   end type branch_watch_t
 
 contains
@@ -36,13 +36,13 @@ contains
     call journal%begin('starts', 2_int64*size(search%values)*size(search%starts, 2), 0_int64)
   end subroutine begin
 
-  subroutine tell_start(self)
+  subroutine report_start(self)
     class(branch_watch_t), intent(inout) :: self
     self%tried = self%tried + 1
     call self%journal%progress(self%tried)
-  end subroutine tell_start
+  end subroutine report_start
 
-  subroutine tell_point(self, points, parameter)
+  subroutine report_point(self, points, parameter)
     class(branch_watch_t), intent(inout) :: self
     integer, intent(in) :: points
     real(wp), intent(in) :: parameter
@@ -51,6 +51,6 @@ contains
         self%search%family%path//' = '//to_text(parameter, 6), '"following": '//to_text(branch)//', "points": '// &
         to_text(points)//', "parameter": '//json_number(parameter))
     end associate
-  end subroutine tell_point
+  end subroutine report_point
 
 end module branch_watch

@@ -13,7 +13,7 @@ module catalogue_report
   implicit none
   private
 
-  public :: tell_found, list_attractors, not_known_text, missed_text
+  public :: report_found, list_attractors, not_known_text, missed_text
 
   !> Confidence of the bound on what the sample has missed.
   real(wp), parameter :: confidence = 0.95_wp
@@ -42,7 +42,7 @@ contains
   end subroutine count_found
 
   !> These numbers in a line.
-  subroutine tell_found(journal, catalogues, source)
+  subroutine report_found(journal, catalogues, source)
     type(journal_t), intent(inout) :: journal
     type(catalogue_t), intent(in) :: catalogues(:)
     character(len=*), intent(in) :: source
@@ -55,7 +55,7 @@ contains
     call journal%line('catalogue', line//' in '//counted(size(catalogues), 'slice')//' '//source, &
                       '"attractors": '//to_text(attractors)//', "families": '//to_text(families)// &
                       ', "not_known": '//to_text(not_known))
-  end subroutine tell_found
+  end subroutine report_found
 
   !> '1 slice', '2 slices'.
   pure function counted(number, thing) result(words)

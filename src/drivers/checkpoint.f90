@@ -31,7 +31,7 @@ module checkpoint
     logical :: taken_up = .false.
     character(len=:), allocatable, private :: path
     type(byte_file_t), private :: file
-    integer(int64), private :: place = 0
+    integer(int64), private :: offset = 0
     logical, private :: reading = .false.
   contains
     procedure :: open => open_checkpoint
@@ -74,7 +74,7 @@ contains
       self%taken_up = self%reading
       first = [mark, crc32_text(identity, 0_int64)]
       if (.not. allocated(error) .and. .not. self%reading) call self%file%write(transfer(first, [0_int8]), 0_int64, error)
-      self%place = head
+      self%offset = head
     end if
     call session%team%agree(error)
   end subroutine open_checkpoint
@@ -93,7 +93,7 @@ contains
     if (self%reading) then
       call read_part(self, own, sound)
       inquire (file=self%path, size=bytes_on_disk)
-      if (.not. sound .and. bytes_on_disk > self%place) call session%journal%line('damaged', "'"//self%path// &
+      if (.not. sound .and. bytes_on_disk > self%offset) call session%journal%line('damaged', "'"//self%path// &
         "' is damaged behind "//to_text(self%recalled)//' sound parts: what follows is computed again')
     end if
     self%reading = sound
@@ -112,8 +112,8 @@ contains
     integer(int8), allocatable :: bytes(:)
     if (session%team%is_root()) then
       bytes = transfer(values, [0_int8])
-      call self%file%write([transfer([size(values, kind=int64), crc32(bytes, 0_int64)], [0_int8]), bytes], self%place, error)
-      self%place = self%place + head + size(bytes)
+      call self%file%write([transfer([size(values, kind=int64), crc32(bytes, 0_int64)], [0_int8]), bytes], self%offset, error)
+      self%offset = self%offset + head + size(bytes)
     end if
     call session%stop_if(error)
     call check_stop(session%journal, session%command%time_limit, self%doing, error, resumable=.true.)
@@ -128,7 +128,7 @@ contains
     if (.not. allocated(error)) call remove_file(self%path, error)
   end subroutine remove_checkpoint
 
-  !> The part at the place of the file, which moves on; `found` is false behind the last sound one.
+  !> The part at the offset of the file, which moves on; `found` is false behind the last sound one.
   subroutine read_part(self, values, found)
     class(checkpoint_t), intent(inout) :: self
     real(wp), allocatable, intent(inout) :: values(:)
@@ -136,28 +136,28 @@ contains
     integer(int64) :: first(2), bytes_on_disk
     integer(int8), allocatable :: bytes(:)
     type(error_t), allocatable :: error
-    call read_words(self%file, self%place, first, found)
+    call read_words(self%file, self%offset, first, found)
     if (.not. found) return
     inquire (file=self%path, size=bytes_on_disk)
-    found = first(1) >= 0 .and. first(1) <= (bytes_on_disk - self%place - head)/word
+    found = first(1) >= 0 .and. first(1) <= (bytes_on_disk - self%offset - head)/word
     if (.not. found) return
     allocate (bytes(word*first(1)))
-    call self%file%read(bytes, self%place + head, error)
+    call self%file%read(bytes, self%offset + head, error)
     found = .not. allocated(error)
     if (found) found = crc32(bytes, 0_int64) == first(2)
     if (.not. found) return
     values = transfer(bytes, values, int(first(1)))
-    self%place = self%place + head + size(bytes)
+    self%offset = self%offset + head + size(bytes)
   end subroutine read_part
 
-  subroutine read_words(file, place, words, found)
+  subroutine read_words(file, offset, words, found)
     type(byte_file_t), intent(in) :: file
-    integer(int64), intent(in) :: place
+    integer(int64), intent(in) :: offset
     integer(int64), intent(out) :: words(2)
     logical, intent(out) :: found
     integer(int8) :: bytes(head)
     type(error_t), allocatable :: error
-    call file%read(bytes, place, error)
+    call file%read(bytes, offset, error)
     found = .not. allocated(error)
     words = 0
     if (found) words = transfer(bytes, words)

@@ -40,12 +40,12 @@ contains
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: why, asked
-    integer :: place, neighbours, count
+    integer :: local_rank, neighbours, count
     integer(int64) :: starts
     call use_gpu(-1)
     asked = trim(command%device)
     ! Before any return, as ranks may be asked for different things.
-    call find_place(team, place, neighbours)
+    call find_local_rank(team, local_rank, neighbours)
     if (asked == 'cpu') return
     starts = starts_at_once(command, the_case, team%size())
     if (asked == 'auto' .and. starts < fewest()) return
@@ -66,7 +66,7 @@ contains
       call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several '// &
                 'bodies); allowed are auto and cpu')
     end if
-    if (count > 0) call use_gpu(gpu_number(modulo(place, count)), threads_of(neighbours))
+    if (count > 0) call use_gpu(gpu_number(modulo(local_rank, count)), threads_of(neighbours))
   end subroutine choose_device
 
   !> What `auto` asks for.
@@ -146,18 +146,18 @@ contains
   end function threads_of
 
   !> Number of this rank among the `neighbours` on its host, from 0. Collective.
-  subroutine find_place(team, place, neighbours)
+  subroutine find_local_rank(team, local_rank, neighbours)
     class(team_t), intent(in) :: team
-    integer, intent(out) :: place, neighbours
+    integer, intent(out) :: local_rank, neighbours
     character(len=host_length), allocatable :: names(:)
     real(wp), allocatable :: hosts(:)
     character(len=host_length) :: mine
     mine = host_name()
     call team%hosts(mine, names)
     call team%allgather([real(findloc(names == mine, .true., dim=1), wp)], hosts)
-    place = count(nint(hosts(:team%rank())) == nint(hosts(team%rank() + 1)))
+    local_rank = count(nint(hosts(:team%rank())) == nint(hosts(team%rank() + 1)))
     neighbours = count(nint(hosts) == nint(hosts(team%rank() + 1)))
-  end subroutine find_place
+  end subroutine find_local_rank
 
   !> Whether bodies of the case fly in lanes; `on_gpu`: in those that a GPU has, which know one body. Asks the case itself, not
   !> along its axes.

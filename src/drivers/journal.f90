@@ -39,7 +39,7 @@ module journal
     !> The stretch of work under way.
     character(len=:), allocatable :: things
     integer(int64) :: total = 0, before = 0
-    real(wp) :: stretch_started = 0
+    real(wp) :: interval_started = 0
   contains
     procedure :: open => open_journal
     procedure :: open_copy
@@ -149,7 +149,7 @@ contains
     self%things = things
     self%total = total
     self%before = before
-    self%stretch_started = monotonic_seconds()
+    self%interval_started = monotonic_seconds()
   end subroutine begin
 
   !> Progress of the stretch when it is due.
@@ -162,7 +162,7 @@ contains
     if (done <= self%before) return
     if (.not. is_due(self)) return
     now = monotonic_seconds()
-    rate = real(done - self%before, wp)/max(now - self%stretch_started, 1e-3_wp)
+    rate = real(done - self%before, wp)/max(now - self%interval_started, 1e-3_wp)
     message = to_text(done)//' of '//to_text(self%total)//' '//self%things//', '//to_text(nint(100*real(done, wp) &
       /real(max(self%total, 1_int64), wp)))//' %, '//to_text(rate, 3)//' '//self%things//'/s, ETA '// &
       duration_text(real(self%total - done, wp)/rate)

@@ -43,7 +43,7 @@ contains
     real(wp), allocatable :: table(:, :)
     real(wp) :: results(6, 1), start(3, 1)
     character(len=*), parameter :: names(7) = [character(len=8) :: 'x0', 'v0', 'ratio', 'x', 'v', 'impacts', 'reason']
-    integer :: i, place(1), point
+    integer :: i, drawn(1), point
     call reader%read_columns('/'//names, table, error)
     if (.not. allocated(error)) list%x0 = table(:, 1)
     if (.not. allocated(error)) call read_further(reader, list, error)
@@ -51,8 +51,8 @@ contains
     allocate (none%attractors(0))
     audit%whole = size(table, 1) <= sample
     do i = 1, min(sample, size(table, 1))
-      place = sampled([size(table, 1)], audit%whole, seed, i)
-      point = place(1)
+      drawn = sampled([size(table, 1)], audit%whole, seed, i)
+      point = drawn(1)
       if (.not. all(abs(table(point, :3)) <= huge(1.0_wp))) then
         call fail(error, exit_io, "'"//reader%path//"', point "//to_text(point - 1)//': the start is not finite')
         return

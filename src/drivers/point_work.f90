@@ -28,7 +28,7 @@ module point_work
   contains
     procedure(compute_points), deferred :: compute
     procedure(note_point), deferred :: note
-    procedure :: tell_apart => by_all_values
+    procedure :: distinguish => by_all_values
     procedure :: points_from => block_of_points
     procedure :: stands => never_again
   end type point_work_t

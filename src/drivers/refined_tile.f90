@@ -7,7 +7,7 @@ module refined_tile
   use kinds, only: int64, wp
   use point_work, only: compute_list, point_work_t, watch_t
   use refinement, only: block_content, block_t, learn_points, next_points, open_block
-  use spread_order, only: spread_place
+  use spread_order, only: spread_subscripts
   use system, only: monotonic_seconds
   implicit none
   private
@@ -30,21 +30,21 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
     type(block_t) :: block
-    integer :: place(size(lengths)), step(size(lengths)), i
+    integer :: corner(size(lengths)), step(size(lengths)), i
     logical :: stop_now
     step = 1
     step(work%refined_axes) = work%refine%block
-    place = lower
+    corner = lower
     whole = .true.
     do
-      call refine_block(work, lengths, place, block, whole, error, watch)
+      call refine_block(work, lengths, corner, block, whole, error, watch)
       if (allocated(error) .or. .not. whole) return
-      call put_block(work, block, place, lower, extent, values)
+      call put_block(work, block, corner, lower, extent, values)
       ! The next block, counting like an odometer.
-      do i = size(place), 1, -1
-        place(i) = place(i) + step(i)
-        if (place(i) < lower(i) + extent(i)) exit
-        place(i) = lower(i)
+      do i = size(corner), 1, -1
+        corner(i) = corner(i) + step(i)
+        if (corner(i) < lower(i) + extent(i)) exit
+        corner(i) = lower(i)
       end do
       if (i == 0) return
       if (.not. present(watch)) cycle
@@ -55,10 +55,10 @@ contains
     end do
   end subroutine refine_tile
 
-  !> The block that begins at `place` (from 0), as far as it needs to be computed.
-  subroutine refine_block(work, lengths, place, block, whole, error, watch)
+  !> The block that begins at `corner` (from 0), as far as it needs to be computed.
+  subroutine refine_block(work, lengths, corner, block, whole, error, watch)
     class(point_work_t), intent(inout) :: work
-    integer, intent(in) :: lengths(:), place(:)
+    integer, intent(in) :: lengths(:), corner(:)
     type(block_t), intent(out) :: block
     logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
@@ -68,18 +68,18 @@ contains
     integer :: n
     whole = .true.
     associate (axes => work%refined_axes)
-      call open_block(work%refine, lengths(axes), place(axes), layer_of(axes, lengths, place), block)
+      call open_block(work%refine, lengths(axes), corner(axes), layer_of(axes, lengths, corner), block)
       do
         call next_points(block, points)
         n = size(points, 2)
         if (n == 0) return
-        index = spread(place + 1, 2, n)
+        index = spread(corner + 1, 2, n)
         index(axes, :) = points + 1
         if (allocated(values)) deallocate (values, marks, settling)
         allocate (values(n, work%variables), marks(n, work%marks), settling(n))
         call compute_list(work, index, values, whole, error, watch)
         if (allocated(error) .or. .not. whole) return
-        call work%tell_apart(index, values, marks, settling, error)
+        call work%distinguish(index, values, marks, settling, error)
         if (allocated(error)) return
         call learn_points(block, points, marks, settling)
       end do
@@ -94,18 +94,18 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(block_t) :: block
     real(wp) :: start
-    integer :: place(size(lengths)), i, k
+    integer :: corner(size(lengths)), i, k
     integer(int64) :: points
     logical :: whole
     start = monotonic_seconds()
     work%computed = 0
     points = 0
     do i = 1, pilot_blocks
-      place = spread_place(i, lengths) - 1
+      corner = spread_subscripts(i, lengths) - 1
       do k = 1, size(lengths)
-        if (any(work%refined_axes == k)) place(k) = place(k)/work%refine%block*work%refine%block
+        if (any(work%refined_axes == k)) corner(k) = corner(k)/work%refine%block*work%refine%block
       end do
-      call refine_block(work, lengths, place, block, whole, error)
+      call refine_block(work, lengths, corner, block, whole, error)
       if (allocated(error)) return
       points = points + product(block%own(2, :) - block%own(1, :) + 1)
       if (monotonic_seconds() - start > pilot_time) exit
@@ -120,30 +120,30 @@ contains
     layers = product(int(lengths, int64))/product(int(lengths(axes), int64))
   end function layers_of
 
-  !> Number of a block's place on the axes that are not refined, the last one fastest.
-  pure integer(int64) function layer_of(axes, lengths, place) result(layer)
-    integer, intent(in) :: axes(2), lengths(:), place(:)
+  !> Number of a block's corner on the axes that are not refined, the last one fastest.
+  pure integer(int64) function layer_of(axes, lengths, corner) result(layer)
+    integer, intent(in) :: axes(2), lengths(:), corner(:)
     integer :: i
     layer = 0
     do i = 1, size(lengths)
-      if (all(axes /= i)) layer = layer*lengths(i) + place(i)
+      if (all(axes /= i)) layer = layer*lengths(i) + corner(i)
     end do
   end function layer_of
 
   !> Puts a block that is done where it belongs in its tile.
-  subroutine put_block(work, block, place, lower, extent, values)
+  subroutine put_block(work, block, corner, lower, extent, values)
     class(point_work_t), intent(in) :: work
     type(block_t), intent(in) :: block
-    integer, intent(in) :: place(:), lower(:), extent(:)
+    integer, intent(in) :: corner(:), lower(:), extent(:)
     real(wp), intent(inout) :: values(:, :)
     real(wp), allocatable :: content(:, :)
     integer, allocatable :: origin(:)
-    integer :: here(size(place)), a, b, i, point, row
+    integer :: here(size(corner)), a, b, i, point, row
     associate (own => block%own, axes => work%refined_axes)
       point = product(own(2, :) - own(1, :) + 1)
       allocate (content(point, work%marks), origin(point))
       call block_content(block, content, origin)
-      here = place - lower
+      here = corner - lower
       point = 0
       do a = own(1, 1), own(2, 1)
         here(axes(1)) = a - lower(axes(1))

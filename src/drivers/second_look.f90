@@ -110,7 +110,7 @@ contains
     integer(int64), allocatable :: rows(:, :), row(:)
     integer :: looks, budget, before, found, highest
     integer(int64) :: first, left
-    character(len=:), allocatable :: tells
+    character(len=:), allocatable :: suggestion
     logical :: changed
     complete = .true.
     if (.not. is_offered(session, work)) return
@@ -139,11 +139,11 @@ contains
     end do
     if (size(rows, 2) == 0 .or. .not. complete) return
     found = entries(work%catalogues) - before
-    tells = ''
-    if (left > 0) tells = ', a longer run.extension may tell'
+    suggestion = ''
+    if (left > 0) suggestion = ', a longer run.extension may tell'
     call session%journal%line('second_look', 'second look from '//to_text(count(rows >= 0))//' of '//to_text(first)// &
       ' points that had ended without an attractor: '//to_text(found)//' more found, '//to_text(left)//' points left without'// &
-      tells, '"starts": '//to_text(count(rows >= 0))//', "found": '//to_text(found)//', "left": '//to_text(left))
+      suggestion, '"starts": '//to_text(count(rows >= 0))//', "found": '//to_text(found)//', "left": '//to_text(left))
     if (size(work%catalogues) > 1) return
     associate (attractors => work%catalogues(1)%attractors)
       call list_attractors(session%journal, pack(attractors, attractors%id > highest), position_is_angle(session%the_case%laws))
@@ -176,7 +176,7 @@ contains
     integer(int64), allocatable, intent(out) :: row(:)
     type(error_t), allocatable :: error
     real(wp), allocatable :: values(:, :), everywhere(:)
-    real(wp) :: best(2, wanted), place(1)
+    real(wp) :: best(2, wanted), drawn(1)
     integer(int64) :: lower(size(work%grid%shape)), extent(size(work%grid%shape)), flat
     integer :: tile, point, i
     best = huge(1.0_wp)
@@ -188,8 +188,8 @@ contains
         if (.not. needs_label(values(point, :))) cycle
         flat = flat_index(work%grid, index_in_block(lower, extent, point))
         if (any(rows == flat)) cycle
-        call uniform(int(session%the_case%attractors%seed, int64), flat, place)
-        call put_in_order(best, place(1), real(flat, wp))
+        call uniform(int(session%the_case%attractors%seed, int64), flat, drawn)
+        call put_in_order(best, drawn(1), real(flat, wp))
       end do
     end do
     call session%team%allgather(reshape(best, [size(best)]), everywhere)
@@ -201,19 +201,19 @@ contains
     where (best(1, :) < 2) row = nint(best(2, :), int64)
   end subroutine choose
 
-  !> Keeps the smallest places in order.
-  pure subroutine put_in_order(best, place, flat)
+  !> Keeps the smallest positions in order.
+  pure subroutine put_in_order(best, drawn, flat)
     real(wp), intent(inout) :: best(:, :)
-    real(wp), intent(in) :: place, flat
+    real(wp), intent(in) :: drawn, flat
     integer :: i
-    if (place >= best(1, size(best, 2))) return
+    if (drawn >= best(1, size(best, 2))) return
     i = size(best, 2) - 1
     do while (i >= 1)
-      if (best(1, i) <= place) exit
+      if (best(1, i) <= drawn) exit
       best(:, i + 1) = best(:, i)
       i = i - 1
     end do
-    best(:, i + 1) = [place, flat]
+    best(:, i + 1) = [drawn, flat]
   end subroutine put_in_order
 
   !> Number of a point in C order, from 0.
@@ -239,7 +239,7 @@ contains
     end do
   end function index_of
 
-  !> Adds what the points of a row lead to, in the order of the row, slices shared among the ranks; `changed` tells whether the
+  !> Adds what the points of a row lead to, in the order of the row, slices shared among the ranks; `changed` suggestion whether the
   !> catalogues are others now. New attractors carry the labels of their branches in the neighbouring slices, or new ones.
   subroutine extend_catalogues(team, journal, grid, span, max_period, time_limit, row, catalogues, changed, error)
     class(team_t), intent(in) :: team

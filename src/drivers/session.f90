@@ -60,7 +60,7 @@ module session
     procedure :: end_with
     procedure :: stop_if
     procedure :: abort_if
-    procedure :: say_how_to_go_on
+    procedure :: report_how_to_resume
   end type session_t
 
 contains
@@ -86,7 +86,7 @@ contains
     if (.not. any(command%name == [character(len=10) :: 'trajectory', 'branches', 'stability'])) call install_signals(error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
-                                                   wants_sweep=command%name == 'sweep', structure_file=read_structure_file)
+                                                   needs_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
     if (len(command%draw) > 0) call draw_machine(session)
     if (command%validate) call warn_about(command%name, session%the_case, session%journal)
@@ -245,7 +245,7 @@ contains
 
   !> After SIGTERM says how to go on with the run kept in `path`: mpirun ends its processes so when one of them has died,
   !> and leaves them no time for more. Two ranks speak, because either may be the dead one.
-  subroutine say_how_to_go_on(self, path)
+  subroutine report_how_to_resume(self, path)
     class(session_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(journal_t) :: own
@@ -258,7 +258,7 @@ contains
     own%active = .true.
     call own%error('rank '//to_text(self%team%rank())//' was told to end (SIGTERM); the tiles done are kept in '// &
                    path//'; the same command with --resume (without --force) goes on')
-  end subroutine say_how_to_go_on
+  end subroutine report_how_to_resume
 
   !> Ends the program at once because of an error of this rank alone.
   subroutine abort_if(self, error)

@@ -31,7 +31,7 @@ module stability_of_map
 
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
-  !> Logarithm of the contraction over a period from which on points that are the same tell a cycle.
+  !> Logarithm of the contraction over a period from which on points that are the same report_stability a cycle.
   real(wp), parameter :: contracts = 1e-2_wp
 
   integer, parameter :: not_known = 0, chaotic = 1, quasi_periodic = 2, long_transient = 3, above_limit = 4
@@ -83,7 +83,7 @@ contains
     if (command%validate .or. command%dry_run) return
     given_up = 0
     do i = 1, size(entries)
-      call tell(journal, grid, the_case, entries(i), command%periods, given_up)
+      call report_stability(journal, grid, the_case, entries(i), command%periods, given_up)
     end do
     call judge_given_up(journal, given_up, size(entries, kind=int64), 'entries', command%partial, error)
   end subroutine run_stability_of_map
@@ -191,7 +191,7 @@ contains
   end subroutine look_for
 
   !> Computes and tells what an entry is; counts those whose motion was given up.
-  subroutine tell(journal, grid, the_case, entry, periods, given_up)
+  subroutine report_stability(journal, grid, the_case, entry, periods, given_up)
     type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid
     type(case_t), intent(in) :: the_case
@@ -230,7 +230,7 @@ contains
       end if
     end if
     call journal%line('entry', words, data)
-  end subroutine tell
+  end subroutine report_stability
 
   !> What more periods would do for a motion that is not known, by the 0-1 test `k`; '' if that is not known either.
   pure function needed_text(spectrum, k) result(text)

@@ -77,7 +77,7 @@ contains
         call session%journal%line('valid', command%path//' is a valid case for sweep')
         call session%end_with(exit_done)
       end if
-      if (command%dry_run) call tell_plan(session, work)
+      if (command%dry_run) call report_plan(session, work)
       call session%begin(path, tiled=product(sweep%starts) > 0)
       call session%journal%line('chains', 'running '//trim(sweep%swept%name)//' '//directions_text(session%the_case)//' over '// &
                                 to_text(size(sweep%swept%values))//' values')
@@ -125,7 +125,7 @@ contains
   end subroutine judge_sweep
 
   !> Says what would be done: holds of the runs, points of the many starts, bytes, time. Ends the program.
-  subroutine tell_plan(session, work)
+  subroutine report_plan(session, work)
     type(session_t), intent(inout) :: session
     type(branch_work_t), intent(inout) :: work
     type(error_t), allocatable :: error
@@ -156,7 +156,7 @@ contains
     end associate
     call session%journal%line('plan', plan)
     call session%end_with(exit_done)
-  end subroutine tell_plan
+  end subroutine report_plan
 
   !> Time that a hold in the middle of the range takes from the start of the case [s].
   real(wp) function hold_seconds(session, error) result(seconds)
@@ -258,11 +258,11 @@ contains
     logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
-    integer :: place(3, size(index, 2))
-    place(1, :) = index(1, :)
-    place(2, :) = 1 + (index(2, :) - 1)/self%grid%shape(3)
-    place(3, :) = 1 + modulo(index(2, :) - 1, self%grid%shape(3))
-    call basin_points(self%grid, self%span, self%max_period, self%catalogues, place, self%cache, values, error, whole, watch)
+    integer :: subscripts(3, size(index, 2))
+    subscripts(1, :) = index(1, :)
+    subscripts(2, :) = 1 + (index(2, :) - 1)/self%grid%shape(3)
+    subscripts(3, :) = 1 + modulo(index(2, :) - 1, self%grid%shape(3))
+    call basin_points(self%grid, self%span, self%max_period, self%catalogues, subscripts, self%cache, values, error, whole, watch)
   end subroutine compute_branch_points
 
   subroutine branch_points_from(self, index, points, error)
@@ -279,13 +279,13 @@ contains
     class(branch_work_t), intent(inout) :: self
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    associate (reason => nint(values(3)), place => index(1))
+    associate (reason => nint(values(3)), subscripts => index(1))
       self%reasons(reason) = self%reasons(reason) + 1
       if (reason /= reason_settled .and. reason /= reason_time_over) return
       if (values(6) > 0) then
-        self%impacting(place) = self%impacting(place) + 1
+        self%impacting(subscripts) = self%impacting(subscripts) + 1
       else
-        self%free(place) = self%free(place) + 1
+        self%free(subscripts) = self%free(subscripts) + 1
       end if
     end associate
   end subroutine note_branch_point

@@ -21,7 +21,7 @@ module tiled_run
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use shard, only: in_shard
-  use spread_order, only: spread_place
+  use spread_order, only: spread_subscripts
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -144,7 +144,7 @@ contains
       if (.not. whole) exit
       computed = computed + 1
     end do
-    if (scheduler%stop_requested()) call session%say_how_to_go_on(working_path(file%path))
+    if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
     begun = scheduler%started
     call scheduler%finish()
     call write_tile_times(session, scheduler, unfinished)
@@ -307,7 +307,7 @@ contains
     integer :: index(size(lengths), pilot_points), i
     logical :: whole
     do i = 1, pilot_points
-      index(:, i) = spread_place(i, lengths)
+      index(:, i) = spread_subscripts(i, lengths)
     end do
     start = monotonic_seconds()
     call compute_list(work, index, values, whole, error)

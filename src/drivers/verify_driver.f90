@@ -42,7 +42,7 @@ module verify_driver
   public :: run_verify
 
   !> Deviations [m] above it are explained to the reader.
-  real(wp), parameter :: told_deviation = 1e-6_wp
+  real(wp), parameter :: reported_deviation = 1e-6_wp
 
 contains
 
@@ -143,7 +143,7 @@ contains
     type(slice_cache_t) :: cache
     real(wp) :: values(1, point_values)
     integer, allocatable :: index(:)
-    integer(int64), allocatable :: lengths(:), place(:)
+    integer(int64), allocatable :: lengths(:), subscripts(:)
     integer(int64) :: points
     integer :: i, before
     grid = grid_of(the_case, axes)
@@ -151,7 +151,7 @@ contains
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
     if (allocated(error)) return
-    allocate (index(size(axes)), place(size(lengths)))
+    allocate (index(size(axes)), subscripts(size(lengths)))
     points = product(int(grid%shape(:size(axes)), int64))
     audit%whole = points <= sample
     points = min(points, int(sample, int64))
@@ -159,15 +159,15 @@ contains
     do i = 1, int(points)
       index = sampled(grid%shape(:size(axes)), audit%whole, seed, i)
       if (size(lengths) == size(axes)) then
-        place = index - 1
+        subscripts = index - 1
       else
-        place = [index(1) - 1, (index(2) - 1)*grid%shape(3) + index(3) - 1]
+        subscripts = [index(1) - 1, (index(2) - 1)*grid%shape(3) + index(3) - 1]
       end if
       call basin_points(grid, span_of(the_case), the_case%attractors%max_period, catalogues, reshape(index, [size(index), 1]), &
                         cache, values, error)
       if (allocated(error)) return
       before = audit%flips + audit%inferred_differing
-      call compare_with_file(reader, prefix, place, values(1, :), audit, error)
+      call compare_with_file(reader, prefix, subscripts, values(1, :), audit, error)
       if (allocated(error)) return
       call compare_with_reference(grid, catalogues, index, values(1, :), cache%ensemble, &
                                   audit, error)
@@ -194,10 +194,10 @@ contains
   end subroutine check_lengths
 
   !> Every variable must be what the file holds.
-  subroutine compare_with_file(reader, prefix, place, values, audit, error)
+  subroutine compare_with_file(reader, prefix, subscripts, values, audit, error)
     type(reader_t), intent(in) :: reader
     character(len=*), intent(in) :: prefix
-    integer(int64), intent(in) :: place(:)
+    integer(int64), intent(in) :: subscripts(:)
     real(wp), intent(in) :: values(:)
     type(audit_t), intent(inout) :: audit
     type(error_t), allocatable, intent(out) :: error
@@ -207,14 +207,15 @@ contains
     audit%points = audit%points + 1
     inferred = .false.
     if (reader%has('/origin')) then
-      call reader%read_block('/origin', place, spread(1_int64, 1, size(place)), stored, error)
+      call reader%read_block('/origin', subscripts, spread(1_int64, 1, size(subscripts)), stored, error)
       if (allocated(error)) return
       inferred = nint(stored(1)) > origin_contradicted
       if (inferred) audit%inferred = audit%inferred + 1
     end if
     do k = 1, size(point_table)
       if (.not. reader%has('/'//prefix//trim(point_table(k)%name))) cycle
-      call reader%read_block('/'//prefix//trim(point_table(k)%name), place, spread(1_int64, 1, size(place)), stored, error)
+      call reader%read_block('/'//prefix//trim(point_table(k)%name), subscripts, spread(1_int64, 1, size(subscripts)), stored, &
+        error)
       if (allocated(error)) return
       if (k <= 5) same = nint(stored(1), int64) == nint(values(k), int64)
       if (k > 5) same = real(stored(1), real32) == real(values(k), real32) &
@@ -225,23 +226,23 @@ contains
         return
       end if
       audit%differing = audit%differing + 1
-      if (audit%differing == 1) audit%first_difference = trim(point_table(k)%name)//' at '//place_text(place)//': the file has '// &
-        to_text(stored(1))//', rerun gives '//to_text(values(k))
+      if (audit%differing == 1) audit%first_difference = trim(point_table(k)%name)//' at '// &
+        subscripts_text(subscripts)//': the file has '//to_text(stored(1))//', rerun gives '//to_text(values(k))
       return
     end do
   end subroutine compare_with_file
 
-  pure function place_text(place) result(text)
-    integer(int64), intent(in) :: place(:)
+  pure function subscripts_text(subscripts) result(text)
+    integer(int64), intent(in) :: subscripts(:)
     character(len=:), allocatable :: text
     integer :: i
     text = '['
-    do i = 1, size(place)
+    do i = 1, size(subscripts)
       if (i > 1) text = text//', '
-      text = text//to_text(place(i))
+      text = text//to_text(subscripts(i))
     end do
     text = text//']'
-  end function place_text
+  end function subscripts_text
 
   !> Label from a quadruple-precision run, and how far the double one has drifted at the end of the duration if the
   !> motion settles (on a chaotic one any error grows to its size).
@@ -313,7 +314,7 @@ contains
       '  '//all_of//to_text(audit%points)//' points run again: '//to_text(audit%differing)//' differ from the file'// &
       trim(merge(' where it was computed', repeat(' ', 22), audit%inferred > 0)), &
       '  against quadruple precision: '//to_text(audit%flips)//' label flips'//deviations
-    if (audit%x_deviation > told_deviation .and. audit%flips == 0) write (output_unit, '(a)') &
+    if (audit%x_deviation > reported_deviation .and. audit%flips == 0) write (output_unit, '(a)') &
       '  a deviation so large with the same label: the phase on the cycle, or chaos, hangs on the last digits of the start'
     if (.not. audit%whole) write (output_unit, '(a)') &
       '  so, with 95 % confidence, at most '//to_text(100*share_upper_limit(audit%flips, audit%points, 0.95_wp), 3)// &

@@ -125,7 +125,7 @@ contains
     type(multibody_state_t), intent(in) :: state
     real(wp), intent(in) :: surface(:)
     type(path_t), intent(inout) :: path
-    real(wp), dimension(most_degrees) :: q, v, place, speed, push, push_rate
+    real(wp), dimension(most_degrees) :: q, v, position, speed, push, push_rate
     real(wp) :: w
     integer :: n, m, free
     n = machine%n
@@ -145,14 +145,14 @@ contains
     push(:n) = push(:n) - matmul(flow%stiffness, path%powers(:n, 0)) - matmul(flow%damping, path%powers(:n, 1))
     push_rate(:n) = push_rate(:n) - matmul(flow%stiffness, path%powers(:n, 1))
     ! In basis coordinates.
-    place(:n) = matmul(machine%mass, q(:n))
+    position(:n) = matmul(machine%mass, q(:n))
     speed(:n) = matmul(machine%mass, v(:n))
-    place(:free) = matmul(transpose(flow%basis), place(:n))
+    position(:free) = matmul(transpose(flow%basis), position(:n))
     speed(:free) = matmul(transpose(flow%basis), speed(:n))
     push(:free) = matmul(transpose(flow%basis), push(:n))
     push_rate(:free) = matmul(transpose(flow%basis), push_rate(:n))
-    call begin_exponentials(flow, n, speed, push, push_rate, place, path)
-    call begin_rigid(flow, n, place, speed, push, push_rate, path)
+    call begin_exponentials(flow, n, speed, push, push_rate, position, path)
+    call begin_rigid(flow, n, position, speed, push, push_rate, path)
   end subroutine begin_modal
 
   !> What constraints do to all coordinates, `q` [m] being the start.
@@ -173,13 +173,13 @@ contains
     end do
   end subroutine carry_along
 
-  !> Amplitudes of the exponentials, and the steady part of what they answer to a push that grows steadily; `place` is less
+  !> Amplitudes of the exponentials, and the steady part of what they answer to a push that grows steadily; `position` is less
   !> what they carry of the damped rigid coordinates. All in basis coordinates.
-  pure subroutine begin_exponentials(flow, n, speed, push, push_rate, place, path)
+  pure subroutine begin_exponentials(flow, n, speed, push, push_rate, position, path)
     type(mode_flow_t), intent(in) :: flow
     integer, intent(in) :: n
     real(wp), intent(in) :: speed(:), push(:), push_rate(:)
-    real(wp), intent(inout) :: place(:)
+    real(wp), intent(inout) :: position(:)
     type(path_t), intent(inout) :: path
     complex(wp) :: forced, forced_rate, lambda
     integer :: i, k, f, d
@@ -187,14 +187,14 @@ contains
     d = flow%damped
     do k = 1, size(flow%exponent)
       lambda = flow%exponent(k)
-      path%amplitude(k) = sum(flow%left(k, :f)*flow%frequency*place(:f)) + sum(flow%left(k, f + 1:)*speed(:f + d))
+      path%amplitude(k) = sum(flow%left(k, :f)*flow%frequency*position(:f)) + sum(flow%left(k, f + 1:)*speed(:f + d))
       forced = -sum(flow%left(k, f + 1:)*push(:f + d))/lambda
       forced_rate = -sum(flow%left(k, f + 1:)*push_rate(:f + d))/lambda
       forced = forced + forced_rate/lambda
-      path%size_of_amplitude(k) = sum(flow%size_of_left(k, :f)*flow%frequency*abs(place(:f))) + &
+      path%size_of_amplitude(k) = sum(flow%size_of_left(k, :f)*flow%frequency*abs(position(:f))) + &
         sum(flow%size_of_left(k, f + 1:)*(abs(speed(:f + d)) + abs(push(:f + d))/flow%size_of_exponent(k)))
       do i = 1, d
-        place(f + i) = place(f + i) - real(flow%drift(i, k)*path%amplitude(k))
+        position(f + i) = position(f + i) - real(flow%drift(i, k)*path%amplitude(k))
       end do
       path%amplitude(k) = path%amplitude(k) - forced
       path%powers(:n, 0) = path%powers(:n, 0) + real(flow%shape(:, k)*forced)
@@ -203,10 +203,10 @@ contains
   end subroutine begin_exponentials
 
   !> Rigid coordinates: with damping, of which the exponentials have carried their part, then without.
-  pure subroutine begin_rigid(flow, n, place, speed, push, push_rate, path)
+  pure subroutine begin_rigid(flow, n, position, speed, push, push_rate, path)
     type(mode_flow_t), intent(in) :: flow
     integer, intent(in) :: n
-    real(wp), intent(in) :: place(:), speed(:), push(:), push_rate(:)
+    real(wp), intent(in) :: position(:), speed(:), push(:), push_rate(:)
     type(path_t), intent(inout) :: path
     real(wp) :: b0, b1
     integer :: i, k, r, f, d
@@ -219,12 +219,12 @@ contains
         b0 = b0 - real(flow%drift(i, k)*sum(flow%left(k, f + 1:)*push(:f + d)))
         b1 = b1 - real(flow%drift(i, k)*sum(flow%left(k, f + 1:)*push_rate(:f + d)))
       end do
-      path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, f + i)*place(f + i)
+      path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, f + i)*position(f + i)
       path%powers(:n, 1) = path%powers(:n, 1) + flow%basis(:, f + i)*b0
       path%powers(:n, 2) = path%powers(:n, 2) + flow%basis(:, f + i)*(b1/2)
     end do
     do r = f + d + 1, size(flow%basis, 2)
-      path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, r)*place(r)
+      path%powers(:n, 0) = path%powers(:n, 0) + flow%basis(:, r)*position(r)
       path%powers(:n, 1) = path%powers(:n, 1) + flow%basis(:, r)*speed(r)
       path%powers(:n, 2) = path%powers(:n, 2) + flow%basis(:, r)*(push(r)/2)
       path%powers(:n, 3) = path%powers(:n, 3) + flow%basis(:, r)*(push_rate(r)/6)
@@ -326,7 +326,7 @@ contains
     end do
   end subroutine path_at
 
-  !> The same by stretches of the series.
+  !> The same by intervals of the series.
   pure subroutine series_at(machine, flow, path, t, q, v)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -334,12 +334,12 @@ contains
     real(wp), intent(in) :: t
     real(wp), intent(out) :: q(:), v(:)
     real(wp) :: y(size(path%unknowns)), powers(size(path%unknowns), 0:terms), length
-    integer :: stretches, i, n
+    integer :: intervals, i, n
     n = machine%n
     y = path%unknowns
-    stretches = max(1, ceiling(flow%rate*abs(t)))
-    length = t/stretches
-    do i = 1, stretches
+    intervals = max(1, ceiling(flow%rate*abs(t)))
+    length = t/intervals
+    do i = 1, intervals
       call series_step(path%matrix, y, length, powers)
       y = sum(powers, dim=2)
     end do

@@ -10,7 +10,7 @@ module guard_functions
   use multibody, only: multibody_t, most_degrees
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use path_rows, only: force_powers, place_powers
+  use path_rows, only: force_powers, position_powers
   implicit none
   private
 
@@ -46,7 +46,7 @@ contains
     type(joint_guard_t), intent(in) :: list(:)
     integer, intent(in) :: count_guards, watched
     type(search_t), intent(out) :: search
-    real(wp) :: place(0:3), force(0:3), w, largest
+    real(wp) :: position(0:3), force(0:3), w, largest
     integer :: g, k, m, n, order
     search%guards = count_guards
     search%functions = count_guards + 1
@@ -59,14 +59,14 @@ contains
     allocate (search%turn(size(path%turning), search%functions))
     do g = 1, count_guards
       associate (guard => list(g))
-        place = place_powers(machine, path, guard%joint)
-        search%power(:, g) = guard%place*place
-        search%power(0:2, g) = search%power(0:2, g) + guard%speed*[1, 2, 3]*place(1:3)
+        position = position_powers(machine, path, guard%joint)
+        search%power(:, g) = guard%position*position
+        search%power(0:2, g) = search%power(0:2, g) + guard%speed*[1, 2, 3]*position(1:3)
         search%power(0, g) = search%power(0, g) + guard%constant
-        search%term(:n, g) = (guard%place + guard%speed*flow%exponent)*flow%joint_shape(:, guard%joint)
+        search%term(:n, g) = (guard%position + guard%speed*flow%exponent)*flow%joint_shape(:, guard%joint)
         do m = 1, size(path%turning)
           w = m*machine%frequency
-          search%turn(m, g) = (guard%place + guard%speed*cmplx(0.0_wp, w, wp))*flow%joint_response(m, guard%joint)
+          search%turn(m, g) = (guard%position + guard%speed*cmplx(0.0_wp, w, wp))*flow%joint_response(m, guard%joint)
         end do
         if (guard%held > 0) then
           force = force_powers(machine, flow, path, guard%held)
@@ -76,7 +76,7 @@ contains
         end if
         search%blur(:, g) = guard%blur
         do k = 1, n
-          largest = (abs(guard%place) + abs(guard%speed)*flow%size_of_exponent(k))*flow%size_of_joint(k, guard%joint)
+          largest = (abs(guard%position) + abs(guard%speed)*flow%size_of_exponent(k))*flow%size_of_joint(k, guard%joint)
           if (guard%held > 0) largest = largest + abs(guard%force)*flow%size_of_force(k, guard%held)
           search%blur(:, g) = search%blur(:, g) &
                               + largest*path%size_of_amplitude(k)*flow%size_of_exponent(k)**[(order, order=0, 3)]

@@ -29,14 +29,14 @@ contains
 
   !> The first falls within `duration` [s]: `time` is that of the first, `triggered` all guards that fall with it by no more than
   !> rounding; time = duration and none triggered if there is none. `extremes` are those of the watched coordinate on the way,
-  !> `top_speed` the largest of its speeds if `wants_speed`; `margin` the smallest gap at which a stop was missed [m] if
-  !> `wants_margin`.
-  pure subroutine find_first(search, list, origin, duration, wants_speed, wants_margin, time, triggered, extremes, top_speed, &
+  !> `top_speed` the largest of its speeds if `needs_speed`; `margin` the smallest gap at which a stop was missed [m] if
+  !> `needs_margin`.
+  pure subroutine find_first(search, list, origin, duration, needs_speed, needs_margin, time, triggered, extremes, top_speed, &
                              margin, evaluations)
     type(search_t), intent(inout) :: search
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: origin, duration
-    logical, intent(in) :: wants_speed, wants_margin
+    logical, intent(in) :: needs_speed, needs_margin
     real(wp), intent(out) :: time
     logical, intent(out) :: triggered(:)
     real(wp), intent(inout) :: extremes(2), top_speed, margin
@@ -55,7 +55,7 @@ contains
     end do
     length = panel_length(search, 0.0_wp, duration)
     longest = huge(longest)
-    if (wants_margin) longest = longest_panel(search, 0.0_wp)
+    if (needs_margin) longest = longest_panel(search, 0.0_wp)
     length = min(length, longest)
     panels = 0
     tie = 8*spacing(max(origin, origin + duration))
@@ -75,20 +75,20 @@ contains
       call search_panel(search, a, b, here, there, tie, certified, time, root, evaluations)
       if (any(root(:search%guards) <= time)) then
         triggered(:search%guards) = root(:search%guards) <= time + tie
-        call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, wants_speed, extremes, &
+        call watch(search, a, time, here(:, search%functions), there(:, search%functions), time < b, needs_speed, extremes, &
                    top_speed, evaluations)
-        if (wants_margin) call note_misses(search, list, a, time, here, triggered, margin, evaluations)
+        if (needs_margin) call note_misses(search, list, a, time, here, triggered, margin, evaluations)
         return
       end if
-      call watch(search, a, b, here(:, search%functions), there(:, search%functions), .false., wants_speed, extremes, &
+      call watch(search, a, b, here(:, search%functions), there(:, search%functions), .false., needs_speed, extremes, &
                  top_speed, evaluations)
-      if (wants_margin) call note_misses(search, list, a, b, here, triggered, margin, evaluations)
+      if (needs_margin) call note_misses(search, list, a, b, here, triggered, margin, evaluations)
       a = b
       here = there
       panels = panels + 1
       if (mod(panels, panels_between) == 0 .and. time > a) then
         b = panel_length(search, a, time - a)
-        if (wants_margin) longest = longest_panel(search, a)
+        if (needs_margin) longest = longest_panel(search, a)
         if (b > 2*length) length = min(b, longest)
       end if
     end do
@@ -168,10 +168,10 @@ contains
   end subroutine note_extremes
 
   !> Extremes of the watched coordinate between `a` and `b`, with its derivatives there.
-  pure subroutine watch(search, a, b, here, there, stale, wants_speed, extremes, top_speed, evaluations)
+  pure subroutine watch(search, a, b, here, there, stale, needs_speed, extremes, top_speed, evaluations)
     type(search_t), intent(in) :: search
     real(wp), intent(in) :: a, b, here(0:3), there(0:3)
-    logical, intent(in) :: stale, wants_speed
+    logical, intent(in) :: stale, needs_speed
     real(wp), intent(inout) :: extremes(2), top_speed
     integer, intent(inout) :: evaluations
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
@@ -187,7 +187,7 @@ contains
       call turning_point(search, search%functions, 1, a, b, here, last, extremes(2) - extremes(1), at, d)
       call note_extremes(search, d, extremes, top_speed)
     end if
-    if (wants_speed .and. here(2) > 0 .and. last(2) < 0) then
+    if (needs_speed .and. here(2) > 0 .and. last(2) < 0) then
       call turning_point(search, search%functions, 2, a, b, here, last, 0.0_wp, at, d)
       call note_extremes(search, d, extremes, top_speed)
     end if

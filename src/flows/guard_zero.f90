@@ -14,7 +14,7 @@ module guard_zero
 
   !> Remainder of the quintic: |y - H| <= max|y^(6)| L^6/46080 in the middle of a panel.
   real(wp), parameter :: remainder = 46080
-  integer, parameter :: most_steps = 200, most_halvings = 60, most_stretches = 50
+  integer, parameter :: most_steps = 200, most_halvings = 60, most_intervals = 50
 
 contains
 
@@ -39,7 +39,7 @@ contains
                 there(0) - h*(2*there(1)/5 - h*there(2)/20), there(0) - h*there(1)/5, there(0))
   end function least_of
 
-  !> As `approach`, of a guard that begins as rounding, to within its rounding: over stretches on which the quintic is that good.
+  !> As `approach`, of a guard that begins as rounding, to within its rounding: over intervals on which the quintic is that good.
   pure subroutine walk(search, g, a, b, root, evaluations)
     type(search_t), intent(in) :: search
     integer, intent(in) :: g
@@ -91,7 +91,7 @@ contains
     real(wp) :: low, high, at
     integer :: i
     call step_on(search, g, a, b, root, at, evaluations)
-    do i = 1, most_stretches
+    do i = 1, most_intervals
       if (at >= b .or. root < huge(root)) return
       call prove_on(search, g, at, b, low, high, evaluations)
       if (low >= b) return
@@ -100,7 +100,7 @@ contains
     root = at
   end subroutine approach
 
-  !> Steps from `a` that no zero is within, to the first, `root`, or `at` the place where they have become too many, `b` at most.
+  !> Steps from `a` that no zero is within, to the first, `root`, or `at` the position where they have become too many, `b` at most.
   pure subroutine step_on(search, g, a, b, root, at, evaluations)
     type(search_t), intent(in) :: search
     integer, intent(in) :: g
@@ -141,7 +141,7 @@ contains
     end do
   end subroutine step_on
 
-  !> Where a guard has been small for long, on from `a` over stretches on which the quintic proves that it has no zero, as far as
+  !> Where a guard has been small for long, on from `a` over intervals on which the quintic proves that it has no zero, as far as
   !> `low`; between that and `high` it does not, however short the stretch.
   pure subroutine prove_on(search, g, a, b, low, high, evaluations)
     type(search_t), intent(in) :: search

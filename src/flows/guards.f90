@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> What ends a flight of a multibody structure: functions that are positive as long as the joints stay in their phases, all
-!> of one form, constant + place s + speed u + force lambda of a joint.
+!> of one form, constant + position s + speed u + force lambda of a joint.
 module guards
   use contact_law, only: contact_kelvin_voigt
   use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, multibody_t, most_joints
@@ -24,7 +24,7 @@ module guards
 
   type, public :: joint_guard_t
     integer :: joint = 0, meaning = 0
-    real(wp) :: constant = 0, place = 0, speed = 0, force = 0
+    real(wp) :: constant = 0, position = 0, speed = 0, force = 0
     !> Number of the joint among the constraints of the mode.
     integer :: held = 0
     !> It is zero now and rises.
@@ -66,9 +66,9 @@ contains
           if (phase == 0) then
             ! r = -k (s - z) is above -level and below level.
             k = joint%stiffness
-            call put(list, count_guards, joint_guard_t(j, slides_up, constant=level + k*state%slider(j), place=-k, &
+            call put(list, count_guards, joint_guard_t(j, slides_up, constant=level + k*state%slider(j), position=-k, &
                                                        from_zero=state%left(j) > 0))
-            call put(list, count_guards, joint_guard_t(j, slides_down, constant=level - k*state%slider(j), place=k, &
+            call put(list, count_guards, joint_guard_t(j, slides_down, constant=level - k*state%slider(j), position=k, &
                                                        from_zero=state%left(j) < 0))
           else
             call put(list, count_guards, joint_guard_t(j, slide_ends, speed=d, from_zero=changed))
@@ -108,17 +108,17 @@ contains
     type(mode_flow_t), intent(in) :: flow
     type(multibody_state_t), intent(in) :: state
     type(joint_guard_t), intent(inout) :: list(:)
-    real(wp) :: force(machine%n), acceleration(machine%n), place, speed, change
+    real(wp) :: force(machine%n), acceleration(machine%n), position, speed, change
     integer :: g, n
     n = machine%n
     force = abs(machine%load) + matmul(abs(flow%stiffness), abs(state%q(:n))) + matmul(abs(flow%damping), abs(state%v(:n)))
     acceleration = matmul(abs(machine%mobility), force)
     do g = 1, size(list)
       associate (guard => list(g), row => abs(machine%joints(list(g)%joint)%row))
-        place = sum(row*abs(state%q(:n)))
+        position = sum(row*abs(state%q(:n)))
         speed = sum(row*abs(state%v(:n)))
         change = sum(row*acceleration)
-        guard%blur = abs(guard%place)*[place, speed, change, change*machine%frequency] &
+        guard%blur = abs(guard%position)*[position, speed, change, change*machine%frequency] &
                      + abs(guard%speed)*[speed, change, change*machine%frequency, change*machine%frequency**2]
         if (guard%held > 0) then
           change = sum(abs(flow%reaction(guard%held, :))*force)
@@ -145,9 +145,9 @@ contains
     integer, intent(inout) :: count_guards
     associate (joint => machine%joints(j))
       if (joint%upper < huge(1.0_wp)) call put(list, count_guards, &
-        joint_guard_t(j, meets_upper, constant=joint%upper, place=-1.0_wp, from_zero=state%left(j) > 0))
+        joint_guard_t(j, meets_upper, constant=joint%upper, position=-1.0_wp, from_zero=state%left(j) > 0))
       if (joint%lower > -huge(1.0_wp)) call put(list, count_guards, &
-        joint_guard_t(j, meets_lower, constant=-joint%lower, place=1.0_wp, from_zero=state%left(j) < 0))
+        joint_guard_t(j, meets_lower, constant=-joint%lower, position=1.0_wp, from_zero=state%left(j) < 0))
     end associate
   end subroutine gap_guards
 
@@ -175,20 +175,20 @@ contains
       if (joint%contact%by_impact) c = c/max(state%touch_speed(j), tiny(1.0_wp))
       if (abs(phase) == 1) then
         if (joint%contact%kind /= contact_kelvin_voigt) then
-          call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, place=d, from_zero=changed))
+          call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, position=d, from_zero=changed))
           if (c > 0) call put(list, count_guards, joint_guard_t(j, force_ends, constant=1.0_wp, speed=d*c))
         else if (joint%contact%tension .or. .not. c > 0) then
-          call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, place=d, from_zero=changed))
+          call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, position=d, from_zero=changed))
         else
           ! Without tension the force ends before the surface is free.
-          call put(list, count_guards, joint_guard_t(j, force_ends, constant=-k*d*stop, place=k*d, speed=c*d))
+          call put(list, count_guards, joint_guard_t(j, force_ends, constant=-k*d*stop, position=k*d, speed=c*d))
         end if
       else
-        call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, place=d))
+        call put(list, count_guards, joint_guard_t(j, leaves, constant=-d*stop, position=d))
         if (joint%contact%kind /= contact_kelvin_voigt) then
           call put(list, count_guards, joint_guard_t(j, force_returns, constant=-1.0_wp, speed=-d*c, from_zero=changed))
         else
-          call put(list, count_guards, joint_guard_t(j, force_returns, constant=k*d*stop, place=-k*d, speed=-c*d, &
+          call put(list, count_guards, joint_guard_t(j, force_returns, constant=k*d*stop, position=-k*d, speed=-c*d, &
                                                      from_zero=changed))
         end if
       end if

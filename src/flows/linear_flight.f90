@@ -22,10 +22,10 @@ module linear_flight
   type, public :: watch_t
     real(wp) :: extremes(2) = [huge(1.0_wp), -huge(1.0_wp)]
     real(wp) :: top_speed = -huge(1.0_wp)
-    logical :: wants_speed = .false.
+    logical :: needs_speed = .false.
     !> Smallest gap at which a stop was missed [m]; of closed-form flights, and costly.
     real(wp) :: margin = huge(1.0_wp)
-    logical :: wants_margin = .false.
+    logical :: needs_margin = .false.
     integer :: evaluations = 0
   end type watch_t
 
@@ -52,7 +52,7 @@ contains
     call begin_path(machine, flow, state, path)
     if (flow%modal) then
       call prepare_search(machine, flow, path, list, count_guards, machine%watched, search)
-      call find_first(search, list, path%start, until - path%start, watch%wants_speed, watch%wants_margin, time, triggered, &
+      call find_first(search, list, path%start, until - path%start, watch%needs_speed, watch%needs_margin, time, triggered, &
                       watch%extremes, watch%top_speed, watch%margin, evaluations)
       watch%evaluations = watch%evaluations + evaluations
       call path_at(machine, flow, path, time, state%q, state%v)
@@ -63,7 +63,7 @@ contains
     if (.not. any(triggered)) state%time = until
   end subroutine fly_linear
 
-  !> The same by stretches of the exponential series.
+  !> The same by intervals of the exponential series.
   pure subroutine fly_series(machine, flow, path, list, count_guards, duration, state, time, triggered, watch)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -78,21 +78,21 @@ contains
     real(wp), dimension(size(path%unknowns)) :: y, size_of_y
     real(wp) :: powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
     real(wp) :: length, p(0:order), gap(0:terms, most_guards), root(most_guards), lift(most_guards), first, fraction
-    integer :: g, i, k, n, stretches
+    integer :: g, i, k, n, intervals
     n = machine%n
     triggered = .false.
     y = path%unknowns
     do g = 1, count_guards
       row(:, g) = guard_row(machine, flow, path, list(g))
     end do
-    stretches = max(1, ceiling(flow%rate*duration))
-    length = duration/stretches
+    intervals = max(1, ceiling(flow%rate*duration))
+    length = duration/intervals
     time = 0
     lift = 0
-    do i = 1, stretches
+    do i = 1, intervals
       call series_step(path%matrix, y, length, powers)
       size_of_y = abs(y)
-      ! A place on its way through zero has the rounding of its swing.
+      ! A position on its way through zero has the rounding of its swing.
       size_of_y(:n) = size_of_y(:n) + length*size_of_y(n + 1:2*n)
       root = 2
       do g = 1, count_guards
@@ -105,7 +105,7 @@ contains
         root(g) = first_zero(p)
         gap(:, g) = p(:terms)
       end do
-      if (watch%wants_margin) call note_misses(list(:count_guards), gap, root, min(1.0_wp, minval(root)), watch%margin)
+      if (watch%needs_margin) call note_misses(list(:count_guards), gap, root, min(1.0_wp, minval(root)), watch%margin)
       call watch_series(powers(machine%watched, :), powers(n + machine%watched, :), min(1.0_wp, minval(root)), watch)
       first = minval(root(:max(count_guards, 1)))
       if (count_guards > 0 .and. first <= 1) then
@@ -127,21 +127,21 @@ contains
   end subroutine fly_series
 
   !> Extremes of the watched coordinate up to a fraction of a stretch, from its series and that of its speed.
-  pure subroutine watch_series(place, speed, fraction, watch)
-    real(wp), intent(in) :: place(0:), speed(0:), fraction
+  pure subroutine watch_series(position, speed, fraction, watch)
+    real(wp), intent(in) :: position(0:), speed(0:), fraction
     type(watch_t), intent(inout) :: watch
     real(wp) :: at, factors(ubound(speed, 1))
     integer :: k
     factors = [(k, k=1, size(factors))]
-    watch%extremes = [min(watch%extremes(1), place(0), value(place, fraction)), &
-                      max(watch%extremes(2), place(0), value(place, fraction))]
+    watch%extremes = [min(watch%extremes(1), position(0), value(position, fraction)), &
+                      max(watch%extremes(2), position(0), value(position, fraction))]
     watch%top_speed = max(watch%top_speed, speed(0), value(speed, fraction))
-    if (watch%wants_speed) then
+    if (watch%needs_speed) then
       at = zero_of(factors*speed(1:), fraction)
       watch%top_speed = max(watch%top_speed, value(speed, at))
     end if
     at = zero_of(speed, fraction)
-    watch%extremes = [min(watch%extremes(1), value(place, at)), max(watch%extremes(2), value(place, at))]
+    watch%extremes = [min(watch%extremes(1), value(position, at)), max(watch%extremes(2), value(position, at))]
   end subroutine watch_series
 
   !> Where a series changes its sign up to a fraction of a stretch, 0 if it does not.

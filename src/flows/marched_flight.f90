@@ -12,7 +12,8 @@ module marched_flight
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use linear_flight, only: watch_t
-  use marched_system, only: digits_of_forces, forces_at, marched_t, place_now, set_system, sizes_of_guards, sizes_of_terms, unknowns
+  use marched_system, only: digits_of_forces, forces_at, marched_t, position_now, set_system, sizes_of_guards, sizes_of_terms, &
+    unknowns
   use mode_flow, only: harmonics_of, mode_flow_t
   use path_rows, only: guard_row, size_of_row
   use polynomial, only: degree, maximum_until
@@ -132,7 +133,8 @@ contains
             taken%noise = noise_share*flight%size_of_guard(g)
             taken%noise_rate = noise_share*rate
             call take_as_linear(system, g, taken)
-            taken%is_left = taken%from_zero .and. taken%margin == 0 .and. abs(guard%place) > 0 .and. .not. abs(taken%constant) > 0
+            taken%is_left = taken%from_zero .and. taken%margin == 0 .and. abs(guard%position) > 0 .and. &
+              .not. abs(taken%constant) > 0
             taken%noise_bend = 0.5_wp*noise_share*sum(abs(row(:n))*accelerations)
           end associate
         end associate
@@ -182,7 +184,7 @@ contains
         u = abs(sum(row*y(n + 1:)))
         force = mass*abs(sum(row*slope(n + 1:)))
         p = max(depth(law, mass*u**2, 1.0_wp), depth(law, force, 0.0_wp), &
-                abs(system%place(2*n + 1, k)))
+                abs(system%position(2*n + 1, k)))
         if (.not. p < length .or. .not. p > tiny(p)) cycle
         length = p
         scale(:n) = p
@@ -201,8 +203,8 @@ contains
     if (amount > tiny(amount)*contact%stiffness) depth = exponential(logarithm(amount/contact%stiffness)/(contact%exponent + more))
   end function depth
 
-  !> One step, until `until` [s after the section] at most. `path` is the step; `triggered` are the guards that fell together at its
-  !> end; `ended` says that the flight is over, `failed` that no step is small enough.
+  !> One step, until `until` [s after the section] at most. `path` is the step; `triggered` are the guards that triggered_guard
+  !> together at its end; `ended` says that the flight is over, `failed` that no step is small enough.
   pure subroutine step_flight(machine, flight, state, until, path, triggered, ended, failed, watch)
     type(multibody_t), intent(in) :: machine
     type(marched_flight_t), intent(inout) :: flight
@@ -212,7 +214,7 @@ contains
     logical, intent(out) :: triggered(most_guards), ended, failed
     type(watch_t), intent(inout) :: watch
     real(wp) :: before(most_guards), y(2*machine%n)
-    integer :: fell, g, n
+    integer :: triggered_guard, g, n
     n = machine%n
     if (maxval(abs(flight%march%y(:n))) > far*flight%depth) call count_anew(flight)
     call measure_noise(flight, min(flight%march%next_length, until - flight%system%start - flight%march%time))
@@ -221,18 +223,18 @@ contains
       before(g) = value_of(flight, g, flight%march%time, y)
     end do
     flight%march%slope_rounding(n + 1:2*n) = force_rounding*sizes_of_terms(flight%system, flight%origin, flight%march%time, y)
-    call take_step(flight%march, flight%system, flight%guards(:flight%count_guards), until - flight%system%start, fell)
+    call take_step(flight%march, flight%system, flight%guards(:flight%count_guards), until - flight%system%start, triggered_guard)
     watch%evaluations = watch%evaluations + 1
     triggered = .false.
-    failed = fell == march_failed
-    ended = fell /= march_goes_on
+    failed = triggered_guard == march_failed
+    ended = triggered_guard /= march_goes_on
     y = flight%march%y(:2*n)
-    if (fell > 0) then
+    if (triggered_guard > 0) then
       do g = 1, flight%count_guards
         if (before(g) > rounding*flight%size_of_guard(g)) triggered(g) = value_of(flight, g, flight%march%time, y) <= &
                                                                       rounding*flight%size_of_guard(g)
       end do
-      triggered(fell) = .true.
+      triggered(triggered_guard) = .true.
     end if
     path%start = flight%system%start + flight%march%from
     path%length = 0
@@ -246,7 +248,7 @@ contains
     state%q(:n) = flight%origin + y(:n)
     state%v(:n) = y(n + 1:)
     state%time = flight%system%start + flight%march%time
-    if (fell == march_time_over) state%time = until
+    if (triggered_guard == march_time_over) state%time = until
   end subroutine step_flight
 
   !> Rounding of the forces of constraints, by what they are sums of now and, roughly, after the next step of `h` [s].
@@ -284,7 +286,7 @@ contains
       flight%origin = flight%origin + z(:n)
       y(:n) = y(:n) - z(:n)
       do k = 1, system%count_joints
-        system%place(c - 1, k) = place_now(system, k, z)
+        system%position(c - 1, k) = position_now(system, k, z)
       end do
       do k = 1, n
         system%acceleration(c - 1, k) = system%acceleration(c - 1, k) + behind(system%acceleration(:, k))
@@ -327,7 +329,7 @@ contains
     p = path%step(:, machine%watched)
     watch%extremes(2) = max(watch%extremes(2), maximum_until(p, fraction))
     watch%extremes(1) = min(watch%extremes(1), -maximum_until(-p, fraction))
-    if (.not. watch%wants_speed) return
+    if (.not. watch%needs_speed) return
     watch%top_speed = max(watch%top_speed, maximum_until(path%step(:, machine%n + machine%watched), fraction))
   end subroutine look_along
 

@@ -15,7 +15,7 @@ module marched_system
   implicit none
   private
 
-  public :: marched_t, set_system, unknowns, forces_at, place_now, digits_of_forces, sizes_of_guards, sizes_of_terms
+  public :: marched_t, set_system, unknowns, forces_at, position_now, digits_of_forces, sizes_of_guards, sizes_of_terms
 
   !> Displacements and speeds, 1, the time since the start, cosines and sines of the drive are what rows refer to.
   type, extends(watched_system_t) :: marched_t
@@ -28,7 +28,7 @@ module marched_system
     type(joint_t), allocatable :: joints(:)
     integer :: phase(most_joints) = 0
     real(wp) :: touch_speed(most_joints) = 0
-    real(wp), allocatable :: place(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
+    real(wp), allocatable :: position(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
     !> Sizes of what the forces of constraints are sums of, as `guard` and `lean`; 0 for other guards.
     real(wp), allocatable :: size_of_guard(:, :), size_of_lean(:, :)
   contains
@@ -58,7 +58,7 @@ contains
     system%acceleration(one, :) = system%acceleration(one, :) + matmul(path%matrix(n + 1:2*n, :n), state%q(:n))
     system%count_joints = count([(is_curved(machine%joints(j), state%phase(j)), j=1, size(machine%joints))])
     allocate (system%joints(system%count_joints), system%push(n, system%count_joints))
-    allocate (system%place(size(path%unknowns), system%count_joints), system%speed(size(path%unknowns), system%count_joints))
+    allocate (system%position(size(path%unknowns), system%count_joints), system%speed(size(path%unknowns), system%count_joints))
     allocate (system%strength(size(path%unknowns), system%count_joints), source=0.0_wp)
     k = 0
     do j = 1, size(machine%joints)
@@ -73,15 +73,15 @@ contains
       system%touch_speed(k) = state%touch_speed(j)
       system%push(:, k) = held_push(machine, flow, machine%joints(j)%row)
       call set_strength(machine%joints(j), one, system%strength(:, k))
-      system%place(:, k) = flow%place_row(:, j)
+      system%position(:, k) = flow%position_row(:, j)
       system%speed(:, k) = flow%speed_row(:, j)
-      system%place(one + 1, k) = machine%joints(j)%offset%rate
+      system%position(one + 1, k) = machine%joints(j)%offset%rate
       system%speed(one, k) = machine%joints(j)%offset%rate
       call joint_motion(machine, j, state%q, state%v, state%time, path%turning, s, u)
       ! A contact that begins is at its stop to the last digit.
       if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop) &
           <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop
-      system%place(one, k) = s - stop
+      system%position(one, k) = s - stop
     end do
   end subroutine set_system
 
@@ -143,30 +143,30 @@ contains
     real(wp) :: force(self%count_joints)
     integer :: k
     do k = 1, self%count_joints
-      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), place_now(self, k, z), &
+      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), position_now(self, k, z), &
                        sum(self%speed(:, k)*z), sum(self%strength(:, k)*z), force(k))
     end do
   end function forces_at
 
   !> Coordinate of joint number `k` of the system [m]. The part that is given changes by sum of amplitude (exp(i m Omega t) - 1),
   !> with exp(i x) - 1 = 2 i sin(x/2) exp(i x/2): a stiff contact is so thin that differences of positions have no digits of it.
-  pure real(wp) function place_now(self, k, z) result(s)
+  pure real(wp) function position_now(self, k, z) result(s)
     class(marched_t), intent(in) :: self
     integer, intent(in) :: k
     real(wp), intent(in) :: z(:)
     real(wp) :: sine, cosine, half, unused
     integer :: c, m
     c = 2*self%n + 2
-    s = sum(self%place(:c, k)*z(:c))
+    s = sum(self%position(:c, k)*z(:c))
     do m = 1, self%harmonics
-      associate (a => self%place(c + 2*m - 1, k), b => self%place(c + 2*m, k))
+      associate (a => self%position(c + 2*m - 1, k), b => self%position(c + 2*m, k))
         if (.not. (abs(a) > 0 .or. abs(b) > 0)) cycle
         call sine_cosine(m*self%frequency*z(c)/2, half, unused)
         call sine_cosine(m*self%frequency*(self%start + z(c)/2), sine, cosine)
         s = s + 2*half*(b*cosine - a*sine)
       end associate
     end do
-  end function place_now
+  end function position_now
 
   !> Speeds and accelerations.
   pure function marched_slope(self, time, y) result(slope)
@@ -185,26 +185,26 @@ contains
     end do
   end function marched_slope
 
-  !> Accelerations with the size of each term in its place, those of a nonlinear force and what its slopes make of the sizes
+  !> Accelerations with the size of each term in its position, those of a nonlinear force and what its slopes make of the sizes
   !> of its coordinate and speed: near an equilibrium the terms cancel, and their rounding is left. `origin` are the coordinates at
   !> the start [m].
   pure function sizes_of_terms(self, origin, time, y) result(sizes)
     class(marched_t), intent(in) :: self
     real(wp), intent(in) :: origin(:), time, y(:)
-    real(wp) :: sizes(self%n), z(2*self%n + 2 + 2*self%harmonics), term, force, by_place, by_speed, strength, s
+    real(wp) :: sizes(self%n), z(2*self%n + 2 + 2*self%harmonics), term, force, by_position, by_speed, strength, s
     integer :: i, k
     z = unknowns(self, time, y)
     do i = 1, self%n
       sizes(i) = sum(abs(self%acceleration(:, i)*z))
     end do
     do k = 1, self%count_joints
-      s = place_now(self, k, z)
+      s = position_now(self, k, z)
       strength = sum(self%strength(:, k)*z)
       call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), s, sum(self%speed(:, k)*z), strength, force, &
-                       by_place, by_speed)
+                       by_position, by_speed)
       term = abs(force)
       if (self%joints(k)%kind == joint_spring) term = spring_terms(self%joints(k), s, strength)
-      term = term + abs(by_place)*(abs(s) + sum(abs(self%joints(k)%row)*(abs(origin) + abs(y(:self%n))))) &
+      term = term + abs(by_position)*(abs(s) + sum(abs(self%joints(k)%row)*(abs(origin) + abs(y(:self%n))))) &
              + abs(by_speed)*sum(abs(self%speed(:, k)*z))
       sizes = sizes + abs(self%push(:, k))*term
     end do
@@ -230,13 +230,13 @@ contains
   end function sizes_of_guards
 
   !> Forces [N], one for each joint that is not linear, of which rounding takes a share: a displacement is known to a share of the
-  !> places it is the difference of, and the force to that times its slope.
+  !> positions it is the difference of, and the force to that times its slope.
   pure function digits_of_forces(machine, system, state, turning) result(sizes)
     type(multibody_t), intent(in) :: machine
     type(marched_t), intent(in) :: system
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
-    real(wp) :: sizes(system%count_joints), s, u, strength, r, by_place, by_speed
+    real(wp) :: sizes(system%count_joints), s, u, strength, r, by_position, by_speed
     integer :: j, k
     k = 0
     do j = 1, size(machine%joints)
@@ -244,9 +244,9 @@ contains
       k = k + 1
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       call strength_now(machine%joints(j), machine%frequency, turning, strength)
-      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, &
+      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, &
                        by_speed)
-      sizes(k) = abs(by_place)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:machine%n))))
+      sizes(k) = abs(by_position)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:machine%n))))
     end do
   end function digits_of_forces
 

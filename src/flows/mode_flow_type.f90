@@ -42,7 +42,7 @@ module mode_flow_type
     real(wp), allocatable :: matrix(:, :)
     real(wp) :: rate = 0
     !> Rows of the joint coordinates, their speeds, and the forces of the constraints over the same unknowns.
-    real(wp), allocatable :: place_row(:, :), speed_row(:, :), force_row(:, :)
+    real(wp), allocatable :: position_row(:, :), speed_row(:, :), force_row(:, :)
     !> Sizes of what the rows of the forces are sums of.
     real(wp), allocatable :: size_of_force_row(:, :)
   end type mode_flow_t

@@ -68,10 +68,10 @@ contains
     integer :: n, m, j, c, unknowns
     n = machine%n
     unknowns = size(flow%matrix, 1)
-    allocate (flow%place_row(unknowns, size(machine%joints)), flow%speed_row(unknowns, size(machine%joints)), &
+    allocate (flow%position_row(unknowns, size(machine%joints)), flow%speed_row(unknowns, size(machine%joints)), &
               flow%force_row(unknowns, size(flow%held)), flow%size_of_force_row(unknowns, size(flow%held)), source=0.0_wp)
     do j = 1, size(machine%joints)
-      flow%place_row(:n, j) = machine%joints(j)%row
+      flow%position_row(:n, j) = machine%joints(j)%row
       flow%speed_row(n + 1:2*n, j) = machine%joints(j)%row
     end do
     flow%force_row(:n, :) = transpose(matmul(flow%reaction, flow%stiffness))
@@ -83,7 +83,7 @@ contains
       w = m*machine%frequency
       do j = 1, size(machine%joints)
         amplitude = offset_of(machine%joints(j), m)
-        flow%place_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
+        flow%position_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
         amplitude = amplitude*cmplx(0.0_wp, w, wp)
         flow%speed_row(c:c + 1, j) = [real(amplitude), -aimag(amplitude)]
       end do

@@ -20,7 +20,7 @@ contains
     type(mode_flow_t), intent(inout) :: flow
     complex(wp), intent(in) :: forcing(:, :), surface(:, :)
     complex(wp) :: iw
-    real(wp) :: largest, by_place(size(flow%held)), by_speed(size(flow%held))
+    real(wp) :: largest, by_position(size(flow%held)), by_speed(size(flow%held))
     integer :: j, k, m, count_shapes, harmonics
     count_shapes = size(flow%exponent)
     harmonics = size(forcing, 2)
@@ -36,12 +36,12 @@ contains
     end do
     allocate (flow%size_of_joint(count_shapes, size(machine%joints)), flow%size_of_force(count_shapes, size(flow%held)))
     allocate (flow%size_of_force_response(harmonics, size(flow%held)))
-    by_place = sum(matmul(abs(flow%reaction), abs(flow%stiffness)), dim=2)
+    by_position = sum(matmul(abs(flow%reaction), abs(flow%stiffness)), dim=2)
     by_speed = sum(matmul(abs(flow%reaction), abs(flow%damping)), dim=2)
     do k = 1, count_shapes
       largest = maxval(modulus(flow%shape(:, k)))
       flow%size_of_joint(k, :) = largest*[(sum(abs(machine%joints(j)%row)), j=1, size(machine%joints))]
-      flow%size_of_force(k, :) = largest*(by_place + flow%size_of_exponent(k)*by_speed)
+      flow%size_of_force(k, :) = largest*(by_position + flow%size_of_exponent(k)*by_speed)
       flow%force_shape(k, :) = matmul(flow%reaction, matmul(flow%stiffness, flow%shape(:, k)) &
                                       + flow%exponent(k)*matmul(flow%damping, flow%shape(:, k)))
     end do
@@ -51,7 +51,7 @@ contains
                                          + iw*matmul(flow%damping, flow%response(:, m)) - forcing(:, m)) &
                                   - iw**2*matmul(flow%hold, surface(:, m))
       largest = maxval(modulus(flow%response(:, m)))
-      flow%size_of_force_response(m, :) = largest*(by_place + m*machine%frequency*by_speed) &
+      flow%size_of_force_response(m, :) = largest*(by_position + m*machine%frequency*by_speed) &
                                           + matmul(abs(flow%reaction), modulus(forcing(:, m))) &
                                           + (m*machine%frequency)**2*matmul(abs(flow%hold), modulus(surface(:, m)))
     end do

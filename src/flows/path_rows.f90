@@ -11,12 +11,12 @@ module path_rows
   implicit none
   private
 
-  public :: place_powers, force_powers, guard_row, size_of_row
+  public :: position_powers, force_powers, guard_row, size_of_row
 
 contains
 
   !> Powers of time in a joint coordinate.
-  pure function place_powers(machine, path, j) result(p)
+  pure function position_powers(machine, path, j) result(p)
     type(multibody_t), intent(in) :: machine
     type(path_t), intent(in) :: path
     integer, intent(in) :: j
@@ -26,7 +26,7 @@ contains
       p(0) = p(0) + joint%offset%mean + joint%offset%rate*path%start
       p(1) = p(1) + joint%offset%rate
     end associate
-  end function place_powers
+  end function position_powers
 
   !> Powers of time in the force of constraint number `i` of the mode.
   pure function force_powers(machine, flow, path, i) result(p)
@@ -34,12 +34,12 @@ contains
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
     integer, intent(in) :: i
-    real(wp) :: p(0:3), by_place(machine%n), by_speed(machine%n)
+    real(wp) :: p(0:3), by_position(machine%n), by_speed(machine%n)
     integer :: n
     n = machine%n
-    by_place = matmul(flow%reaction(i, :), flow%stiffness)
+    by_position = matmul(flow%reaction(i, :), flow%stiffness)
     by_speed = matmul(flow%reaction(i, :), flow%damping)
-    p = matmul(by_place, path%powers(:n, :))
+    p = matmul(by_position, path%powers(:n, :))
     p(0:2) = p(0:2) + [1, 2, 3]*matmul(by_speed, path%powers(:n, 1:3))
     p(0) = p(0) - sum(flow%reaction(i, :)*path%force(:n))
     p(1) = p(1) - sum(flow%reaction(i, :)*path%force_rate(:n))
@@ -55,9 +55,9 @@ contains
     integer :: one
     one = 2*machine%n + 1
     associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
-      row = guard%place*flow%place_row(:, guard%joint) + guard%speed*flow%speed_row(:, guard%joint)
-      row(one) = row(one) + guard%constant + guard%place*(offset%mean + offset%rate*path%start) + guard%speed*offset%rate
-      row(one + 1) = row(one + 1) + guard%place*offset%rate
+      row = guard%position*flow%position_row(:, guard%joint) + guard%speed*flow%speed_row(:, guard%joint)
+      row(one) = row(one) + guard%constant + guard%position*(offset%mean + offset%rate*path%start) + guard%speed*offset%rate
+      row(one + 1) = row(one + 1) + guard%position*offset%rate
       if (guard%held > 0) then
         row = row + guard%force*flow%force_row(:, guard%held)
         row(one) = row(one) - guard%force*sum(flow%reaction(guard%held, :)*path%force(:n))
@@ -76,10 +76,10 @@ contains
     integer :: one
     one = 2*machine%n + 1
     associate (offset => machine%joints(guard%joint)%offset, n => machine%n)
-      row = abs(guard%place*flow%place_row(:, guard%joint)) + abs(guard%speed*flow%speed_row(:, guard%joint))
-      row(one) = row(one) + abs(guard%constant) + abs(guard%place)*(abs(offset%mean) + abs(offset%rate*path%start)) &
+      row = abs(guard%position*flow%position_row(:, guard%joint)) + abs(guard%speed*flow%speed_row(:, guard%joint))
+      row(one) = row(one) + abs(guard%constant) + abs(guard%position)*(abs(offset%mean) + abs(offset%rate*path%start)) &
                  + abs(guard%speed*offset%rate)
-      row(one + 1) = row(one + 1) + abs(guard%place*offset%rate)
+      row(one + 1) = row(one + 1) + abs(guard%position*offset%rate)
       if (guard%held == 0) return
       row = row + abs(guard%force)*flow%size_of_force_row(:, guard%held)
       row(one) = row(one) + abs(guard%force)*sum(abs(flow%reaction(guard%held, :))*abs(path%force(:n)))

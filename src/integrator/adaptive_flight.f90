@@ -10,7 +10,7 @@ module adaptive_flight
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: context_t => slip_memory_t, dahl_force
-  use energy, only: balance_instant, gauss_place, gauss_points, gauss_weight, record_with_balance
+  use energy, only: balance_instant, gauss_position, gauss_points, gauss_weight, record_with_balance
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     flight_time_over
   use friction_law, only: sliding_friction
@@ -20,7 +20,7 @@ module adaptive_flight
   use oscillator, only: extra_force, system_t => oscillator_t
   use polynomial, only: degree, first_zero, interpolate, maximum_until, value_at
   use restoring_law, only: restoring_force
-  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above
   implicit none
   private
 
@@ -119,7 +119,7 @@ contains
     integer, intent(inout) :: ends(most_guards), count_guards
     type(piece_end_t) :: pieces(most_ends)
     integer :: i, count_ends
-    call enter_pieces(machine%effects, y(1), y(2), stretch_at(machine, time, y(1)), slip)
+    call enter_pieces(machine%effects, y(1), y(2), extension_at(machine, time, y(1)), slip)
     call list_ends(machine%effects, slip, pieces, count_ends)
     do i = 1, count_ends
       associate (guard => guards(count_guards + i))
@@ -131,13 +131,13 @@ contains
     count_guards = count_guards + count_ends
   end subroutine keep_to_pieces
 
-  pure real(wp) function stretch_at(machine, time, x) result(stretch)
+  pure real(wp) function extension_at(machine, time, x) result(spring_extension)
     type(system_t), intent(in) :: machine
     real(wp), intent(in) :: time, x
     real(wp) :: foot
     call foot_motion(machine%drive, machine%drive_frequency*time, foot)
-    stretch = machine%restoring%free_length + foot - x
-  end function stretch_at
+    spring_extension = machine%restoring%free_length + foot - x
+  end function extension_at
 
   !> Size of position and velocity below which errors are absolute [m, m/s].
   pure function scale_of(machine, state) result(scale)
@@ -157,20 +157,20 @@ contains
     integer, intent(in) :: n
     real(wp), intent(in) :: time, y(n)
     real(wp), intent(out) :: slope(n)
-    real(wp) :: stretch
-    stretch = stretch_at(machine, time, y(1))
+    real(wp) :: spring_extension
+    spring_extension = extension_at(machine, time, y(1))
     slope(1) = y(2)
-    slope(2) = (restoring_force(machine%restoring, stretch) &
+    slope(2) = (restoring_force(machine%restoring, spring_extension) &
                 + sliding_friction(machine%friction, y(2), slip%direction))/machine%mass
-    if (machine%extra) slope(2) = slope(2) + extra_force(machine, slip, time, y(1), y(2), stretch)/machine%mass
+    if (machine%extra) slope(2) = slope(2) + extra_force(machine, slip, time, y(1), y(2), spring_extension)/machine%mass
   end subroutine find_slope
 
-  !> How far the stretch of the spring is below or above a constant [m].
+  !> How far the spring_extension of the spring is below or above a constant [m].
   pure real(wp) function margin_of(machine, guard, time, y)
     type(system_t), intent(in) :: machine
     type(guard_t), intent(in) :: guard
     real(wp), intent(in) :: time, y(:)
-    margin_of = guard%constant + merge(1, -1, guard%margin == stretch_above)*stretch_at(machine, time, y(1))
+    margin_of = guard%constant + merge(1, -1, guard%margin == extension_above)*extension_at(machine, time, y(1))
   end function margin_of
 
   !> Largest velocity, energy and samples of the step behind; `state` gives what a sample does not change.
@@ -182,7 +182,7 @@ contains
     type(log_t), intent(inout), optional :: log
     type(state_t) :: sample
     real(wp) :: t, done
-    if (tally%wants_v_max .and. march%context%direction > 0) then
+    if (tally%needs_v_max .and. march%context%direction > 0) then
       tally%v_max = max(tally%v_max, march%path(0, 2), maximum_until(march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
@@ -215,7 +215,7 @@ contains
     integer :: k
     if (.not. balance%kept) return
     do k = 1, gauss_points
-      t = from + (until - from)*gauss_place(k)
+      t = from + (until - from)*gauss_position(k)
       call balance_instant(machine, march%context, march%from + t*march%length, value_at(march%path(:, 1), t), &
                         value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), balance)
     end do

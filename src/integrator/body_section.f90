@@ -37,7 +37,7 @@ contains
     call take_turns(moving%machine%turn, state)
   end function start_of_body
 
-  !> A body with the place, velocity and memory that it had in another machine, with the crank at `angle` [rad].
+  !> A body with the position, velocity and memory that it had in another machine, with the crank at `angle` [rad].
   pure type(state_t) function resumed_body(moving, before, angle) result(state)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(in) :: before

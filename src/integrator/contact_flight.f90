@@ -8,7 +8,7 @@ module contact_flight
   use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_t
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
-  use energy, only: balance_instant, gauss_place, gauss_points, gauss_weight, record_with_balance
+  use energy, only: balance_instant, gauss_position, gauss_points, gauss_weight, record_with_balance
   use exact_flight, only: flight_barrier, flight_failed, flight_speed_reached, flight_time_over
   use friction_law, only: power, sliding_friction
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step, &
@@ -20,7 +20,7 @@ module contact_flight
   use oscillator, only: extra_force, oscillator_t
   use polynomial, only: degree, maximum_until, value_at
   use restoring_law, only: restoring_force
-  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above
   implicit none
   private
 
@@ -42,7 +42,7 @@ module contact_flight
     type(slip_memory_t) :: memory
   contains
     procedure :: slope => pressed_slope
-    procedure :: margin => stretch_margin
+    procedure :: margin => extension_margin
   end type pressed_t
 
 contains
@@ -136,36 +136,36 @@ contains
   pure function pressed_slope(self, time, y) result(slope)
     class(pressed_t), intent(in) :: self
     real(wp), intent(in) :: time, y(:)
-    real(wp) :: slope(size(y)), stretch, force, push
+    real(wp) :: slope(size(y)), extension, force, push
     associate (machine => self%machine)
-      stretch = stretch_at(self, time, y)
-      force = restoring_force(machine%restoring, stretch) &
+      extension = extension_at(self, time, y)
+      force = restoring_force(machine%restoring, extension) &
               + sliding_friction(machine%friction, self%side*y(2), real(self%direction, wp))
       if (machine%extra) force = force + extra_force(machine, self%memory, self%start + time, &
-                                                     self%surface + self%side*y(1), self%side*y(2), stretch)
+                                                     self%surface + self%side*y(1), self%side*y(2), extension)
       push = 0
       if (self%pushing) push = contact_force(machine%contact, y(1), y(2))
       slope = [y(2), (self%side*force - push)/machine%mass, push*y(2)]
     end associate
   end function pressed_slope
 
-  pure real(wp) function stretch_at(pressed, time, y) result(stretch)
+  pure real(wp) function extension_at(pressed, time, y) result(extension)
     class(pressed_t), intent(in) :: pressed
     real(wp), intent(in) :: time, y(:)
     real(wp) :: foot
     associate (machine => pressed%machine)
       call foot_motion(machine%drive, machine%drive_frequency*(pressed%start + time), foot)
-      stretch = machine%restoring%free_length + foot - (pressed%surface + pressed%side*y(1))
+      extension = machine%restoring%free_length + foot - (pressed%surface + pressed%side*y(1))
     end associate
-  end function stretch_at
+  end function extension_at
 
-  !> The stretch [m] of the spring, with the sign that it has in a margin.
-  pure real(wp) function stretch_margin(self, number, time, y)
+  !> The extension [m] of the spring, with the sign that it has in a margin.
+  pure real(wp) function extension_margin(self, number, time, y)
     class(pressed_t), intent(in) :: self
     integer, intent(in) :: number
     real(wp), intent(in) :: time, y(:)
-    stretch_margin = merge(1, -1, number == stretch_above)*stretch_at(self, time, y)
-  end function stretch_margin
+    extension_margin = merge(1, -1, number == extension_above)*extension_at(self, time, y)
+  end function extension_margin
 
   pure real(wp) function margin_at(contact, y)
     type(contact_t), intent(in) :: contact
@@ -199,7 +199,7 @@ contains
     count_guards = cut
     associate (effects => pressed%machine%effects, side => pressed%side)
       if (.not. effects%by_table) return
-      call enter_pieces(effects, pressed%surface + side*y(1), side*y(2), stretch_at(pressed, time, y), pressed%memory)
+      call enter_pieces(effects, pressed%surface + side*y(1), side*y(2), extension_at(pressed, time, y), pressed%memory)
       call list_ends(effects, pressed%memory, pieces, count_ends)
       do i = 1, count_ends
         associate (guard => guards(cut + i))
@@ -244,7 +244,7 @@ contains
     type(state_t) :: sample
     real(wp) :: t, done
     if (.not. march%fraction > 0) return
-    if (tally%wants_v_max .and. pressed%direction > 0) then
+    if (tally%needs_v_max .and. pressed%direction > 0) then
       tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
     end if
     if (.not. present(log)) return
@@ -277,7 +277,7 @@ contains
     integer :: k
     if (.not. log%balance%kept) return
     do k = 1, gauss_points
-      t = from + (until - from)*gauss_place(k)
+      t = from + (until - from)*gauss_position(k)
       call balance_instant(pressed%machine, pressed%memory, pressed%start + march%from + t*march%length, &
                         pressed%surface + pressed%side*value_at(march%path(:, 1), t), &
                         pressed%side*value_at(march%path(:, 2), t), (until - from)*march%length*gauss_weight(k), log%balance)

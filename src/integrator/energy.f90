@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Where the energy of one body goes. With the stretch s = l0 + x_A - x of a linear spring, E = m v^2/2 + c s^2/2 and
+!> Where the energy of one body goes. With the extension s = l0 + x_A - x of a linear spring, E = m v^2/2 + c s^2/2 and
 !>   E' = -(dry friction)|v| - b v^2 + c s x_A' - (force of a soft barrier) p'.
 !> Effects add k3 s^4/4 - F x and the like to E, k3 s^3 x_A' and the like to the work of the drive, and their own losses; what
 !> Dahl's friction holds elastically counts as lost until it gives it back.
 !> The powers are integrated by Gauss's rule over short pieces of a flight.
 module energy
   use drive_law, only: foot_motion, measured_force
-  use effect_law, only: effect_energy, effect_losses, slip_memory_t, stretch_force
+  use effect_law, only: effect_energy, effect_losses, slip_memory_t, extension_force
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
   use friction_law, only: stribeck_excess
   use kinds, only: wp
@@ -22,11 +22,11 @@ module energy
 
   !> Gauss's rule with 8 points on [0, 1] (Abramowitz, Stegun, 25.4.30).
   integer, parameter, public :: gauss_points = 8
-  real(wp), parameter :: half_place(4) = [0.1834346424956498049394761_wp, 0.5255324099163289858177390_wp, &
+  real(wp), parameter :: half_position(4) = [0.1834346424956498049394761_wp, 0.5255324099163289858177390_wp, &
                                           0.7966664774136267395915539_wp, 0.9602898564975362316835609_wp]
   real(wp), parameter :: half_weight(4) = [0.3626837833783619829651504_wp, 0.3137066458778872873379622_wp, &
                                            0.2223810344533744705443560_wp, 0.1012285362903762591525314_wp]
-  real(wp), parameter, public :: gauss_place(gauss_points) = 0.5_wp + 0.5_wp*[half_place, -half_place]
+  real(wp), parameter, public :: gauss_position(gauss_points) = 0.5_wp + 0.5_wp*[half_position, -half_position]
   real(wp), parameter, public :: gauss_weight(gauss_points) = 0.5_wp*[half_weight, half_weight]
 
   !> Longest piece over which the powers of an exact flight are integrated, in radians of its fastest part.
@@ -42,9 +42,9 @@ contains
     type(state_t), intent(in) :: state
     real(wp) :: foot
     call foot_motion(machine%drive, machine%drive_frequency*state%time, foot)
-    associate (stretch => machine%restoring%free_length + foot - state%x)
-      energy = 0.5_wp*machine%mass*state%v**2 + restoring_energy(machine%restoring, stretch)
-      if (machine%effects%present) energy = energy + effect_energy(machine%effects, state%x, stretch)
+    associate (extension => machine%restoring%free_length + foot - state%x)
+      energy = 0.5_wp*machine%mass*state%v**2 + restoring_energy(machine%restoring, extension)
+      if (machine%effects%present) energy = energy + effect_energy(machine%effects, state%x, extension)
     end associate
   end function energy_of_body
 
@@ -54,20 +54,20 @@ contains
     type(slip_memory_t), intent(in) :: slip
     real(wp), intent(in) :: time, x, v, weight
     type(energy_balance_t), intent(inout) :: balance
-    real(wp) :: foot, rate, stretch, measured, losses(2)
+    real(wp) :: foot, rate, extension, measured, losses(2)
     if (.not. balance%kept) return
     call foot_motion(machine%drive, machine%drive_frequency*time, foot, rate)
     associate (law => machine%friction)
       balance%friction = balance%friction + weight*(law%kinetic + stribeck_excess(law, abs(v)))*abs(v)
       balance%damping = balance%damping + weight*law%damping*v**2
     end associate
-    stretch = machine%restoring%free_length + foot - x
-    balance%work = balance%work + weight*restoring_force(machine%restoring, stretch)*rate*machine%drive_frequency
+    extension = machine%restoring%free_length + foot - x
+    balance%work = balance%work + weight*restoring_force(machine%restoring, extension)*rate*machine%drive_frequency
     if (machine%effects%present) then
       losses = effect_losses(machine%effects, machine%friction, slip, x, v)
       balance%friction = balance%friction + weight*losses(1)
       balance%damping = balance%damping + weight*losses(2)
-      balance%work = balance%work + weight*stretch_force(machine%effects, stretch)*rate*machine%drive_frequency
+      balance%work = balance%work + weight*extension_force(machine%effects, extension)*rate*machine%drive_frequency
     end if
     if (machine%drive%interval > 0) then
       call measured_force(machine%drive, time, measured, rate)
@@ -160,7 +160,7 @@ contains
     piece = (span(2) - span(1))/pieces
     do i = 1, pieces
       do k = 1, gauss_points
-        elapsed = span(1) + (i - 1 + gauss_place(k))*piece
+        elapsed = span(1) + (i - 1 + gauss_position(k))*piece
         call evaluate(flow, segment, elapsed, now)
         call balance_instant(machine, slip, start + elapsed, now%x, now%v, gauss_weight(k)*piece, balance)
       end do

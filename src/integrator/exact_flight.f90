@@ -46,7 +46,7 @@ contains
     call begin_segment(flow, state%time, state%x, state%v, direction, segment)
     call find_level(flow, segment, state, direction, span, level, barrier, before, elapsed, now, outcome)
     if (outcome == flight_barrier) call find_barrier(flow, segment, direction, barrier, before, elapsed, now)
-    if (tally%wants_v_max .and. direction > 0) call raise_v_max(flow, segment, elapsed, tally%v_max)
+    if (tally%needs_v_max .and. direction > 0) call raise_v_max(flow, segment, elapsed, tally%v_max)
     if (present(log)) call sample_segment(flow, segment, state, elapsed, log)
     state%time = state%time + elapsed
     if (outcome == flight_time_over) state%time = time_end

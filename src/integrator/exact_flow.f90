@@ -10,7 +10,7 @@
 !> rest, (exp(i n Omega s) - exp(lambda s))/(i n Omega - lambda), is written with exp(x) - 1 and stays
 !> accurate through undamped exact resonance.
 !> Far above critical damping the exponents are real, -slow and -fast: u = y' + fast y and w = y' + slow y are then
-!> u' = -slow u + f and w' = -fast w + f, and take the places of the two parts of z.
+!> u' = -slow u + f and w' = -fast w + f, and take the positions of the two parts of z.
 module exact_flow
   use effect_law, only: constant_force
   use elementary, only: exponential, exponential_minus_one, sine_cosine
@@ -291,7 +291,7 @@ contains
     type(segment_t), intent(in) :: segment
     real(wp), intent(in) :: elapsed
     type(kinematics_t), intent(out) :: now
-    real(wp) :: u, w, s1, c1, s, c, next, places, speeds, apart
+    real(wp) :: u, w, s1, c1, s, c, next, positions, speeds, apart
     integer :: n
     associate (slow => flow%slow, fast => flow%fast)
       apart = fast - slow
@@ -308,11 +308,11 @@ contains
       do n = 1, flow%harmonics
         u = (flow%p_re(n)*c + flow%q_re(n)*s)/apart
         w = (flow%p_im(n)*c + flow%q_im(n)*s)/apart
-        places = u - w
+        positions = u - w
         speeds = fast*w - slow*u
-        now%x = now%x + places
+        now%x = now%x + positions
         now%v = now%v + speeds
-        now%a = now%a - (n*flow%drive_frequency)**2*places
+        now%a = now%a - (n*flow%drive_frequency)**2*positions
         now%j = now%j - (n*flow%drive_frequency)**2*speeds
         next = c*c1 - s*s1
         s = s*c1 + c*s1

@@ -1,11 +1,11 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Crossing the thin Stribeck layer in one stroke. The speed w takes the place of the time as the independent variable
+!> Crossing the thin Stribeck layer in one stroke. The speed w takes the position of the time as the independent variable
 !> (Henon's trick), so that the end of the layer is known:
 !>   dt/dw = 1/A,  dx/dw = s w/A,  A = s (f(t) - omega^2 y) - 2 g w - (E/m) exp(-(w/v_s)^delta),
 !> y the distance from the sliding equilibrium, s the direction. The exponential at the collocation points does
-!> not depend on the motion, and time and place change little on the way, so a fixed-point iteration on Gauss points converges in
+!> not depend on the motion, and time and position change little on the way, so a fixed-point iteration on Gauss points converges in
 !> a few rounds. Where it does not, or the motion does not pass straight through, the adaptive flight takes over.
 module layer_transit
   use constants, only: pi
@@ -130,7 +130,7 @@ contains
     end do
   end function enough_terms
 
-  !> One piece: fixed-point iteration for time and place at the Gauss points.
+  !> One piece: fixed-point iteration for time and position at the Gauss points.
   pure subroutine cross_piece(transit, flow, taylor, direction, which, k, inward, start_rate, elapsed, y, ok, change_by)
     type(transit_t), intent(in) :: transit
     type(flow_t), intent(in) :: flow
@@ -140,15 +140,16 @@ contains
     real(wp), intent(inout) :: elapsed, y
     logical, intent(out) :: ok
     real(wp), intent(inout), optional :: change_by(2, 2)
-    real(wp) :: time(points), place(points), before(points), rate(points), inverse(points), run(points), half, change, last_change
+    real(wp) :: time(points), position(points), before(points), rate(points), inverse(points), run(points), half, change, &
+      last_change
     integer :: round
     half = 0.5_wp*(transit%ends(k, which) - transit%ends(k - 1, which))
     time = elapsed
-    place = y
+    position = y
     ok = .false.
     change = 0
     do round = 1, most_rounds
-      rate = direction*(polynomial(taylor, time) - flow%natural**2*place) &
+      rate = direction*(polynomial(taylor, time) - flow%natural**2*position) &
              - 2*flow%decay*transit%speed(:, k, which) - transit%excess(:, k, which)
       if (inward) rate = -rate
       if (minval(rate) < smallest_share*abs(start_rate)) return
@@ -158,12 +159,12 @@ contains
       if (inward) then
         ! From the outer end: what is left of the whole integral.
         time = elapsed + dot_product(transit%weight, inverse)
-        place = y + dot_product(transit%weight, run)
-        call add_integrals(transit, -inverse, -run, time, place)
+        position = y + dot_product(transit%weight, run)
+        call add_integrals(transit, -inverse, -run, time, position)
       else
         time = elapsed
-        place = y
-        call add_integrals(transit, inverse, run, time, place)
+        position = y
+        call add_integrals(transit, inverse, run, time, position)
       end if
       last_change = change
       change = maxval(abs(time - before))
@@ -183,56 +184,56 @@ contains
     end do
   end subroutine cross_piece
 
-  !> Takes a variation of time and place across a piece, by the same iteration: `by_time` and `by_place` are the relative
+  !> Takes a variation of time and position across a piece, by the same iteration: `by_time` and `by_position` are the relative
   !> derivatives of the deceleration at the points, `inverse` the weights of the time there.
-  pure subroutine vary_piece(transit, velocity, inward, by_time, by_place, inverse, change)
+  pure subroutine vary_piece(transit, velocity, inward, by_time, by_position, inverse, change)
     type(transit_t), intent(in) :: transit
-    real(wp), intent(in) :: velocity(points), by_time(points), by_place(points), inverse(points)
+    real(wp), intent(in) :: velocity(points), by_time(points), by_position(points), inverse(points)
     logical, intent(in) :: inward
     real(wp), intent(inout) :: change(2)
-    real(wp) :: time(points), place(points), before(2, points), later(points), further(points)
+    real(wp) :: time(points), position(points), before(2, points), later(points), further(points)
     integer :: round
     time = change(1)
-    place = change(2)
+    position = change(2)
     do round = 1, most_rounds
       before(1, :) = time
-      before(2, :) = place
-      later = -inverse*(by_time*time + by_place*place)
+      before(2, :) = position
+      later = -inverse*(by_time*time + by_position*position)
       further = velocity*later
       time = change(1)
-      place = change(2)
+      position = change(2)
       if (inward) then
         time = time + dot_product(transit%weight, later)
-        place = place + dot_product(transit%weight, further)
-        call add_integrals(transit, -later, -further, time, place)
+        position = position + dot_product(transit%weight, further)
+        call add_integrals(transit, -later, -further, time, position)
       else
-        call add_integrals(transit, later, further, time, place)
+        call add_integrals(transit, later, further, time, position)
       end if
       if (maxval(abs(time - before(1, :))) <= 4*epsilon(1.0_wp)*maxval(abs(time)) .and. &
-          maxval(abs(place - before(2, :))) <= 4*epsilon(1.0_wp)*maxval(abs(place))) exit
+          maxval(abs(position - before(2, :))) <= 4*epsilon(1.0_wp)*maxval(abs(position))) exit
     end do
     change = change + [dot_product(transit%weight, later), dot_product(transit%weight, further)]
   end subroutine vary_piece
 
   !> Adds the integrals from -1 to each point of what has the values `inverse` and `run` at the points. A few at a time, whose
   !> sums stay in registers.
-  pure subroutine add_integrals(transit, inverse, run, time, place)
+  pure subroutine add_integrals(transit, inverse, run, time, position)
     type(transit_t), intent(in) :: transit
     real(wp), intent(in) :: inverse(points), run(points)
-    real(wp), intent(inout) :: time(points), place(points)
+    real(wp), intent(inout) :: time(points), position(points)
     integer, parameter :: few = 8
     real(wp) :: t(few), p(few)
     integer :: first, i
     do first = 1, points, few
       t = time(first:first + few - 1)
-      p = place(first:first + few - 1)
+      p = position(first:first + few - 1)
       !GCC$ novector
       do i = 1, points
         t = t + transit%integral(first:first + few - 1, i)*inverse(i)
         p = p + transit%integral(first:first + few - 1, i)*run(i)
       end do
       time(first:first + few - 1) = t
-      place(first:first + few - 1) = p
+      position(first:first + few - 1) = p
     end do
   end subroutine add_integrals
 

@@ -54,7 +54,7 @@ module motion
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
     real(wp) :: layer = 0
-    !> The section is where the motion turns round, in the place of a time.
+    !> The section is where the motion turns round, in the position of a time.
     logical :: by_event = .false.
     !> Several bodies with joints.
     type(multibody_motion_t), allocatable :: multibody
@@ -103,7 +103,7 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the
   !> trajectory had to be given up (codes of module `status`). With `slip_speed` no further than to a slip in the other
-  !> direction that is so fast [m/s], with `matching_point` no further than to a slip through that place [m], or its opposite.
+  !> direction that is so fast [m/s], with `matching_point` no further than to a slip through that position [m], or its opposite.
   pure subroutine advance(moving, state, time_end, tally, reason, log, slip_speed, matching_point)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state

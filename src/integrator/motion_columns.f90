@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What is written down of a motion beside time, place and velocity of the body looked at, by the machine: the foot of the spring,
-!> the driving body, all coordinates of a structure and the joint of each event.
+!> What is written down of a motion beside time, position and velocity of the body looked at, by the machine: the foot of the
+!> spring, the driving body, all coordinates of a structure and the joint of each event.
 module motion_columns
   use angle_units, only: unit_of
   use multibody, only: joint_section, multibody_t
@@ -67,7 +67,7 @@ contains
     call set_column(columns(2), 'driver_v', 'm/s', 'velocity of the driving body', driver(2, :))
   end function driver_columns
 
-  !> Position and velocity of every coordinate of a structure; inner ones have a number in the place of a point's name.
+  !> Position and velocity of every coordinate of a structure; inner ones have a number in the position of a point's name.
   pure function coordinate_columns(machine, log) result(columns)
     type(multibody_t), intent(in) :: machine
     type(log_t), intent(in) :: log

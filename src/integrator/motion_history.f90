@@ -22,12 +22,12 @@ contains
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     real(wp) :: forces(log%samples)
-    real(wp), allocatable :: place(:, :)
-    place = log%sample_data(2:3, :log%samples)
+    real(wp), allocatable :: position(:, :)
+    position = log%sample_data(2:3, :log%samples)
     if (has_driver(moving)) then
-      if (moving%multibody%machine%driver%carries) place = place - log%sample_driver(:, :log%samples)
+      if (moving%multibody%machine%driver%carries) position = position - log%sample_driver(:, :log%samples)
     end if
-    forces = force_on_body(contact_at_speed(stops_of(moving), log%sample_touch(1, :log%samples)), place(1, :), place(2, :))
+    forces = force_on_body(contact_at_speed(stops_of(moving), log%sample_touch(1, :log%samples)), position(1, :), position(2, :))
   end function contact_forces
 
   !> Positions of the foot of the spring [m] at the samples of a motion that began at `crank_angle` [rad].

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A multibody structure on the stroboscopic section: the positions and the velocities on which anything depends, and the stretch of
-!> the springs of elastic friction.
+!> A multibody structure on the stroboscopic section: the positions and the velocities on which anything depends, and the extension
+!> of the springs of elastic friction.
 module multibody_section
   use multibody, only: is_stop, joint_contact, joint_elastic
   use multibody_flows, only: without_contacts
@@ -31,7 +31,7 @@ contains
     n = size(moving%directions, 2) + size(moving%speeds, 2) + count(moving%machine%joints%kind == joint_elastic)
   end function coordinates_of_multibody
 
-  !> Number of the coordinate that is the velocity of the watched place, in a motion without a clock.
+  !> Number of the coordinate that is the velocity of the watched position, in a motion without a clock.
   pure integer function watched_speed(moving) result(at)
     type(multibody_motion_t), intent(in) :: moving
     at = size(moving%directions, 2) + moving%machine%watched
@@ -43,19 +43,19 @@ contains
     fits_section = coordinates_of_multibody(moving) <= most_coordinates .and. .not. acts_on_time(moving%machine)
   end function fits_section
 
-  !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
-  pure subroutine free_multibody(moving, free, places)
+  !> The same machine without stops, if that takes away just the first `positions` coordinates, positions; else 0.
+  pure subroutine free_multibody(moving, free, positions)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_motion_t), intent(out) :: free
-    integer, intent(out) :: places
-    places = 0
+    integer, intent(out) :: positions
+    positions = 0
     if (.not. moving%machine%driven .or. .not. any(is_stop(moving%machine%joints%kind))) return
     call prepare_multibody(without_contacts(moving%machine), moving%options, free)
-    if (size(free%speeds, 2) == size(moving%speeds, 2)) places = size(moving%directions, 2) - size(free%directions, 2)
+    if (size(free%speeds, 2) == size(moving%speeds, 2)) positions = size(moving%directions, 2) - size(free%directions, 2)
   end subroutine free_multibody
 
-  !> Whether a structure on the section comes no nearer to a stop in the next `periods` than displacements of all places by
-  !> `distance` [m] would close.
+  !> Whether a structure on the section comes no nearer to a stop in the next `periods` than displacements of all positions
+  !> by `distance` [m] would close.
   pure logical function keeps_clear(moving, state, periods, distance)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(in) :: state
@@ -88,9 +88,9 @@ contains
     keeps_clear = .true.
   end function keeps_clear
 
-  !> A state with the watched place at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
+  !> A state with the watched position at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
   !> drive at `angle` [rad].
-  !> `others`, if it is not empty, has place and velocity of every coordinate in the place of what the machine says.
+  !> `others`, if it is not empty, has position and velocity of every coordinate in the position of what the machine says.
   !> One that no mode fits, or that lies beyond a stop, is not a number.
   pure function start_of_multibody(moving, x, v, angle, others) result(state)
     type(multibody_motion_t), intent(in) :: moving
@@ -132,16 +132,16 @@ contains
   end function is_allowed
 
   !> Places and velocities of all coordinates for those of the section, `point`; what these leave open is zero: of two bodies that
-  !> nothing ties to the ground place and velocity of the driving one.
+  !> nothing ties to the ground position and velocity of the driving one.
   pure subroutine lay_out(moving, point, q, v)
     type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     real(wp), intent(out) :: q(:), v(:)
-    integer :: places, speeds
-    places = size(moving%directions, 2)
+    integer :: positions, speeds
+    positions = size(moving%directions, 2)
     speeds = size(moving%speeds, 2)
-    q = matmul(moving%directions, point(:places))
-    v = matmul(moving%speeds, point(places + 1:places + speeds))
+    q = matmul(moving%directions, point(:positions))
+    v = matmul(moving%speeds, point(positions + 1:positions + speeds))
     if (.not. allocated(moving%machine%driver)) return
     associate (at => moving%machine%driver%at)
       if (at > 0 .and. all(abs(sum(moving%directions, 1)) < nothing)) q = q - q(at)
@@ -182,17 +182,17 @@ contains
     type(multibody_state_t), intent(in) :: state
     real(wp) :: point(most_coordinates), q(moving%machine%n), s, u
     complex(wp) :: turning(moving%harmonics)
-    integer :: n, places, speeds, j, k
+    integer :: n, positions, speeds, j, k
     point = 0
     if (.not. fits_section(moving)) return
     n = moving%machine%n
-    places = size(moving%directions, 2)
+    positions = size(moving%directions, 2)
     speeds = size(moving%speeds, 2)
     q = state%q(:n)
     if (allocated(moving%machine%driver)) q = q - moving%machine%driver%running*state%clock
-    point(:places) = matmul(transpose(moving%directions), q)
-    point(places + 1:places + speeds) = matmul(transpose(moving%speeds), state%v(:n))
-    k = places + speeds
+    point(:positions) = matmul(transpose(moving%directions), q)
+    point(positions + 1:positions + speeds) = matmul(transpose(moving%speeds), state%v(:n))
+    k = positions + speeds
     turning = turning_at(moving%machine%frequency, state%time, moving%harmonics)
     do j = 1, size(moving%machine%joints)
       associate (joint => moving%machine%joints(j))
@@ -210,13 +210,13 @@ contains
     type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates), length
-    integer :: places, speeds
-    places = size(moving%directions, 2)
+    integer :: positions, speeds
+    positions = size(moving%directions, 2)
     speeds = size(moving%speeds, 2)
     length = max(half_range, 1e-3_wp*moving%machine%length_scale)
     if (speeds < moving%machine%n) length = min(length, moving%machine%length_scale)
     scales = length
-    scales(places + 1:places + speeds) = length*moving%machine%frequency
+    scales(positions + 1:positions + speeds) = length*moving%machine%frequency
   end function scales_of_multibody
 
 end module multibody_section

@@ -18,8 +18,8 @@ module pair_as_structure
 
 contains
 
-  !> The structure of two bodies: coordinates are the places of both on the ground, or of the driven one where the motion of the
-  !> other is given.
+  !> The structure of two bodies: coordinates are the positions of both on the ground, or of the driven one where the motion
+  !> of the other is given.
   pure subroutine structure_of_pair(pair, machine, error)
     type(pair_t), intent(in) :: pair
     type(multibody_t), intent(out) :: machine

@@ -145,20 +145,20 @@ contains
     end do
   end subroutine hold
 
-  !> Time [s] for which the stretch of the spring is proven to reach no sharp corner while the body rests.
+  !> Time [s] for which the extension of the spring is proven to reach no sharp corner while the body rests.
   pure real(wp) function time_to_corner(machine, state) result(time)
     type(oscillator_t), intent(in) :: machine
     type(state_t), intent(in) :: state
-    real(wp) :: foot, foot_rate, stretch, limits(2), room
+    real(wp) :: foot, foot_rate, extension, limits(2), room
     integer :: i
     time = huge(time)
     if (.not. machine%effects%play%sharp) return
     call foot_motion(machine%drive, machine%drive_frequency*state%time, foot, foot_rate)
-    stretch = machine%restoring%free_length + foot - state%x
-    limits = piece_limits(machine%effects%play, piece_at(machine%effects%play, stretch))
+    extension = machine%restoring%free_length + foot - state%x
+    limits = piece_limits(machine%effects%play, piece_at(machine%effects%play, extension))
     do i = 1, 2
       if (.not. abs(limits(i)) < huge(1.0_wp)) cycle
-      room = abs(limits(i) - stretch)
+      room = abs(limits(i) - extension)
       time = min(time, positive_step(room, (3 - 2*i)*foot_rate*machine%drive_frequency, machine%foot_acceleration_bound))
     end do
   end function time_to_corner

@@ -42,14 +42,14 @@ module section
 
 contains
 
-  !> The same machine without stops, if that takes away just the first `places` coordinates, positions; else 0.
-  pure subroutine without_stops(moving, free, places)
+  !> The same machine without stops, if that takes away just the first `positions` coordinates, positions; else 0.
+  pure subroutine without_stops(moving, free, positions)
     type(motion_t), intent(in) :: moving
     type(motion_t), intent(out) :: free
-    integer, intent(out) :: places
-    places = 0
+    integer, intent(out) :: positions
+    positions = 0
     free = moving
-    if (allocated(moving%multibody)) call free_multibody(moving%multibody, free%multibody, places)
+    if (allocated(moving%multibody)) call free_multibody(moving%multibody, free%multibody, positions)
   end subroutine without_stops
 
   !> Number of a coordinate that is a velocity, of machines of several bodies.
@@ -113,7 +113,7 @@ contains
   end function section_obstacle
 
   !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
-  !> are places and velocities of the coordinates of several bodies, in the place of those that the machine says.
+  !> are positions and velocities of the coordinates of several bodies, in the position of those that the machine says.
   pure function start_section(moving, start) result(section)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
@@ -156,7 +156,7 @@ contains
     section%state = resumed_body(moving, before%state, angle)
   end function resume_section
 
-  !> The same of several bodies: all keep their places and velocities.
+  !> The same of several bodies: all keep their positions and velocities.
   pure function resume_multibody(moving, before, angle) result(section)
     type(motion_t), intent(in) :: moving
     type(section_state_t), intent(in) :: before

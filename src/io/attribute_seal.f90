@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> One checksum over all attributes of a file: HDF5 keeps texts in a place that it does not check.
+!> One checksum over all attributes of a file: HDF5 keeps texts in a group that it does not check.
 module attribute_seal
   use checksum, only: crc32, crc32_text
   use errors, only: error_t, fail
@@ -21,7 +21,7 @@ module attribute_seal
 
   public :: seal_attributes, verify_attributes
 
-  character(len=*), parameter :: place = '/provenance', seal_name = 'attributes_checksum'
+  character(len=*), parameter :: group = '/provenance', seal_name = 'attributes_checksum'
   !> The seals, and what the dimension scales consist of.
   character(len=*), parameter :: left_out(6) = [character(len=19) :: seal_name, 'checksum', 'CLASS', 'NAME', 'DIMENSION_LIST', &
     'REFERENCE_LIST']
@@ -34,11 +34,11 @@ contains
     type(h5_file_t), intent(in) :: file
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: value
-    if (.not. h5_exists(file, place)) return
+    if (.not. h5_exists(file, group)) return
     value = 0
     call add_object(file, '/', value, error)
     if (allocated(error)) return
-    call h5_put_numbers(file, place, seal_name, type_uint32, [real(value, real64)], error)
+    call h5_put_numbers(file, group, seal_name, type_uint32, [real(value, real64)], error)
   end subroutine seal_attributes
 
   !> Code 74 if the attributes do not match it; a file without it passes.
@@ -47,9 +47,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(real64), allocatable :: expected(:)
     integer(int64) :: found
-    if (.not. h5_exists(file, place)) return
-    if (.not. h5_has_attribute(file, place, seal_name)) return
-    call h5_get_numbers(file, place, seal_name, expected, error)
+    if (.not. h5_exists(file, group)) return
+    if (.not. h5_has_attribute(file, group, seal_name)) return
+    call h5_get_numbers(file, group, seal_name, expected, error)
     found = 0
     if (.not. allocated(error)) call add_object(file, '/', found, error)
     if (allocated(error)) return

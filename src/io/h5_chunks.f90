@@ -15,7 +15,7 @@ module h5_chunks
   implicit none
   private
 
-  public :: h5_chunk_place, h5_reserve_chunk, h5_read_chunk
+  public :: h5_chunk_offset, h5_reserve_chunk, h5_read_chunk
 
   interface
     ! HDF5's Fortran interface lacks these.
@@ -41,44 +41,44 @@ module h5_chunks
       integer(c_int64_t), intent(out) :: size
     end function chunk_size
 
-    integer(c_int) function chunk_info(dataset, corner, filters, place, size) bind(c, name='H5Dget_chunk_info_by_coord')
+    integer(c_int) function chunk_info(dataset, corner, filters, offset, size) bind(c, name='H5Dget_chunk_info_by_coord')
       import :: c_int, c_int32_t, c_int64_t, c_ptr, hid_t
       integer(hid_t), value :: dataset
       type(c_ptr), value :: corner
       integer(c_int32_t), intent(out) :: filters
-      integer(c_int64_t), intent(out) :: place, size
+      integer(c_int64_t), intent(out) :: offset, size
     end function chunk_info
   end interface
 
 contains
 
   !> Where in the file a chunk begins. HDF5 1.10 looks at all chunks before it.
-  subroutine h5_chunk_place(dataset, corner, place, error)
+  subroutine h5_chunk_offset(dataset, corner, offset, error)
     type(h5_dataset_t), intent(in) :: dataset
     integer(int64), intent(in), contiguous, target :: corner(:)
-    integer(int64), intent(out) :: place
+    integer(int64), intent(out) :: offset
     type(error_t), allocatable, intent(out) :: error
     integer(c_int32_t) :: filters
     integer(c_int64_t) :: bytes
     integer :: status
     call trap(dataset%name, dataset%path, endless=.true.)
-    status = chunk_info(dataset%id, c_loc(corner), filters, place, bytes)
+    status = chunk_info(dataset%id, c_loc(corner), filters, offset, bytes)
     call end_guard()
     if (status >= 0 .and. bytes == 0) status = -1
     if (h5_failed(status, 'find a chunk of', dataset%name, dataset%path, error)) return
-  end subroutine h5_chunk_place
+  end subroutine h5_chunk_offset
 
   !> Takes the space of a chunk that no one has written yet, by writing these bytes into it, as they are, and says where that is.
-  subroutine h5_reserve_chunk(file, dataset, corner, bytes, place, error)
+  subroutine h5_reserve_chunk(file, dataset, corner, bytes, offset, error)
     type(h5_file_t), intent(in) :: file
     type(h5_dataset_t), intent(in) :: dataset
     integer(int64), intent(in), contiguous, target :: corner(:)
     integer(int8), intent(in), contiguous, target :: bytes(:)
-    integer(int64), intent(out) :: place
+    integer(int64), intent(out) :: offset
     type(error_t), allocatable, intent(out) :: error
     integer(hsize_t) :: before, after
     integer :: status
-    place = 0
+    offset = 0
     call h5fget_filesize_f(file%id, before, status)
     if (status >= 0) status = write_chunk(dataset%id, H5P_DEFAULT_F, 0_c_int32_t, c_loc(corner), size(bytes, kind=c_size_t), &
                                               c_loc(bytes))
@@ -86,9 +86,9 @@ contains
     if (h5_failed(status, 'write', dataset%name, dataset%path, error)) return
     if (after - before == size(bytes)) then
       ! The file has grown by just that. Asking would take longer with every chunk.
-      place = before
+      offset = before
     else
-      call h5_chunk_place(dataset, corner, place, error)
+      call h5_chunk_offset(dataset, corner, offset, error)
     end if
   end subroutine h5_reserve_chunk
 

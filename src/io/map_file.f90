@@ -329,11 +329,11 @@ contains
     integer, intent(in) :: tile, state
     integer(int64), intent(in) :: value
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: place(1)
-    place = tile - 1
-    call h5_write(self%checksums, bytes_in(type_uint32, [real(value, real64)]), error, place, [1_int64])
+    integer(int64) :: corner(1)
+    corner = tile - 1
+    call h5_write(self%checksums, bytes_in(type_uint32, [real(value, real64)]), error, corner, [1_int64])
     if (allocated(error)) return
-    call h5_write(self%states, [int(state, int8)], error, place, [1_int64])
+    call h5_write(self%states, [int(state, int8)], error, corner, [1_int64])
   end subroutine mark
 
   !> Reads the states of all tiles, and the data of the done ones, shared among the ranks. Tiles that

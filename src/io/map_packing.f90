@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The tiled variables of a map, from the working file into the final one, by all ranks. Each compresses its share of the chunks;
-!> rank 0 learns their lengths alone, takes their places in the file, and each writes its own there. Who does what does not
+!> rank 0 learns their lengths alone, takes their offsets in the file, and each writes its own there. Who does what does not
 !> show: chunks lie in the order of variables and C order.
 module map_packing
   use boxes, only: copy_common
@@ -42,7 +42,7 @@ module map_packing
     integer :: most_chunks = 0
     !> Slabs that this rank checks, numbered over all variables, and length and checksum of their chunks.
     integer(int64), allocatable :: checked(:), expected(:, :)
-    !> Seconds in which rank 0 took the places of chunks, and the others waited.
+    !> Seconds in which rank 0 took the offsets of chunks, and the others waited.
     real(real64), public :: alone = 0
   contains
     procedure :: begin => begin_packing
@@ -136,10 +136,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(part_t) :: parts(self%most_chunks, most_held)
     !> Per chunk its length and its checksum, in one number; the last row: the checksum of the slab's values.
-    integer(int64), allocatable :: words(:, :), places(:, :), flat(:)
+    integer(int64), allocatable :: words(:, :), offsets(:, :), flat(:)
     real(real64) :: begun
     integer :: unit, mine, k
-    allocate (words(self%most_chunks + 1, count), places(self%most_chunks, count), source=0_int64)
+    allocate (words(self%most_chunks + 1, count), offsets(self%most_chunks, count), source=0_int64)
     do unit = 1, count
       if (mod(unit - 1, team%size()) /= team%rank() .or. allocated(error)) cycle
       mine = (unit - 1)/team%size() + 1
@@ -151,13 +151,13 @@ contains
     call team%agree(error)
     if (allocated(error)) return
     begun = monotonic_seconds()
-    if (team%is_root()) call reserve(self, first, words, datasets, new, places, error)
+    if (team%is_root()) call reserve(self, first, words, datasets, new, offsets, error)
     self%alone = self%alone + (monotonic_seconds() - begun)
     call team%agree(error)
     if (allocated(error)) return
-    flat = reshape(places, [size(places)])
+    flat = reshape(offsets, [size(offsets)])
     call team%broadcast(flat)
-    places = reshape(flat, shape(places))
+    offsets = reshape(flat, shape(offsets))
     do unit = 1, count
       call note_checksum(self, first + unit - 1, words(:, unit))
       ! What one has written another one reads back.
@@ -165,7 +165,7 @@ contains
       if (mod(unit - 1, team%size()) /= team%rank()) cycle
       do k = 1, self%most_chunks
         if (words(k, unit) == 0) cycle
-        if (.not. allocated(error)) call file%write(parts(k, (unit - 1)/team%size() + 1)%bytes, places(k, unit), error)
+        if (.not. allocated(error)) call file%write(parts(k, (unit - 1)/team%size() + 1)%bytes, offsets(k, unit), error)
       end do
     end do
     call team%agree(error)
@@ -207,13 +207,13 @@ contains
     bytes_in = ishft(word, -32)
   end function bytes_in
 
-  !> Takes the places of the chunks of a round, in order.
-  subroutine reserve(self, first, words, datasets, new, places, error)
+  !> Takes the offsets of the chunks of a round, in order.
+  subroutine reserve(self, first, words, datasets, new, offsets, error)
     class(packing_t), intent(in) :: self
     integer(int64), intent(in) :: first, words(:, :)
     type(h5_dataset_t), intent(in) :: datasets(:)
     type(h5_file_t), intent(in) :: new
-    integer(int64), intent(inout) :: places(:, :)
+    integer(int64), intent(inout) :: offsets(:, :)
     type(error_t), allocatable, intent(out) :: error
     integer(int64), dimension(size(self%lengths)) :: lower, extent
     integer(int8), allocatable :: nothing(:)
@@ -223,7 +223,7 @@ contains
       call self%slab_of(first + unit - 1, variable, lower, extent)
       do k = 1, int(chunk_count(self%chunk, extent))
         call h5_reserve_chunk(new, datasets(variable), chunk_corner(self%chunk, lower, extent, k), &
-                              nothing(:bytes_in(words(k, unit))), places(k, unit), error)
+                              nothing(:bytes_in(words(k, unit))), offsets(k, unit), error)
         if (allocated(error)) return
       end do
     end do

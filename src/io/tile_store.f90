@@ -8,7 +8,7 @@ module tile_store
   use byte_file, only: byte_file_t
   use errors, only: error_t, fail
   use h5, only: h5_dataset_t
-  use h5_chunks, only: h5_chunk_place
+  use h5_chunks, only: h5_chunk_offset
   use kinds, only: int64, int8
   use status, only: exit_io
   use tiles, only: tiling_t
@@ -47,12 +47,12 @@ contains
     do i = 1, size(datasets)
       self%width(i) = bytes_of(datasets(i)%type)
       corner = 0
-      call h5_chunk_place(datasets(i), corner, self%first(i), error)
+      call h5_chunk_offset(datasets(i), corner, self%first(i), error)
       if (allocated(error)) return
       corner = (tiling%lengths - 1)/tiling%shape*tiling%shape
-      call h5_chunk_place(datasets(i), corner, place, error)
+      call h5_chunk_offset(datasets(i), corner, place, error)
       if (allocated(error)) return
-      if (place == place_of(self, i, tiling%count())) cycle
+      if (place == offset_of(self, i, tiling%count())) cycle
       call fail(error, exit_io, 'the tiles of '''//datasets(i)%name//''' in '''//datasets(i)%path// &
                 ''' do not lie one after the other')
       return
@@ -76,11 +76,11 @@ contains
   end subroutine close_store
 
   !> Where in the file a tile (from 1) of a variable begins.
-  pure integer(int64) function place_of(self, variable, tile)
+  pure integer(int64) function offset_of(self, variable, tile)
     class(tile_store_t), intent(in) :: self
     integer, intent(in) :: variable, tile
-    place_of = self%first(variable) + (tile - 1)*product(self%tiling%shape)*self%width(variable)
-  end function place_of
+    offset_of = self%first(variable) + (tile - 1)*product(self%tiling%shape)*self%width(variable)
+  end function offset_of
 
   !> The bytes of a tile's values, in the C order of the tile. Code 74.
   subroutine read_tile(self, variable, tile, bytes, error)
@@ -92,7 +92,7 @@ contains
     integer(int8), allocatable :: stored(:)
     call self%tiling%block_of(tile, lower, extent)
     allocate (stored(product(self%tiling%shape)*self%width(variable)))
-    call self%file%read(stored, place_of(self, variable, tile), error)
+    call self%file%read(stored, offset_of(self, variable, tile), error)
     if (allocated(error)) return
     if (all(extent == self%tiling%shape)) then
       call move_alloc(stored, bytes)
@@ -140,7 +140,7 @@ contains
       tile_bytes = product(tiling%shape)*self%width(variable)
       number = tiling%number_at(place)
       allocate (stored((last - place(size(place)) + 1)*tile_bytes))
-      call self%file%read(stored, place_of(self, variable, int(number)), error)
+      call self%file%read(stored, offset_of(self, variable, int(number)), error)
       if (allocated(error)) return
       do i = 0, last - place(size(place))
         corner = place*tiling%shape

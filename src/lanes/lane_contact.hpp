@@ -19,16 +19,16 @@ const double contact_shrinking = 1.4;
 const double shortest_share = 1e-9;
 
 // Coefficients in sigma: u, position, velocity, time since the start of the step; with tables those of the
-// stretch and of the factor of dry friction, too.
+// extension and of the factor of dry friction, too.
 struct contact_expansion {
-  vec u[order + 1], x[order], v[order], time[order + 1], stretch[order], factor[order];
+  vec u[order + 1], x[order], v[order], time[order + 1], extension[order], factor[order];
 };
 
 // The side that is pressed: 1 above, -1 below.
-LANE_DEVICE inline vec side_of(const lane_group &g) { return pick(g.place < 1.5, vec(1.0), vec(-1.0)); }
+LANE_DEVICE inline vec side_of(const lane_group &g) { return pick(g.pressed_on < 1.5, vec(1.0), vec(-1.0)); }
 
 LANE_DEVICE inline vec surface_of(const lane_machine &m, const lane_group &g) {
-  return pick(g.place < 1.5, vec(m.upper), vec(m.lower));
+  return pick(g.pressed_on < 1.5, vec(m.upper), vec(m.lower));
 }
 
 // Damping of the law of a contact.
@@ -116,7 +116,7 @@ LANE_DEVICE inline void expand_contact(const lane_machine &m, const lane_group &
   p.time[order] = (2.0 / order) * p.u[order - 1];
   if (m.law.has_tables > 0) {
     p.x[order - 1] = side * square_of(p.u, order - 1);
-    others.keep(p.x, p.stretch, p.factor);
+    others.keep(p.x, p.extension, p.factor);
   }
 }
 
@@ -293,7 +293,7 @@ LANE_DEVICE inline mask take_contact_events(const lane_machine &m, const table_p
   put(g.x, due, x);
   put(g.v, due, pick(turns, 0, v));
   put(g.direction, turns, -g.direction);
-  put(g.place, leaves, 0);
+  put(g.pressed_on, leaves, 0);
   return rare;
 }
 
@@ -356,7 +356,7 @@ LANE_DEVICE void fly_in_series(const lane_machine &m, const lane_regions &region
   vec limit = m.stride, contact_limit = 1e300;
   int rounds = 0;
   while (any(sent) && !any(sent & (g.status != lane_flying)) && !is_due_back(rounds)) {
-    mask pressed = sent & (g.place > 0.5), left = {};
+    mask pressed = sent & (g.pressed_on > 0.5), left = {};
     if (contacts_first(pressed, sent)) {
       mask there = press_on(m, pressed, contact_limit, left, g, along);
       put(g.status, left, lane_left);

@@ -39,9 +39,9 @@ module lane_gpu
       character(kind=c_char), intent(out) :: message(size)
     end function separatrix_gpu_count
 
-    integer(c_int) function separatrix_gpu_number(place) bind(c)
+    integer(c_int) function separatrix_gpu_number(index) bind(c)
       import :: c_int
-      integer(c_int), value :: place
+      integer(c_int), value :: index
     end function separatrix_gpu_number
 
     subroutine separatrix_gpu_name(device, text, size) bind(c)
@@ -95,10 +95,10 @@ contains
     why = text_of(message)
   end subroutine count_gpus
 
-  !> The number that CUDA gives to the GPU at `place` of those counted, from 0; the others take it.
-  integer function gpu_number(place)
-    integer, intent(in) :: place
-    gpu_number = separatrix_gpu_number(int(place, c_int))
+  !> The number that CUDA gives to the GPU at `index` of those counted, from 0; the others take it.
+  integer function gpu_number(index)
+    integer, intent(in) :: index
+    gpu_number = separatrix_gpu_number(int(index, c_int))
   end function gpu_number
 
   !> What its maker calls a GPU.
@@ -125,16 +125,16 @@ contains
     type(gpu_half_t), intent(out) :: halves(2)
     type(error_t), allocatable, intent(out) :: error
     character(kind=c_char) :: message(message_size)
-    type(c_ptr) :: places(2)
+    type(c_ptr) :: pointers(2)
     integer(c_int64_t) :: batches
     integer :: i
-    if (separatrix_gpu_open(int(device, c_int), int(wanted, c_int64_t), places, batches, message, &
+    if (separatrix_gpu_open(int(device, c_int), int(wanted, c_int64_t), pointers, batches, message, &
                             int(message_size, c_int)) /= 0) then
       call fail(error, exit_resumable, text_of(message))
       return
     end if
     do i = 1, 2
-      call c_f_pointer(places(i), halves(i)%batches, [int(batches, int64)])
+      call c_f_pointer(pointers(i), halves(i)%batches, [int(batches, int64)])
     end do
   end subroutine open_gpu
 

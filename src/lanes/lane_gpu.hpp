@@ -132,10 +132,10 @@ int gpu_count(char *message, int size) {
   return count;
 }
 
-int gpu_number(int place) {
+int gpu_number(int index) {
   int seen;
   cudaError_t error;
-  return gpu_usable(seen, error).at(place);
+  return gpu_usable(seen, error).at(index);
 }
 
 void gpu_name(int device, char *text, int size) {

@@ -33,7 +33,7 @@ static const lane_gpu *gpu(void) {
 
 int separatrix_gpu_count(char *message, int size) { return gpu()->count(message, size); }
 
-int separatrix_gpu_number(int place) { return gpu()->number(place); }
+int separatrix_gpu_number(int index) { return gpu()->number(index); }
 
 void separatrix_gpu_name(int device, char *text, int size) { gpu()->name(device, text, size); }
 

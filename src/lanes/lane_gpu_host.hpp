@@ -40,11 +40,11 @@ struct cudaDeviceProp {
 // What is still to do.
 typedef std::vector<std::function<void()>> *cudaStream_t;
 
-struct gpu_place {
+struct gpu_index {
   int64_t x;
 };
 
-gpu_place blockIdx, blockDim, threadIdx;
+gpu_index blockIdx, blockDim, threadIdx;
 
 cudaError_t made_call() {
   static const char *asked = getenv("SEPARATRIX_GPU_FAULT");

@@ -388,7 +388,7 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
     mask passed = {};
     flying = sent;
     while (any(flying) && !is_due_back(rounds)) {
-      mask pressed = in_series ? flying & (g.place > 0.5) : mask{}, left = {};
+      mask pressed = in_series ? flying & (g.pressed_on > 0.5) : mask{}, left = {};
       if (in_series && contacts_first(pressed, flying)) {
         mask there = press_on(m, pressed, limit, left, g, along);
         if (any(there))
@@ -396,12 +396,12 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
         passed = passed | there;
         flying = flying & ~left & ~there;
         put(g.status, left, lane_left);
-        put(g.status, flying & pressed & (g.place < 0.5), lane_fresh);
+        put(g.status, flying & pressed & (g.pressed_on < 0.5), lane_fresh);
       } else {
         mask free = flying & ~pressed, seek = free & (g.found < 0.5);
         if (any(seek))
           left = look_ahead<true, false>(f, seek, g.direction > 0.0, f.barrier, g);
-        // Friction that has dropped to zero stays there. A slip has it where either end has, as its place does
+        // Friction that has dropped to zero stays there. A slip has it where either end has, as its position does
         // not turn round.
         if (m.friction_slope != 0)
           left = left | (seek & ((1.0 + m.friction_slope * g.x <= 0.0) |

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // Machines whose equation is linear in every mode of slip, but not the same in all: barriers that are springs
-// with dampers, friction that differs by direction or changes with the place. Each lane has the coefficients
+// with dampers, friction that differs by direction or changes with the position. Each lane has the coefficients
 // of the mode it is in; the search for events and its proof are those of the plain machine.
 #ifndef SEPARATRIX_LANE_MODES_HPP
 #define SEPARATRIX_LANE_MODES_HPP
@@ -31,7 +31,7 @@ struct lane_modes {
     for (int k = 0; k < lane_modes_count; k++) {
       const lane_mode &t = machine.mode[k];
       const double heading = k % 2 == 0 ? 1 : -1;
-      mask in = changed & (g.place == k / 2) & (g.direction == heading);
+      mask in = changed & (g.pressed_on == k / 2) & (g.direction == heading);
       if (!any(in))
         continue;
       put(natural, in, t.natural);
@@ -73,18 +73,18 @@ LANE_DEVICE inline mask leaves_for_good(const lane_modes &f, const lane_group &g
 LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_group &g) {
   const lane_machine &m = f.machine;
   mask hit = g.hits > 0.5, impact = hit & (f.leads_to < 0.0), passage = hit & (f.leads_to >= 0.0);
-  mask free = g.place < 0.5;
+  mask free = g.pressed_on < 0.5;
   vec w = g.direction * g.end_v, gap = g.direction * (f.barrier - g.end_x);
-  vec place = f.origin + pick(hit & (f.lead <= 0.0), f.barrier, g.end_x);
-  vec factor = 1.0 + m.friction_slope * place;
+  vec pressed_on = f.origin + pick(hit & (f.lead <= 0.0), f.barrier, g.end_x);
+  vec factor = 1.0 + m.friction_slope * pressed_on;
   vec push = -g.direction * g.end_a - m.kinetic * factor;
   vec restitution = m.restitution;
   if (any(due & impact))
     restitution = restitution_at(m, w);
-  mask turns_back = (push > m.break_away * factor) & (~free | ((place < m.upper) & (place > m.lower)));
+  mask turns_back = (push > m.break_away * factor) & (~free | ((pressed_on < m.upper) & (pressed_on > m.lower)));
   mask passes = (w > 0.0) & leaves_for_good(f, g, w);
   mask plain = pick(impact, restitution * w > m.slow, pick(passage, passes, turns_back)) &
-               (magnitude(place) < m.domain) & (factor > 0.0);
+               (magnitude(pressed_on) < m.domain) & (factor > 0.0);
   mask rare = due & ~plain;
   due = due & plain;
   mask up = due & free & (g.direction > 0.0), down = due & free & (g.direction < 0.0);
@@ -100,11 +100,11 @@ LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_gro
   put(g.last_speed, struck, w);
   put(g.margin, due & ~hit & free & (gap < g.margin), gap);
   put(g.time, due, g.start + g.span);
-  put(g.x, due, place);
+  put(g.x, due, pressed_on);
   put(g.v, due, pick(passage, g.end_v, pick(impact, -restitution * g.end_v, 0)));
   put(g.direction, due & ~passage, -g.direction);
   put(g.touch, due & passage & free, w);
-  put(g.place, due & passage, f.leads_to);
+  put(g.pressed_on, due & passage, f.leads_to);
   put(g.status, due, lane_fresh);
   return rare;
 }
@@ -112,7 +112,7 @@ LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_gro
 // The same with what rides along. Out of a barrier, its surface is the origin.
 template <class rider>
 LANE_DEVICE inline mask pass_mode_events(const lane_modes &f, mask due, lane_group &g, rider &along) {
-  const mask hit = g.hits > 0.5, passage = hit & (f.leads_to >= 0.0), free = g.place < 0.5;
+  const mask hit = g.hits > 0.5, passage = hit & (f.leads_to >= 0.0), free = g.pressed_on < 0.5;
   const vec heading = g.direction;
   along.flown(due, g.start + g.span, closed_motion<true, lane_modes>{f, g});
   const mask rare = take_mode_events(f, due, g), taken = due & ~rare;

@@ -17,7 +17,7 @@ typedef lane_fields<vec> lane_group;
 
 enum {
   members = sizeof(lane_batch::fields) / sizeof(double[lanes]),
-  plain_members = offsetof(lane_fields<double[lanes]>, place) / sizeof(double[lanes])
+  plain_members = offsetof(lane_fields<double[lanes]>, pressed_on) / sizeof(double[lanes])
 };
 
 template <bool all> LANE_DEVICE inline void load(const lane_batch &batch, int first, lane_group &g) {

@@ -10,8 +10,9 @@ module lane_preparation
   use exact_flow, only: largest_damping_ratio
   use kinds, only: wp
   use lane_curve, only: restitution_curve_of
-  use lane_types, only: contact_series_t, factor_over_place, lane_flow_t, law_t, layer_nodes, machine_t, mode_t, most_harmonics, &
-    over_place, over_play, over_speed, over_speed_downwards, over_stretch, series_order, table_t
+  use lane_types, only: contact_series_t, factor_over_position, lane_flow_t, law_t, layer_nodes, machine_t, mode_t, &
+    most_harmonics, &
+    over_position, over_play, over_speed, over_speed_downwards, over_extension, series_order, table_t
   use layer_transit, only: gauss
   use motion, only: motion_t
   use motion_state, only: flight_adaptive
@@ -102,11 +103,11 @@ contains
   end subroutine prepare_plain
 
   !> One equation for each mode of slip: a barrier that is a spring with a damper, friction that depends on the direction or
-  !> linearly on the place.
+  !> linearly on the position.
   pure subroutine prepare_modes(moving, flow)
     type(motion_t), intent(in) :: moving
     type(lane_flow_t), intent(inout) :: flow
-    integer :: place, direction
+    integer :: pressed_on, direction
     associate (law => moving%machine, m => flow%machine)
       flow%available = has_linear_modes(law) .and. moving%options%flight /= flight_adaptive
       if (.not. flow%available) return
@@ -123,17 +124,17 @@ contains
         if (.not. flow%available) return
       end if
       m%force_rate = law%natural_frequency**2*law%foot_speed_bound
-      do place = 0, 2
-        if (place > 0 .and. .not. law%contact%kind == contact_kelvin_voigt) cycle
-        if (abs(surface_of(law, place)) >= huge(1.0_wp)) cycle
+      do pressed_on = 0, 2
+        if (pressed_on > 0 .and. .not. law%contact%kind == contact_kelvin_voigt) cycle
+        if (abs(surface_of(law, pressed_on)) >= huge(1.0_wp)) cycle
         do direction = -1, 1, 2
-          call set_mode(law, place, direction, m, m%mode(2*place + (1 - direction)/2), flow%available)
+          call set_mode(law, pressed_on, direction, m, m%mode(2*pressed_on + (1 - direction)/2), flow%available)
         end do
       end do
     end associate
   end subroutine prepare_modes
 
-  !> Whether the force on a slipping body is linear in place and speed, in every mode.
+  !> Whether the force on a slipping body is linear in position and speed, in every mode.
   pure logical function has_linear_modes(law) result(linear)
     type(oscillator_t), intent(in) :: law
     associate (effects => law%effects)
@@ -146,26 +147,26 @@ contains
     end associate
   end function has_linear_modes
 
-  !> The surface [m] that a body in `place` presses on (0: none, and zero), as in lane_types.hpp.
-  pure real(wp) function surface_of(law, place)
+  !> The surface [m] that a body in `pressed_on` presses on (0: none, and zero), as in lane_types.hpp.
+  pure real(wp) function surface_of(law, pressed_on)
     type(oscillator_t), intent(in) :: law
-    integer, intent(in) :: place
+    integer, intent(in) :: pressed_on
     surface_of = 0
-    if (place == 1) surface_of = law%contact%soft_upper
-    if (place == 2) surface_of = law%contact%soft_lower
+    if (pressed_on == 1) surface_of = law%contact%soft_upper
+    if (pressed_on == 2) surface_of = law%contact%soft_lower
   end function surface_of
 
-  !> The mode of a slip in `direction` +1 or -1 in `place`. `available` becomes false where it has no closed form for lanes.
-  pure subroutine set_mode(law, place, direction, m, mode, available)
+  !> The mode of a slip in `direction` +1 or -1 in `pressed_on`. `available` becomes false where it has no closed form for lanes.
+  pure subroutine set_mode(law, pressed_on, direction, m, mode, available)
     type(oscillator_t), intent(in) :: law
-    integer, intent(in) :: place, direction
+    integer, intent(in) :: pressed_on, direction
     type(machine_t), intent(in) :: m
     type(mode_t), intent(inout) :: mode
     logical, intent(inout) :: available
     real(wp) :: stiffness, damping, force, pressing, fastest
     logical :: leaving
-    mode%origin = surface_of(law, place)
-    pressing = merge(1, 0, place > 0)
+    mode%origin = surface_of(law, pressed_on)
+    pressing = merge(1, 0, pressed_on > 0)
     associate (dry => direction*law%friction%kinetic, effects => law%effects)
       stiffness = law%restoring%stiffness + pressing*law%contact%stiffness + dry*effects%friction_slope
       damping = law%friction%damping + pressing*law%contact%damping + direction*effects%asymmetric_viscous
@@ -182,10 +183,10 @@ contains
     if (.not. available) return
     mode%rest = force/stiffness
     mode%damped = sqrt((mode%natural - mode%decay)*(mode%natural + mode%decay))
-    leaving = (place == 1 .and. direction < 0) .or. (place == 2 .and. direction > 0)
+    leaving = (pressed_on == 1 .and. direction < 0) .or. (pressed_on == 2 .and. direction > 0)
     mode%barrier = merge(m%upper, m%lower, direction > 0)
     mode%leads_to = merge((3 - direction)/2, -1, law%contact%soft)
-    if (place > 0) then
+    if (pressed_on > 0) then
       mode%barrier = merge(0.0_wp, direction*huge(1.0_wp), leaving)
       mode%leads_to = 0
       mode%guess = half_pi/mode%damped
@@ -229,10 +230,10 @@ contains
       layer%speed = -law%stribeck_velocity*lengths(delta)*logarithm(q)
       share = exponential(-(layer%speed/law%stribeck_velocity)**delta)
       layer%force = layer%excess*share
-      associate (stretch => law%stribeck_velocity*lengths(delta)*0.5_wp*(1 - last)/q)
-        layer%weight = stretch*weight
+      associate (extension => law%stribeck_velocity*lengths(delta)*0.5_wp*(1 - last)/q)
+        layer%weight = extension*weight
         do j = 1, layer_nodes
-          layer%from_rest(:, j) = stretch(j)*integral(:, j)
+          layer%from_rest(:, j) = extension(j)*integral(:, j)
           layer%from_edge(:, j) = layer%weight(j) - layer%from_rest(:, j)
         end do
       end associate
@@ -334,9 +335,9 @@ contains
     type(effects_t), intent(in) :: effects
     type(law_t), intent(inout) :: law
     law%has_tables = 1
-    law%table(over_stretch) = table_of(effects%spring, law%inverse_mass)
-    law%table(over_place) = table_of(effects%force, law%inverse_mass)
-    law%table(factor_over_place) = table_of(effects%over_place, 1.0_wp)
+    law%table(over_extension) = table_of(effects%spring, law%inverse_mass)
+    law%table(over_position) = table_of(effects%force, law%inverse_mass)
+    law%table(factor_over_position) = table_of(effects%over_position, 1.0_wp)
     law%table(over_play) = table_of(effects%play, effects%series_stiffness*law%inverse_mass)
     law%table(over_speed) = table_of(effects%upwards, law%inverse_mass)
     law%table(over_speed_downwards) = table_of(effects%downwards, law%inverse_mass)

@@ -47,16 +47,16 @@ public:
       cross_surface(flying & (released_at < for_ever), known);
     mask due = flying & (upcoming < end);
     while (any(due)) {
-      vec place, speed;
-      known.at(upcoming, due, place, speed);
-      double is_due[vec_size], places[vec_size], speeds[vec_size];
+      vec position, speed;
+      known.at(upcoming, due, position, speed);
+      double is_due[vec_size], positions[vec_size], speeds[vec_size];
       to_array(pick(due, vec(1.0), vec{}), is_due);
-      to_array(place, places);
+      to_array(position, positions);
       to_array(speed, speeds);
       for (int i = 0; i < vec_size; i++) {
         if (!(is_due[i] > 0))
           continue;
-        *x[i]++ = places[i];
+        *x[i]++ = positions[i];
         *v[i]++ = speeds[i];
         next[i] = ++times[i] < left[i] ? *times[i] : for_ever;
         ++*taken[i];
@@ -108,12 +108,12 @@ private:
   // The speed of the lanes `out`, whose flight is known, at the surface that they come to, if they do so
   // before their last sample.
   template <class motion> LANE_DEVICE inline void cross_surface(mask out, const motion &known) {
-    vec time = released_at, place, speed;
+    vec time = released_at, position, speed;
     for (int round = 0; round < most_crossing_rounds; round++) {
-      known.at(time, out, place, speed);
-      time -= (place - surface) / speed;
+      known.at(time, out, position, speed);
+      time -= (position - surface) / speed;
     }
-    known.at(time, out, place, speed);
+    known.at(time, out, position, speed);
     came_off(out & (time <= last), magnitude(speed));
     put(released_at, out, for_ever);
   }

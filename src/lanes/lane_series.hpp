@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // Machines without a closed form, by Taylor series over the lanes: cubic springs, free play and pendulums,
-// drag, friction that depends on speed or place, Dahl's friction, tables. Every step expands the motion to a
+// drag, friction that depends on speed or position, Dahl's friction, tables. Every step expands the motion to a
 // fixed order by recurrences; its length follows from the last coefficients (Jorba & Zou 2005). Events are
 // roots of the polynomials; that nothing comes before them is proven by the Bernstein coefficients of the
 // velocity.
@@ -20,9 +20,9 @@ enum { order = series_order, most_root_rounds = 30 };
 const double shrinking = 1.75;
 
 // Coefficients of position and velocity in the time since the start of a step, with tables those of the
-// stretch and of the factor of dry friction, too.
+// extension and of the factor of dry friction, too.
 struct expansion {
-  vec x[order + 1], v[order], stretch[order], factor[order];
+  vec x[order + 1], v[order], extension[order], factor[order];
 };
 
 // The pieces of a table that the lanes are in: see lane_tables.hpp.
@@ -132,7 +132,7 @@ struct table_series {
 
 // The acceleration of a body that slips as `direction` says, by everything but a soft barrier, as a series.
 struct force_series {
-  vec stretch[order], square[order], turn[order], sine[order], cosine[order], dry[order], behind[order],
+  vec extension[order], square[order], turn[order], sine[order], cosine[order], dry[order], behind[order],
       factor[order], speed_square[order];
   excess_series excess[2];
   table_series table[tables];
@@ -145,30 +145,30 @@ struct force_series {
     const lane_law &l = m.law;
     const bool excessive = l.excess[0] > 0 || l.excess[1] > 0;
     const vec d = g.direction, viscous = l.viscous + l.asymmetric_viscous * d;
-    stretch[k] = foot - x[k];
+    extension[k] = foot - x[k];
     if (k == 0)
-      stretch[0] += l.length;
-    vec a = l.stiffness * stretch[k] - viscous * v[k];
+      extension[0] += l.length;
+    vec a = l.stiffness * extension[k] - viscous * v[k];
     if (l.pendulum != 0) {
       if (k == 0)
-        sine_cosine(stretch[0], sine[0], cosine[0]);
+        sine_cosine(extension[0], sine[0], cosine[0]);
       else {
-        turn[k] = double(k) * stretch[k];
+        turn[k] = double(k) * extension[k];
         sine[k] = chain(turn, cosine, k);
         cosine[k] = -chain(turn, sine, k);
       }
       a += l.pendulum * sine[k];
     }
     if (l.cubic != 0) {
-      square[k] = square_of(stretch, k);
-      a += l.cubic * product(square, stretch, k);
+      square[k] = square_of(extension, k);
+      a += l.cubic * product(square, extension, k);
     }
-    if (l.table[over_stretch].knots > 0)
-      a += table[over_stretch].next<3>(pieces[over_stretch], stretch[k], k);
+    if (l.table[over_extension].knots > 0)
+      a += table[over_extension].next<3>(pieces[over_extension], extension[k], k);
     if (l.table[over_play].knots > 0)
-      a += table[over_play].next<2>(pieces[over_play], stretch[k], k);
-    if (l.table[over_place].knots > 0)
-      a += table[over_place].next<3>(pieces[over_place], x[k], k);
+      a += table[over_play].next<2>(pieces[over_play], extension[k], k);
+    if (l.table[over_position].knots > 0)
+      a += table[over_position].next<3>(pieces[over_position], x[k], k);
     if (l.table[over_speed].knots > 0)
       a -= d * table[over_speed].next<3>(pieces[over_speed], d * v[k], k);
     if (l.quadratic != 0 || l.cubic_damping != 0)
@@ -196,20 +196,20 @@ struct force_series {
       factor[0] += 1.0;
       a += l.offset;
     }
-    if (l.table[factor_over_place].knots > 0)
-      factor[k] += table[factor_over_place].next<3>(pieces[factor_over_place], x[k], k);
+    if (l.table[factor_over_position].knots > 0)
+      factor[k] += table[factor_over_position].next<3>(pieces[factor_over_position], x[k], k);
     else if (!(m.friction_slope != 0))
       return a - dry[k];
     return a - product(factor, dry, k);
   }
 
   // Stretch and factor of dry friction where `x` has one coefficient more than they have.
-  LANE_DEVICE inline void keep(const vec *x, vec *all_stretch, vec *all_factor) const {
+  LANE_DEVICE inline void keep(const vec *x, vec *all_extension, vec *all_factor) const {
     for (int k = 0; k < order - 1; k++) {
-      all_stretch[k] = stretch[k];
+      all_extension[k] = extension[k];
       all_factor[k] = factor[k];
     }
-    all_stretch[order - 1] = -x[order - 1];
+    all_extension[order - 1] = -x[order - 1];
     all_factor[order - 1] = {};
   }
 };
@@ -230,7 +230,7 @@ LANE_DEVICE inline void expand(const lane_machine &m, const lane_group &g, const
   }
   p.x[order] = (1.0 / order) * p.v[order - 1];
   if (m.law.has_tables > 0)
-    forces.keep(p.x, p.stretch, p.factor);
+    forces.keep(p.x, p.extension, p.factor);
 }
 
 // Length of a step over which the terms shrink so. The last few are asked, as one may happen to be small.
@@ -430,8 +430,8 @@ LANE_DEVICE inline turning_forces forces_at_turn(const lane_machine &m, const ta
                                                  vec a, vec direction) {
   turning_forces t;
   t.factor = 1.0 + m.friction_slope * x;
-  if (m.law.table[factor_over_place].knots > 0)
-    t.factor += value_in(pieces[factor_over_place], x);
+  if (m.law.table[factor_over_position].knots > 0)
+    t.factor += value_in(pieces[factor_over_position], x);
   t.push = -direction * a - m.law.rest_friction * t.factor;
   t.holds = m.break_away * t.factor;
   if (m.law.table[over_speed].knots > 0) {
@@ -478,7 +478,7 @@ LANE_DEVICE inline mask take_series_events(const lane_machine &m, const table_pi
   put(g.x, due, pick(hits, barrier, x));
   if (soft) {
     put(g.touch, hits, w);
-    put(g.place, hits, pick(g.direction > 0.0, vec(1.0), vec(2.0)));
+    put(g.pressed_on, hits, pick(g.direction > 0.0, vec(1.0), vec(2.0)));
     put(g.v, due, pick(turns, 0, v));
     put(g.direction, turns, -g.direction);
   } else {

@@ -42,7 +42,7 @@ LANE_DEVICE inline vec attractors_reached(const lane_regions &regions, vec x, ve
   vec reached = {};
   for (int i = regions.count - 1; i >= 0; i--) {
     const lane_region &r = regions.region[i];
-    vec dx = (x - r.x) * r.stretch_x, dv = (v - r.v) * r.stretch_v;
+    vec dx = (x - r.x) * r.scaling_x, dv = (v - r.v) * r.scaling_v;
     vec square = r.metric_xx * dx * dx + 2 * r.metric_xv * dv * dx + r.metric_vv * dv * dv;
     put(reached, square <= r.reach, r.attractor);
   }

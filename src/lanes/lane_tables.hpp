@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Forces that a table gives over the stretch, the place or the speed: a cubic between two knots. A step of a
+// Forces that a table gives over the extension, the position or the speed: a cubic between two knots. A step of a
 // series knows one piece of each table; it ends where a lane leaves that.
 #ifndef SEPARATRIX_LANE_TABLES_HPP
 #define SEPARATRIX_LANE_TABLES_HPP
@@ -27,18 +27,18 @@ LANE_DEVICE inline void find_piece(const lane_table &t, mask asked, vec u, table
 LANE_DEVICE inline void find_pieces(const lane_machine &m, const lane_group &g, table_piece *pieces) {
   vec foot, speed = g.direction * g.v;
   mask upward = g.direction > 0.0;
-  if (m.law.table[over_stretch].knots > 0 || m.law.table[over_play].knots > 0) {
+  if (m.law.table[over_extension].knots > 0 || m.law.table[over_play].knots > 0) {
     expand_foot(m, g.time, 1, &foot);
-    vec stretch = foot - g.x + m.law.length;
-    if (m.law.table[over_stretch].knots > 0)
-      find_piece(m.law.table[over_stretch], ~mask{}, stretch, pieces[over_stretch]);
+    vec extension = foot - g.x + m.law.length;
+    if (m.law.table[over_extension].knots > 0)
+      find_piece(m.law.table[over_extension], ~mask{}, extension, pieces[over_extension]);
     if (m.law.table[over_play].knots > 0)
-      find_piece(m.law.table[over_play], ~mask{}, stretch, pieces[over_play]);
+      find_piece(m.law.table[over_play], ~mask{}, extension, pieces[over_play]);
   }
-  if (m.law.table[over_place].knots > 0)
-    find_piece(m.law.table[over_place], ~mask{}, g.x, pieces[over_place]);
-  if (m.law.table[factor_over_place].knots > 0)
-    find_piece(m.law.table[factor_over_place], ~mask{}, g.x, pieces[factor_over_place]);
+  if (m.law.table[over_position].knots > 0)
+    find_piece(m.law.table[over_position], ~mask{}, g.x, pieces[over_position]);
+  if (m.law.table[factor_over_position].knots > 0)
+    find_piece(m.law.table[factor_over_position], ~mask{}, g.x, pieces[factor_over_position]);
   if (m.law.table[over_speed].knots > 0) {
     find_piece(m.law.table[over_speed], upward, speed, pieces[over_speed]);
     find_piece(m.law.table[over_speed_downwards], ~upward, speed, pieces[over_speed]);
@@ -85,14 +85,14 @@ template <class series>
 LANE_DEVICE inline mask keep_in_pieces(const lane_machine &m, const lane_group &g, const table_piece *pieces,
                                        const series &p, mask asked, vec &length) {
   mask kept = ~mask{};
-  if (m.law.table[over_stretch].knots > 0)
-    kept = kept & keep_in_piece(p.stretch, pieces[over_stretch], asked, length);
+  if (m.law.table[over_extension].knots > 0)
+    kept = kept & keep_in_piece(p.extension, pieces[over_extension], asked, length);
   if (m.law.table[over_play].knots > 0)
-    kept = kept & keep_in_piece(p.stretch, pieces[over_play], asked, length);
-  if (m.law.table[over_place].knots > 0)
-    kept = kept & keep_in_piece(p.x, pieces[over_place], asked, length);
-  if (m.law.table[factor_over_place].knots > 0) {
-    kept = kept & keep_in_piece(p.x, pieces[factor_over_place], asked, length);
+    kept = kept & keep_in_piece(p.extension, pieces[over_play], asked, length);
+  if (m.law.table[over_position].knots > 0)
+    kept = kept & keep_in_piece(p.x, pieces[over_position], asked, length);
+  if (m.law.table[factor_over_position].knots > 0) {
+    kept = kept & keep_in_piece(p.x, pieces[factor_over_position], asked, length);
     // A factor that has dropped to zero stays there: another law.
     vec factor[order], power = 1.0;
     for (int k = 0; k < order; k++) {

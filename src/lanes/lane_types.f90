@@ -36,9 +36,10 @@ module lane_types
     real(c_double) :: cosine(most_harmonics) = 0, sine(most_harmonics) = 0
   end type mode_t
 
-  !> Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction over the speed
-  !> upwards and downwards, free play over the stretch.
-  integer, parameter, public :: over_stretch = 1, over_place = 2, factor_over_place = 3, over_speed = 4, over_speed_downwards = 5, &
+  !> Tables of a force: over the extension, over the position, the factor of dry friction over the position, friction over the
+  !> speed upwards and downwards, free play over the extension.
+  integer, parameter, public :: over_extension = 1, over_position = 2, factor_over_position = 3, over_speed = 4, &
+    over_speed_downwards = 5, &
     over_play = 6, tables = 6
 
   !> Mirrors `lane_table` of lane_types.hpp.
@@ -85,7 +86,7 @@ module lane_types
 
   !> Mirrors `lane_region` of lane_types.hpp.
   type, bind(c) :: region_t
-    real(c_double) :: attractor = 0, x = 0, v = 0, stretch_x = 1, stretch_v = 1, metric_xx = 0, metric_xv = 0, metric_vv = 0, &
+    real(c_double) :: attractor = 0, x = 0, v = 0, scaling_x = 1, scaling_v = 1, metric_xx = 0, metric_xv = 0, metric_vv = 0, &
       reach = 0
   end type region_t
 
@@ -101,7 +102,7 @@ module lane_types
       direction = 1, start_v = 0, start_a = 0, start_j = 0, z_re = 0, z_im = 0, up_span = 0, down_span = 0, up_hits = 0, &
       down_hits = 0, found = 0, span = 0, hits = 0, end_x = 0, end_v = 0, end_a = 0, end_j = 0, end_re = 0, end_im = 0, &
       flights = 0, impacts = 0, speed_sum = 0, last_speed = 0, margin = huge(1.0_c_double), sections = 0, &
-      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, reached = 0, settled = -1, place = 0, touch = 0, z = 0, skip = 0, &
+      budget = huge(1.0_c_double), leaves = 0, elapsed = 0, reached = 0, settled = -1, pressed_on = 0, touch = 0, z = 0, skip = 0, &
       reach = 0, reach_v = 0, reach_a = 0, reach_j = 0, end_s = 0
   end type lane_batch_t
 

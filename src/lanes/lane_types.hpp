@@ -16,11 +16,11 @@ enum {
   most_knots = 16,
   // Of the series of machines without a closed form.
   series_order = 18,
-  // Tables of a force: over the stretch, over the place, the factor of dry friction over the place, friction
-  // over the speed upwards and downwards, free play over the stretch.
-  over_stretch = 0,
-  over_place = 1,
-  factor_over_place = 2,
+  // Tables of a force: over the extension, over the pressed_on, the factor of dry friction over the position, friction
+  // over the speed upwards and downwards, free play over the extension.
+  over_extension = 0,
+  over_position = 1,
+  factor_over_position = 2,
   over_speed = 3,
   over_speed_downwards = 4,
   over_play = 5,
@@ -44,11 +44,11 @@ struct lane_layer {
   double first_from_edge[layer_nodes], second_from_edge[layer_nodes];
 };
 
-// A mode of slip of a machine that has several: number 2 place + (0 up, 1 down), place 0 = free, 1 = pressed
+// A mode of slip of a machine that has several: number 2 pressed_on + (0 up, 1 down), pressed_on 0 = free, 1 = pressed
 // on the upper and 2 on the lower barrier. Positions are relative to `origin` [m].
 struct lane_mode {
   double natural, damped, decay, origin, rest;
-  // Where the flight ends unless it turns before, and the place that follows there; -1 = an impact. With a
+  // Where the flight ends unless it turns before, and the position that follows there; -1 = an impact. With a
   // `lead` [s] the end is where that time ahead the position would reach the barrier at the present speed.
   double barrier, leads_to, lead;
   // Duration at which the search for the end begins (0: that of the last flight), and as for the machine.
@@ -71,7 +71,7 @@ struct lane_law {
   double series;
   double stiffness, pendulum, cubic, viscous, asymmetric_viscous, quadratic, cubic_damping, kinetic,
       asymmetric, offset;
-  // Spring without stretch where the foot is at its mean [m].
+  // Spring without extension where the foot is at its mean [m].
   double length;
   // Stribeck excesses, and the speed above which they are nil; all dry friction at rest.
   double excess[2], velocity[2], exponent[2], edge, rest_friction;
@@ -174,7 +174,7 @@ template <class T> struct lane_fields {
   T sections, budget, leaves, elapsed, reached, settled;
   // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
   // lower barrier (2).
-  T place;
+  T pressed_on;
   // Speed of the impact that the contact began with [m/s], 0 if none did.
   T touch;
   // Dahl's friction [N].
@@ -186,9 +186,9 @@ template <class T> struct lane_fields {
 };
 
 // The neighbourhood of a point of an attractor on the section: its points, relative to that one and times
-// `stretch`, have a square below `reach` in the metric.
+// `extension`, have a square below `reach` in the metric.
 struct lane_region {
-  double attractor, x, v, stretch_x, stretch_v, metric_xx, metric_xv, metric_vv, reach;
+  double attractor, x, v, scaling_x, scaling_v, metric_xx, metric_xv, metric_vv, reach;
 };
 
 // What the lanes can be converged by; a point in several belongs to the first. Unless these are all, every
@@ -233,9 +233,9 @@ struct lane_samples {
 // says what has failed.
 struct lane_gpu {
   // Devices that can be used; where there are none, `message` may say why. The number that CUDA gives to the
-  // one at `place` among them, from 0, which the others take.
+  // one at `position` among them, from 0, which the others take.
   int (*count)(char *message, int size);
-  int (*number)(int place);
+  int (*number)(int pressed_on);
   void (*name)(int device, char *text, int size);
   // Makes both halves on a device, of at most `wanted` batches each; `batches`: as many as there are.
   int (*open)(int device, int64_t wanted, lane_batch *halves[2], int64_t *batches, char *message, int size);

@@ -47,7 +47,7 @@ contains
     batch%direction(lane) = merge(1.0_wp, -1.0_wp, state%mode == mode_slip_plus)
     batch%z(lane) = state%z
     batch%touch(lane) = state%touch_speed
-    if (flow%machine%several_modes > 0 .or. flow%machine%law%series > 0) call find_place(flow%machine, lane, batch)
+    if (flow%machine%several_modes > 0 .or. flow%machine%law%series > 0) call find_stop_side(flow%machine, lane, batch)
     if (.not. new) return
     batch%up_span(lane) = 0.4_wp*flow%machine%period
     batch%down_span(lane) = 0.4_wp*flow%machine%period
@@ -56,24 +56,24 @@ contains
   end subroutine occupy_lane
 
   !> Free, or pressed on which barrier. A lane is left where the barrier would have to pull, and where friction has changed sign.
-  pure subroutine find_place(m, lane, batch)
+  pure subroutine find_stop_side(m, lane, batch)
     type(machine_t), intent(in) :: m
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
-    integer :: place
+    integer :: stop_side
     associate (x => batch%x(lane), v => batch%v(lane), up => batch%direction(lane) > 0)
       if (m%friction_slope*x <= -1) batch%status(lane) = lane_left
-      place = 0
+      stop_side = 0
       if (m%contact%stiffness > 0 .or. (m%several_modes > 0 .and. m%mode(0)%leads_to >= 0)) then
-        if (x > m%upper .or. (up .and. x >= m%upper)) place = 1
-        if (x < m%lower .or. (.not. up .and. x <= m%lower)) place = 2
+        if (x > m%upper .or. (up .and. x >= m%upper)) stop_side = 1
+        if (x < m%lower .or. (.not. up .and. x <= m%lower)) stop_side = 2
       end if
-      batch%place(lane) = place
-      if (place == 0 .or. (up .eqv. place == 1)) return
+      batch%pressed_on(lane) = stop_side
+      if (stop_side == 0 .or. (up .eqv. stop_side == 1)) return
       ! On the way out: modes 3 and 4.
-      if (merge(x - m%upper, m%lower - x, place == 1) < m%mode(2 + place)%lead*abs(v)) batch%status(lane) = lane_left
+      if (merge(x - m%upper, m%lower - x, stop_side == 1) < m%mode(2 + stop_side)%lead*abs(v)) batch%status(lane) = lane_left
     end associate
-  end subroutine find_place
+  end subroutine find_stop_side
 
   !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop. Not a function: the
   !> copy of its result, just written, would stall every stop.

@@ -26,13 +26,13 @@ inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh
     if (t.known < 0.5 || !any(in))
       continue;
     unknown = unknown & ~in;
-    vec place[most_coordinates], speed[most_coordinates];
+    vec position[most_coordinates], speed[most_coordinates];
     for (int i = 0; i < z.coordinates; i++) {
-      place[i] = g.s.q[i];
+      position[i] = g.s.q[i];
       speed[i] = g.s.v[i];
       for (int n = 0; n < z.waves; n++) {
         double w = (n + 1) * m.drive_frequency;
-        place[i] -= t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
+        position[i] -= t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
         speed[i] += w * (t.wave_re[n][i] * b.sine[n] + t.wave_im[n][i] * b.cosine[n]);
       }
     }
@@ -41,30 +41,30 @@ inline mask set_amplitudes(const structure_machine &m, const size &z, mask fresh
         continue;
       vec held = {};
       for (int i = 0; i < z.coordinates; i++)
-        held += m.joint[j].row[i] * place[i];
+        held += m.joint[j].row[i] * position[i];
       put(g.s.held[j], in, held);
     }
     for (int i = 0; i < z.coordinates; i++) {
       vec still[most_powers] = {};
       still_of(m, z, t, g.s, i, still);
-      place[i] -= still[0];
+      position[i] -= still[0];
       if (z.powers > 1)
         speed[i] -= still[1];
     }
     for (int d = 0; d < z.drifts; d++) {
       vec b = {}, c = {};
       for (int i = 0; i < z.coordinates; i++) {
-        b += t.place_from_place[i][d] * place[i] + t.place_from_speed[i][d] * speed[i];
+        b += t.position_from_position[i][d] * position[i] + t.position_from_speed[i][d] * speed[i];
         c += t.pace_from_speed[i][d] * speed[i];
       }
-      put(g.s.place[d], in, b);
+      put(g.s.position[d], in, b);
       put(g.s.pace[d], in, c);
     }
     for (int k = 0; k < z.terms; k++) {
       vec re = {}, im = {};
       for (int i = 0; i < z.coordinates; i++) {
-        re += t.from_place_re[i][k] * place[i] + t.from_speed_re[i][k] * speed[i];
-        im += t.from_place_im[i][k] * place[i] + t.from_speed_im[i][k] * speed[i];
+        re += t.from_position_re[i][k] * position[i] + t.from_speed_re[i][k] * speed[i];
+        im += t.from_position_im[i][k] * position[i] + t.from_speed_im[i][k] * speed[i];
       }
       put(g.s.re[k], in, re);
       put(g.s.im[k], in, im);
@@ -203,7 +203,7 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
   const vec moves = moves_of(m, z, g);
   harmonics_at(m, z, g.s.start + g.s.span, b);
   b.elapsed = g.s.span;
-  place_at(m, z, due, g, g.s.end_re, g.s.end_im, b, g.s.q, g.s.v);
+  position_at(m, z, due, g, g.s.end_re, g.s.end_im, b, g.s.q, g.s.v);
   put(g.s.time, due, g.s.start + g.s.span);
   put(g.s.left, due, 0);
   put(g.s.rising, due, 0);
@@ -268,8 +268,8 @@ inline vec attractors_reached(const size &z, const structure_batch &batch, const
     const structure_region &region = batch.region[r];
     vec d[most_section], square = {};
     for (int i = 0; i < z.coordinates; i++) {
-      d[i] = (q[i] - region.point[i]) * region.stretch[i];
-      d[z.coordinates + i] = (v[i] - region.point[z.coordinates + i]) * region.stretch[z.coordinates + i];
+      d[i] = (q[i] - region.point[i]) * region.scaling[i];
+      d[z.coordinates + i] = (v[i] - region.point[z.coordinates + i]) * region.scaling[z.coordinates + i];
     }
     for (int j = 0, at = 0; j < 2 * z.coordinates; j++) {
       vec row = {};
@@ -295,7 +295,7 @@ inline void take_stops(const structure_machine &m, const size &z, mask there, bo
     re[k] = g.s.re[k] * b.re[k] - g.s.im[k] * b.im[k];
     im[k] = g.s.re[k] * b.im[k] + g.s.im[k] * b.re[k];
   }
-  place_at(m, z, there, g, re, im, b, g.s.q, g.s.v);
+  position_at(m, z, there, g, re, im, b, g.s.q, g.s.v);
   const vec moves = moves_of(m, z, g);
   mask section = there & (g.c.until >= m.period), passing = section & (g.c.sections > 0.5) & (moves > 0.5);
   for (int i = 0; i < z.coordinates; i++)

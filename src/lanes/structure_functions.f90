@@ -8,17 +8,17 @@ module structure_functions
   use multibody, only: joint_friction, joint_soft, joint_t, multibody_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use path_rows, only: force_powers, place_powers
+  use path_rows, only: force_powers, position_powers
   use structure_types, only: lane_functions, lane_powers, structure_mode_t
   implicit none
   private
 
   public :: never_pulls, set_functions
 
-  !> place s + speed s' of a joint, or the force that holds it as constraint number `held`.
+  !> position s + speed s' of a joint, or the force that holds it as constraint number `held`.
   type :: function_t
     integer :: joint = 0, held = 0
-    real(wp) :: place = 0, speed = 0
+    real(wp) :: position = 0, speed = 0
   end type function_t
 
 contains
@@ -39,7 +39,7 @@ contains
     integer :: j
     list = functions_of(machine, flow)
     do j = 1, size(list)
-      call set_swings(machine, flow, list(j), j, mode)
+      call set_amplitudes(machine, flow, list(j), j, mode)
     end do
     call set_statics(machine, flow, list, mode)
     call set_drifts(machine, flow, list, mode)
@@ -54,7 +54,7 @@ contains
     pushes = size(machine%joints)
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
-        list(j) = function_t(j, findloc(flow%held, j, 1), place=1.0_wp)
+        list(j) = function_t(j, findloc(flow%held, j, 1), position=1.0_wp)
         if (joint%kind == joint_friction) list(j) = function_t(j, list(j)%held, speed=1.0_wp)
         if (.not. never_pulls(joint)) cycle
         pushes = pushes + 1
@@ -72,7 +72,7 @@ contains
   pure type(function_t) function push_of(joint, j)
     type(joint_t), intent(in) :: joint
     integer, intent(in) :: j
-    push_of = function_t(j, place=joint%contact%stiffness, speed=joint%contact%damping)
+    push_of = function_t(j, position=joint%contact%stiffness, speed=joint%contact%damping)
   end function push_of
 
   pure logical function is_pressed(machine, flow, j)
@@ -83,19 +83,19 @@ contains
   end function is_pressed
 
   !> Exponentials and harmonics in function number `at`.
-  pure subroutine set_swings(machine, flow, look, at, mode)
+  pure subroutine set_amplitudes(machine, flow, look, at, mode)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t), intent(in) :: look
     integer, intent(in) :: at
     type(structure_mode_t), intent(inout) :: mode
-    complex(wp) :: part, swing
+    complex(wp) :: part, amplitude
     integer :: k, m
     do k = 1, size(flow%exponent)
       if (look%held > 0) then
         part = flow%force_shape(k, look%held)
       else
-        part = flow%joint_shape(k, look%joint)*(look%place + look%speed*flow%exponent(k))
+        part = flow%joint_shape(k, look%joint)*(look%position + look%speed*flow%exponent(k))
       end if
       mode%part_re(at, k) = real(part)
       mode%part_im(at, k) = aimag(part)
@@ -103,25 +103,25 @@ contains
     end do
     do m = 1, size(flow%response, 2)
       if (look%held > 0) then
-        swing = flow%force_response(m, look%held)
+        amplitude = flow%force_response(m, look%held)
       else
-        swing = flow%joint_response(m, look%joint)*cmplx(look%place, look%speed*(m*machine%frequency), wp)
+        amplitude = flow%joint_response(m, look%joint)*cmplx(look%position, look%speed*(m*machine%frequency), wp)
       end if
-      mode%swing_re(at, m) = real(swing)
-      mode%swing_im(at, m) = aimag(swing)
-      mode%steady(at) = mode%steady(at) + modulus(swing)
-      mode%steady_sixth(at) = mode%steady_sixth(at) + modulus(swing)*(m*machine%frequency)**6
+      mode%amplitude_re(at, m) = real(amplitude)
+      mode%amplitude_im(at, m) = aimag(amplitude)
+      mode%steady(at) = mode%steady(at) + modulus(amplitude)
+      mode%steady_sixth(at) = mode%steady_sixth(at) + modulus(amplitude)*(m*machine%frequency)**6
     end do
-  end subroutine set_swings
+  end subroutine set_amplitudes
 
   !> Where the load and the surfaces would take the structure, by powers of time, and what each joint adds to that: friction in
-  !> its direction, the place where it is held, or that of the stop that is pressed.
+  !> its direction, the position where it is held, or that of the stop that is pressed.
   pure subroutine set_statics(machine, flow, list, mode)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(function_t), intent(in) :: list(:)
     type(structure_mode_t), intent(inout) :: mode
-    real(wp), dimension(machine%n) :: none, force, place
+    real(wp), dimension(machine%n) :: none, force, position
     type(path_t) :: path
     logical :: drifts
     integer :: j, i
@@ -142,12 +142,12 @@ contains
         associate (joint => machine%joints(j))
           i = findloc(flow%held, j, 1)
           force = 0
-          place = 0
-          if (i > 0) place = flow%carried(:, i)
+          position = 0
+          if (i > 0) position = flow%carried(:, i)
           if (joint%kind == joint_friction .and. i == 0) force = -joint%friction%kinetic*joint%row
           if (is_pressed(machine, flow, j)) force = joint%contact%stiffness*joint%row
         end associate
-        call begin_change(machine, flow, place, none, force, path)
+        call begin_change(machine, flow, position, none, force, path)
         mode%still_by_joint(:n, j, :) = path%powers(:n, :)
         call set_levels(machine, flow, list, path, .false., mode%level_by_joint(j, :, :))
         drifts = drifts .or. any(abs(path%powers(:n, 1:)) > 0)
@@ -156,7 +156,7 @@ contains
     mode%powers = merge(lane_powers, 1, drifts)
   end subroutine set_statics
 
-  !> What a place and a pace along each direction without a spring add to the functions.
+  !> What a position and a pace along each direction without a spring add to the functions.
   pure subroutine set_drifts(machine, flow, list, mode)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -170,7 +170,7 @@ contains
       path%powers(:machine%n, 0) = mode%drift(:machine%n, d)
       level = 0
       call set_levels(machine, flow, list, path, .false., level)
-      mode%level_by_place(:, d) = level(:, 1)
+      mode%level_by_position(:, d) = level(:, 1)
       path%powers = 0
       path%powers(:machine%n, 1) = mode%drift(:machine%n, d)
       level = 0
@@ -195,8 +195,8 @@ contains
         cycle
       end if
       powers = matmul(machine%joints(list(k)%joint)%row, path%powers(:machine%n, :))
-      if (with_offset) powers = place_powers(machine, path, list(k)%joint)
-      level(k, :) = list(k)%place*powers + list(k)%speed*[powers(1), 2*powers(2), 3*powers(3), 0.0_wp]
+      if (with_offset) powers = position_powers(machine, path, list(k)%joint)
+      level(k, :) = list(k)%position*powers + list(k)%speed*[powers(1), 2*powers(2), 3*powers(3), 0.0_wp]
     end do
   end subroutine set_levels
 

@@ -71,9 +71,9 @@ contains
     flies = flies .and. flow%structure%mode(key + 1)%known > 0
   end function structure_flies
 
-  !> The lanes can be converged by attractor number `attractor` near its `point` of the section (places, speeds): where the square
-  !> of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`. The section's
-  !> coordinates lie along directions of its own, at right angles; places share a scale, and so do speeds.
+  !> The lanes can be converged by attractor number `attractor` near its `point` of the section (positions, speeds): where
+  !> the square of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`.
+  !> The section's coordinates lie along directions of its own, at right angles; positions share a scale, and so do speeds.
   pure subroutine add_structure_region(moving, batch, attractor, point, scale, metric, reach)
     type(multibody_motion_t), intent(in) :: moving
     type(structure_batch_t), intent(inout) :: batch
@@ -99,7 +99,7 @@ contains
     associate (region => batch%region(batch%regions))
       region = structure_region_t(attractor=real(attractor, wp), reach=reach)
       region%point(:2*n) = matmul(transpose(onto), point)
-      region%stretch(:2*n) = 1/scale
+      region%scaling(:2*n) = 1/scale
       region%metric(:size(metric)) = [((form(i, j), i=1, j), j=1, 2*n)]
     end associate
   end subroutine add_structure_region
@@ -136,7 +136,7 @@ contains
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(in) :: state
     integer, intent(in) :: j
-    real(wp) :: place, speed, stop
+    real(wp) :: position, speed, stop
     real(wp), parameter :: far_from_nothing = 1e-6_wp
     associate (machine => moving%machine, joint => moving%machine%joints(j), phase => state%phase(j))
       left = -j
@@ -145,11 +145,11 @@ contains
       if (abs(phase) == 2) left = -push_of(machine, j)
       if (abs(phase) == 2) return
       call joint_motion(machine, j, state%q, state%v, state%time, turning_at(machine%frequency, state%time, moving%harmonics), &
-                        place, speed)
+                        position, speed)
       stop = merge(joint%upper, joint%lower, phase > 0)
-      place = joint%contact%stiffness*(place - stop)
+      position = joint%contact%stiffness*(position - stop)
       speed = joint%contact%damping*speed
-      if (abs(place + speed) > far_from_nothing*(abs(place) + abs(speed))) left = 0
+      if (abs(position + speed) > far_from_nothing*(abs(position) + abs(speed))) left = 0
     end associate
   end function left_limit
 

@@ -10,7 +10,7 @@
 
 namespace {
 
-// What a joint adds to `still` and `level`: its direction, its coordinate where it is held, the place of the
+// What a joint adds to `still` and `level`: its direction, its coordinate where it is held, the position of the
 // stop that is pressed.
 inline vec pull_of(const structure_joint &joint, const structure_fields<vec> &s, int j) {
   if (joint.soft > 0.5)
@@ -44,7 +44,7 @@ inline vec moves_of(const structure_machine &m, const size &z, const structure_g
 
 // The lanes of `among`, whose bases are `b`: coordinates and speeds.
 template <class size>
-inline void place_at(const structure_machine &m, const size &z, mask among, const structure_group &g,
+inline void position_at(const structure_machine &m, const size &z, mask among, const structure_group &g,
                      const vec (&re)[most_terms], const vec (&im)[most_terms], const structure_bases &b,
                      vec (&q)[most_coordinates], vec (&v)[most_coordinates]) {
   const structure_fields<vec> &s = g.s;
@@ -57,26 +57,26 @@ inline void place_at(const structure_machine &m, const size &z, mask among, cons
       vec p[most_powers] = {};
       still_of(m, z, t, s, i, p);
       for (int d = 0; d < z.drifts; d++) {
-        p[0] += t.drift[d][i] * s.place[d];
+        p[0] += t.drift[d][i] * s.position[d];
         p[1] += t.drift[d][i] * s.pace[d];
       }
-      vec place = p[0], speed = {};
+      vec position = p[0], speed = {};
       if (z.powers > 1) {
-        place += b.elapsed * (p[1] + b.elapsed * (p[2] + b.elapsed * p[3]));
+        position += b.elapsed * (p[1] + b.elapsed * (p[2] + b.elapsed * p[3]));
         speed = p[1] + b.elapsed * (2 * p[2] + 3 * b.elapsed * p[3]);
       }
       for (int n = 0; n < z.waves; n++) {
-        place += t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
+        position += t.wave_re[n][i] * b.cosine[n] - t.wave_im[n][i] * b.sine[n];
         speed -=
             ((n + 1) * m.drive_frequency) * (t.wave_re[n][i] * b.sine[n] + t.wave_im[n][i] * b.cosine[n]);
       }
       for (int k = 0; k < z.terms; k++) {
-        place += t.shape_re[k][i] * re[k] - t.shape_im[k][i] * im[k];
+        position += t.shape_re[k][i] * re[k] - t.shape_im[k][i] * im[k];
         double pace_re = -t.decay[k] * t.shape_re[k][i] - t.turn[k] * t.shape_im[k][i];
         double pace_im = t.turn[k] * t.shape_re[k][i] - t.decay[k] * t.shape_im[k][i];
         speed += pace_re * re[k] - pace_im * im[k];
       }
-      put(q[i], in, place);
+      put(q[i], in, position);
       put(v[i], in, speed);
     }
   }
@@ -150,18 +150,18 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       amplitude[k] = size_above(g.s.re[k], g.s.im[k]);
     }
     for (int j = 0; j < z.joints + z.pushes; j++) {
-      vec d = set_limits(m, z, in, j, g), swing = t.steady[j], sixth = t.steady_sixth[j];
+      vec d = set_limits(m, z, in, j, g), steady_size = t.steady[j], sixth = t.steady_sixth[j];
       for (int k = 0; k < z.terms; k++) {
         double square = t.decay[k] * t.decay[k] + t.turn[k] * t.turn[k];
         vec share = t.part_size[k][j] * amplitude[k];
-        swing += share;
+        steady_size += share;
         sixth += (square * square * square) * share;
         put(g.part_re[j][k], in, d * (t.part_re[k][j] * g.s.re[k] - t.part_im[k][j] * g.s.im[k]));
         put(g.part_im[j][k], in, d * (t.part_re[k][j] * g.s.im[k] + t.part_im[k][j] * g.s.re[k]));
       }
       for (int n = 0; n < z.waves; n++) {
-        put(g.swing_re[j][n], in, d * t.swing_re[n][j]);
-        put(g.swing_im[j][n], in, d * t.swing_im[n][j]);
+        put(g.amplitude_re[j][n], in, d * t.amplitude_re[n][j]);
+        put(g.amplitude_im[j][n], in, d * t.amplitude_im[n][j]);
       }
       for (int n = 0; n < z.powers; n++) {
         vec level = t.level[n][j];
@@ -170,7 +170,7 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
             level += t.level_by_joint[n][j][i] * pull_of(m.joint[i], g.s, i);
         for (int i = 0; i < z.drifts; i++) {
           if (n == 0)
-            level += t.level_by_place[i][j] * g.s.place[i];
+            level += t.level_by_position[i][j] * g.s.position[i];
           if (n < 2)
             level += t.level_by_pace[n][i][j] * g.s.pace[i];
         }
@@ -179,7 +179,7 @@ inline void enter_modes(const structure_machine &m, const size &z, mask changed,
       put(g.sixth[j], in, sixth);
       if (j < z.joints)
         put(g.felt_mass[j], in, t.felt_mass[j]);
-      vec ratio = sixth / (swing + 1e-300);
+      vec ratio = sixth / (steady_size + 1e-300);
       put(steepest, ratio > steepest, ratio);
     }
     put(g.close, in, t.close);

@@ -90,7 +90,7 @@ struct structure_group {
   structure_fields<vec> s;
   vec decay[most_terms], turn[most_terms], square[most_terms];
   vec part_re[most_functions][most_terms], part_im[most_functions][most_terms];
-  vec swing_re[most_functions][most_waves], swing_im[most_functions][most_waves];
+  vec amplitude_re[most_functions][most_waves], amplitude_im[most_functions][most_waves];
   // Limits of the functions, bound on their sixth derivatives, mass that a joint feels.
   vec power[most_powers][most_functions], low[most_functions], high[most_functions], sixth[most_functions],
       felt_mass[most_joints];
@@ -221,8 +221,8 @@ inline void functions_at(const structure_machine &m, const size &z, const struct
     }
     for (int n = 0; n < z.waves; n++) {
       double w = (n + 1) * m.drive_frequency, w2 = w * w;
-      vec part = g.swing_re[j][n] * b.cosine[n] - g.swing_im[j][n] * b.sine[n];
-      vec slope = g.swing_re[j][n] * b.sine[n] + g.swing_im[j][n] * b.cosine[n];
+      vec part = g.amplitude_re[j][n] * b.cosine[n] - g.amplitude_im[j][n] * b.sine[n];
+      vec slope = g.amplitude_re[j][n] * b.sine[n] + g.amplitude_im[j][n] * b.cosine[n];
       f += part;
       f1 -= w * slope;
       f2 -= w2 * part;

@@ -27,10 +27,10 @@ module structure_preparation
   !> Over so many radians of the fastest part Taylor's remainder of a speed after five terms is below rounding.
   real(wp), parameter :: taylor_span = 2e-3_wp
   !> Radians of a panel, and how much longer panels may be.
-  real(wp), parameter :: coarse = 3.0_wp, stretches(panel_lengths) = [4.0_wp, 2.5_wp, 1.6_wp, 1.0_wp]
+  real(wp), parameter :: coarse = 3.0_wp, widths(panel_lengths) = [4.0_wp, 2.5_wp, 1.6_wp, 1.0_wp]
   !> Shares of the sizes of forces and lengths within which a choice is left to the event loop.
   real(wp), parameter :: rounding = 1e-12_wp
-  !> The place of a stop that is not there [m].
+  !> The position of a stop that is not there [m].
   real(wp), parameter :: no_stop = 1e300_wp
   !> Longest end of a chatter that is completed, and shortest flight that ends a burst of impacts, in periods; as in
   !> `multibody_transition` and `multibody_motion`.
@@ -89,7 +89,7 @@ contains
       if (terms > 0) fastest = max(fastest, maxval(hypot(mode%decay(:terms), mode%turn(:terms))))
       mode%close = taylor_span/fastest
       do l = 1, panel_lengths
-        mode%panel(l) = coarse/fastest*stretches(l)
+        mode%panel(l) = coarse/fastest*widths(l)
         if (moving%notes_misses) mode%panel(l) = most_radians/fastest
         mode%steepest(l) = (coarse/mode%panel(l))**6
         if (l == panel_lengths) mode%steepest(l) = huge(1.0_wp)
@@ -240,35 +240,35 @@ contains
     type(mode_flow_t), intent(in) :: flow
     type(structure_mode_t), intent(inout) :: mode
     real(wp) :: project(size(flow%basis, 2), machine%n)
-    complex(wp) :: by_place(machine%n), by_speed(machine%n)
+    complex(wp) :: by_position(machine%n), by_speed(machine%n)
     integer :: i, k, m, f
     f = flow%flexible
     project = matmul(transpose(flow%basis), machine%mass)
     associate (n => machine%n, d => flow%damped)
       do i = 1, d + flow%rigid
         mode%drift(:n, i) = flow%basis(:, f + i)
-        mode%place_from_place(i, :n) = project(f + i, :)
+        mode%position_from_position(i, :n) = project(f + i, :)
         if (i > d) mode%pace_from_speed(i, :n) = project(f + i, :)
       end do
       do k = 1, size(flow%exponent)
-        by_place = 0
+        by_position = 0
         by_speed = 0
         do i = 1, f
-          by_place = by_place + flow%left(k, i)*flow%frequency(i)*project(i, :)
+          by_position = by_position + flow%left(k, i)*flow%frequency(i)*project(i, :)
         end do
         do i = 1, f + d
           by_speed = by_speed + flow%left(k, f + i)*project(i, :)
         end do
-        mode%from_place_re(k, :n) = real(by_place)
-        mode%from_place_im(k, :n) = aimag(by_place)
+        mode%from_position_re(k, :n) = real(by_position)
+        mode%from_position_im(k, :n) = aimag(by_position)
         mode%from_speed_re(k, :n) = real(by_speed)
         mode%from_speed_im(k, :n) = aimag(by_speed)
         mode%shape_re(:n, k) = real(flow%shape(:, k))
         mode%shape_im(:n, k) = aimag(flow%shape(:, k))
         ! The exponentials carry a part of the damped directions.
         do i = 1, d
-          mode%place_from_place(i, :n) = mode%place_from_place(i, :n) - real(flow%drift(i, k)*by_place)
-          mode%place_from_speed(i, :n) = mode%place_from_speed(i, :n) - real(flow%drift(i, k)*by_speed)
+          mode%position_from_position(i, :n) = mode%position_from_position(i, :n) - real(flow%drift(i, k)*by_position)
+          mode%position_from_speed(i, :n) = mode%position_from_speed(i, :n) - real(flow%drift(i, k)*by_speed)
         end do
       end do
       do m = 1, size(flow%response, 2)

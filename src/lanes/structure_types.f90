@@ -19,16 +19,17 @@ module structure_types
   type, bind(c), public :: structure_mode_t
     real(c_double) :: known = 0, terms = 0, drifts = 0, powers = 0, idle = 0
     real(c_double), dimension(lane_terms) :: decay = 0, turn = 0
-    real(c_double), dimension(lane_terms, lane_coordinates) :: from_place_re = 0, from_place_im = 0, from_speed_re = 0, &
+    real(c_double), dimension(lane_terms, lane_coordinates) :: from_position_re = 0, from_position_im = 0, from_speed_re = 0, &
       from_speed_im = 0
     real(c_double), dimension(lane_coordinates, lane_terms) :: shape_re = 0, shape_im = 0
     real(c_double), dimension(lane_coordinates, lane_waves) :: wave_re = 0, wave_im = 0
     real(c_double) :: still(lane_coordinates, lane_powers) = 0, still_by_joint(lane_coordinates, lane_joints, lane_powers) = 0
-    real(c_double), dimension(lane_drifts, lane_coordinates) :: place_from_place = 0, place_from_speed = 0, pace_from_speed = 0
-    real(c_double) :: drift(lane_coordinates, lane_drifts) = 0, level_by_place(lane_functions, lane_drifts) = 0, &
+    real(c_double), dimension(lane_drifts, lane_coordinates) :: position_from_position = 0, position_from_speed = 0, &
+      pace_from_speed = 0
+    real(c_double) :: drift(lane_coordinates, lane_drifts) = 0, level_by_position(lane_functions, lane_drifts) = 0, &
       level_by_pace(lane_functions, lane_drifts, 2) = 0
     real(c_double), dimension(lane_functions, lane_terms) :: part_re = 0, part_im = 0, part_size = 0
-    real(c_double), dimension(lane_functions, lane_waves) :: swing_re = 0, swing_im = 0
+    real(c_double), dimension(lane_functions, lane_waves) :: amplitude_re = 0, amplitude_im = 0
     real(c_double) :: level(lane_functions, lane_powers) = 0, level_by_joint(lane_joints, lane_functions, lane_powers) = 0
     real(c_double), dimension(lane_functions) :: steady = 0, steady_sixth = 0
     real(c_double) :: close = 0
@@ -56,7 +57,7 @@ module structure_types
 
   !> Mirrors `structure_region` of structure_types.hpp.
   type, bind(c), public :: structure_region_t
-    real(c_double) :: attractor = 0, reach = 0, point(section) = 0, stretch(section) = 0, metric(metric_numbers) = 0
+    real(c_double) :: attractor = 0, reach = 0, point(section) = 0, scaling(section) = 0, metric(metric_numbers) = 0
   end type structure_region_t
 
   !> Mirrors `structure_batch` of structure_types.hpp.
@@ -67,7 +68,7 @@ module structure_types
     real(c_double) :: start(structure_lane_count) = 0
     real(c_double), dimension(structure_lane_count, lane_terms) :: re = 0, im = 0
     real(c_double) :: held(structure_lane_count, lane_joints) = 0
-    real(c_double), dimension(structure_lane_count, lane_drifts) :: place = 0, pace = 0
+    real(c_double), dimension(structure_lane_count, lane_drifts) :: position = 0, pace = 0
     real(c_double), dimension(structure_lane_count) :: found = 0, span = 0, joint = 0, side = 0
     real(c_double), dimension(structure_lane_count, lane_terms) :: end_re = 0, end_im = 0
     real(c_double), dimension(structure_lane_count, lane_functions) :: end_f = 0, end_f1 = 0

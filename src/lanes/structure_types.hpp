@@ -29,33 +29,33 @@ enum {
 };
 
 // One mode of a structure: which of its friction joints stick, which soft contacts are pressed. With E(k) =
-// exp((-decay + i turn) t), complex amplitudes a(k), W(m) = exp(i m Omega t), places b(d) and paces c(d)
+// exp((-decay + i turn) t), complex amplitudes a(k), W(m) = exp(i m Omega t), positions b(d) and paces c(d)
 // along the directions without a spring
 //   q = sum still(p) t^p + sum drift (b + c t) + Re sum shape a E + Re sum wave W,
 // and of every joint one function: its coordinate (a contact), its sliding speed, the force that holds it, or
 // the force k s + c s' of a soft contact that never pulls,
-//   f = sum level(p) t^p + Re sum part a E + Re sum swing W.
+//   f = sum level(p) t^p + Re sum part a E + Re sum amplitude W.
 // After them those forces of contacts that are not pressed. `still` and `level` are sums over the directions
-// of the sliding joints, the coordinates of those held, and the places of the stops that are pressed.
+// of the sliding joints, the coordinates of those held, and the positions of the stops that are pressed.
 struct structure_mode {
   // How many powers of time it has, 1 where nothing drifts; `idle`: nothing moves at all.
   double known, terms, drifts, powers, idle;
   double decay[most_terms], turn[most_terms];
   // Amplitudes from q - still - Re sum wave W and its rate.
-  double from_place_re[most_coordinates][most_terms], from_place_im[most_coordinates][most_terms];
+  double from_position_re[most_coordinates][most_terms], from_position_im[most_coordinates][most_terms];
   double from_speed_re[most_coordinates][most_terms], from_speed_im[most_coordinates][most_terms];
   double shape_re[most_terms][most_coordinates], shape_im[most_terms][most_coordinates];
   double wave_re[most_waves][most_coordinates], wave_im[most_waves][most_coordinates];
   double still[most_powers][most_coordinates], still_by_joint[most_powers][most_joints][most_coordinates];
-  // Along the directions without a spring: places and paces from what amplitudes are made from, shapes, and
-  // what places and paces add to the levels.
-  double place_from_place[most_coordinates][most_drifts], place_from_speed[most_coordinates][most_drifts],
+  // Along the directions without a spring: positions and paces from what amplitudes are made from, shapes, and
+  // what positions and paces add to the levels.
+  double position_from_position[most_coordinates][most_drifts], position_from_speed[most_coordinates][most_drifts],
       pace_from_speed[most_coordinates][most_drifts];
   double drift[most_drifts][most_coordinates];
-  double level_by_place[most_drifts][most_functions], level_by_pace[2][most_drifts][most_functions];
+  double level_by_position[most_drifts][most_functions], level_by_pace[2][most_drifts][most_functions];
   double part_re[most_terms][most_functions], part_im[most_terms][most_functions],
       part_size[most_terms][most_functions];
-  double swing_re[most_waves][most_functions], swing_im[most_waves][most_functions];
+  double amplitude_re[most_waves][most_functions], amplitude_im[most_waves][most_functions];
   double level[most_powers][most_functions], level_by_joint[most_powers][most_functions][most_joints];
   // Bounds on what the waves have in the functions and their sixth derivatives.
   double steady[most_functions], steady_sixth[most_functions];
@@ -122,7 +122,7 @@ template <class T> struct structure_fields {
   // The flight: start [s after the section], amplitudes, coordinates of the joints held.
   T start, re[most_terms], im[most_terms], held[most_joints];
   // Places and paces along the directions without a spring.
-  T place[most_drifts], pace[most_drifts];
+  T position[most_drifts], pace[most_drifts];
   // What ends it: 1 = found, 2 = the next stop, when, joint (1, ...; 0 = none, the flight goes on), side;
   // amplitudes then; functions of the joints and their rates then.
   T found, span, joint, side, end_re[most_terms], end_im[most_terms], end_f[most_functions],
@@ -134,7 +134,7 @@ template <class T> struct structure_fields {
 // The neighbourhood of a point of an attractor on the section, in the coordinates q, v.
 struct structure_region {
   double attractor, reach;
-  double point[most_section], stretch[most_section], metric[metric_numbers];
+  double point[most_section], scaling[most_section], metric[metric_numbers];
 };
 
 struct structure_batch {

@@ -113,7 +113,7 @@ contains
     end select
   end subroutine add_to_contact
 
-  !> The rigid barriers of a law made soft, at the same places, by the effect `choice`.
+  !> The rigid barriers of a law made soft, at the same positions, by the effect `choice`.
   pure type(contact_t) function compliant_contact(rigid, choice) result(law)
     type(contact_t), intent(in) :: rigid
     type(law_choice_t), intent(in) :: choice
@@ -191,7 +191,7 @@ contains
     positions = [min(law%upper, law%soft_upper), max(law%lower, law%soft_lower)]
   end function barrier_positions
 
-  !> Whether `x` [m] is no place for a body: beyond a rigid barrier. Inside a soft one a body may be.
+  !> Whether `x` [m] is no position for a body: beyond a rigid barrier. Inside a soft one a body may be.
   pure elemental logical function beyond_barrier(law, x)
     type(contact_t), intent(in) :: law
     real(wp), intent(in) :: x

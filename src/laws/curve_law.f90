@@ -231,7 +231,7 @@ contains
   !> Whether a curve that begins with value 0 is above 0 from there on, beyond the last knot too.
   pure logical function is_positive(curve)
     type(curve_t), intent(in) :: curve
-    real(wp) :: width, c(0:3), place(4), q
+    real(wp) :: width, c(0:3), position(4), q
     integer :: i, k
     is_positive = .false.
     if (curve%slope(curve%count) < 0) return
@@ -244,10 +244,10 @@ contains
       if (i == 1) c = [c(1:), 0.0_wp]
       ! Where it may be least: at its ends, where its derivative is 0.
       q = -c(2) - sign(sqrt(max(0.0_wp, c(2)**2 - 3*c(1)*c(3))), c(2))
-      place = [epsilon(q), 1.0_wp, quotient(q, 3*c(3)), quotient(c(1), q)]
-      do k = 1, size(place)
-        if (place(k) <= 0 .or. place(k) > 1) cycle
-        if (.not. c(0) + place(k)*(c(1) + place(k)*(c(2) + place(k)*c(3))) > 0) return
+      position = [epsilon(q), 1.0_wp, quotient(q, 3*c(3)), quotient(c(1), q)]
+      do k = 1, size(position)
+        if (position(k) <= 0 .or. position(k) > 1) cycle
+        if (.not. c(0) + position(k)*(c(1) + position(k)*(c(2) + position(k)*c(3))) > 0) return
       end do
     end do
     is_positive = .true.

@@ -7,7 +7,7 @@
 !> K + E being the dry friction of the machine, g_+, g_-, p, q and r functions given by tables. Free play g in series with
 !> the linear spring k l makes its force k d(l): nothing within the play and l -+ g/2 beyond it, with corners that parabolas
 !> may round within e of them. Dahl's friction -h z takes the
-!> place of all dry friction. As the velocity keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
+!> position of all dry friction. As the velocity keeps its sign over a slip, z' = sigma (1 - z s/K) v has the closed form
 !>   z = s K + (z_0 - s K) exp(-sigma s (x - x_0)/K),  K the level in that direction.
 module effect_law
   use curve_law, only: continued_at, curve_of, curve_t, integral_of, most_bent, slope_of, steepest
@@ -20,7 +20,7 @@ module effect_law
 
   public :: add_to_effects, add_to_sensor, replace_friction, finish_effects, effect_force, effect_energy, &
     effect_losses, friction_factor, break_away_level, dahl_level, dahl_force, constant_force, observed, &
-    friction_change, change_over_bounce, slip_in_series, stretch_force, stretch_slope, stretch_bounds, place_force
+    friction_change, change_over_bounce, slip_in_series, extension_force, extension_slope, extension_bounds, position_force
 
   real(wp), parameter :: farthest_behind = 100
 
@@ -32,8 +32,8 @@ module effect_law
   type, public :: effects_t
     !> Any force at all, one that leaves no closed form, and one that lanes have no series for.
     logical :: present = .false., nonlinear = .false., unknown_to_lanes = .false.
-    !> A force that only the position of body and foot sets, beside the cubic spring and the offset; any that the place changes.
-    logical :: by_position = .false., by_place = .false.
+    !> A force that only the position of body and foot sets, beside the cubic spring and the offset; any that the position changes.
+    logical :: by_position_table = .false., by_position = .false.
     !> A force that a table gives.
     logical :: by_table = .false.
     !> Dry friction; any force that is another one after the motion has turned round.
@@ -44,11 +44,11 @@ module effect_law
     real(wp) :: cubic_damping = 0
     !> Dahl's friction: sigma [N/m], 0 = none, and mean sliding level [N].
     real(wp) :: dahl_stiffness = 0, dahl_sliding = 0
-    !> g_+ and g_- [N] over the speed [m/s], p over the place [m]; without knots where there is none.
-    type(curve_t) :: upwards, downwards, over_place
-    !> q [N] over the stretch [m], r [N] over the place [m].
+    !> g_+ and g_- [N] over the speed [m/s], p over the position [m]; without knots where there is none.
+    type(curve_t) :: upwards, downwards, over_position
+    !> q [N] over the extension [m], r [N] over the position [m].
     type(curve_t) :: spring, force
-    !> Free play: d(l) - l [m] over the stretch, without knots where there is none, and k [N/m] of the spring in series with it.
+    !> Free play: d(l) - l [m] over the extension, without knots where there is none, and k [N/m] of the spring in series with it.
     type(curve_t) :: play
     real(wp) :: series_stiffness = 0
   end type effects_t
@@ -57,7 +57,7 @@ module effect_law
   !> happens to be in.
   type, public :: slip_memory_t
     real(wp) :: direction = 1, x = 0, z = 0
-    integer :: in_spring = -1, in_play = -1, in_force = -1, in_place = -1, in_speed = -1
+    integer :: in_spring = -1, in_play = -1, in_force = -1, in_position = -1, in_speed = -1
   end type slip_memory_t
 
   !> What is recorded at t: (1 + gain) x(t - delay) + bias.
@@ -93,7 +93,7 @@ contains
       effects%downwards = curve_of(list_of(choice, 'speed'), list_of(choice, 'downwards'))
     case ('friction_place_curve')
       if (.not. any(abs(list_of(choice, 'change')) > 0)) return
-      effects%over_place = curve_of(list_of(choice, 'place'), list_of(choice, 'change'))
+      effects%over_position = curve_of(list_of(choice, 'place'), list_of(choice, 'change'))
     case ('spring_curve')
       if (.not. any(abs(list_of(choice, 'force')) > 0)) return
       effects%spring = curve_of(list_of(choice, 'stretch'), list_of(choice, 'force'))
@@ -122,7 +122,7 @@ contains
     end select
   end subroutine add_to_sensor
 
-  !> Dahl's friction, where it is, takes the place of the dry friction of the machine.
+  !> Dahl's friction, where it is, takes the position of the dry friction of the machine.
   pure subroutine replace_friction(effects, friction)
     type(effects_t), intent(inout) :: effects
     type(friction_t), intent(inout) :: friction
@@ -141,31 +141,32 @@ contains
   !> What the effects together mean for those who fly, vary or prepare a machine.
   pure subroutine finish_effects(effects)
     type(effects_t), intent(inout) :: effects
-    effects%by_position = effects%play%count > 0 .or. effects%spring%count > 0 .or. effects%force%count > 0
-    effects%by_place = effects%by_position .or. any(abs([effects%cubic, effects%friction_slope]) > 0) .or. &
-                       effects%over_place%count > 0
+    effects%by_position_table = effects%play%count > 0 .or. effects%spring%count > 0 .or. effects%force%count > 0
+    effects%by_position = effects%by_position_table .or. any(abs([effects%cubic, effects%friction_slope]) > 0) .or. &
+                       effects%over_position%count > 0
     effects%dry = abs(effects%asymmetric_coulomb) > 0 .or. effects%upwards%count > 0
     effects%turns_round = effects%dry .or. any(abs([effects%quadratic_drag, effects%asymmetric_viscous]) > 0)
-    effects%by_table = any([effects%upwards%count, effects%over_place%count, effects%spring%count, effects%play%count, &
+    effects%by_table = any([effects%upwards%count, effects%over_position%count, effects%spring%count, effects%play%count, &
                             effects%force%count] > 0)
-    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_place .or. effects%by_table .or. effects%unknown_to_lanes .or. &
+    effects%nonlinear = effects%dahl_stiffness > 0 .or. effects%by_position .or. effects%by_table .or. &
+      effects%unknown_to_lanes .or. &
                         any(abs([effects%quadratic_drag, effects%cubic_damping, effects%asymmetric_viscous]) > 0)
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
   end subroutine finish_effects
 
-  !> Force [N] on a body at `x` [m] that slips at `v` [m/s] as `slip` says, the spring being stretched by `stretch` [m].
+  !> Force [N] on a body at `x` [m] that slips at `v` [m/s] as `slip` says, the spring being stretched by `extension` [m].
   !> Continued smoothly beyond v = 0, where a slip ends.
-  pure real(wp) function effect_force(effects, friction, slip, x, v, stretch) result(force)
+  pure real(wp) function effect_force(effects, friction, slip, x, v, extension) result(force)
     type(effects_t), intent(in) :: effects
     type(friction_t), intent(in) :: friction
     type(slip_memory_t), intent(in) :: slip
-    real(wp), intent(in) :: x, v, stretch
+    real(wp), intent(in) :: x, v, extension
     real(wp) :: factor
-    force = effects%offset - slip%direction*(effects%quadratic_drag*v + effects%asymmetric_viscous)*v + effects%cubic*stretch**3
+    force = effects%offset - slip%direction*(effects%quadratic_drag*v + effects%asymmetric_viscous)*v + effects%cubic*extension**3
     if (effects%dahl_stiffness > 0) then
-      force = force - friction_factor(effects, x, slip%in_place)*dahl_force(effects, slip, x)
-    else if (abs(effects%friction_slope) > 0 .or. effects%over_place%count > 0) then
-      factor = friction_factor(effects, x, slip%in_place)
+      force = force - friction_factor(effects, x, slip%in_position)*dahl_force(effects, slip, x)
+    else if (abs(effects%friction_slope) > 0 .or. effects%over_position%count > 0) then
+      factor = friction_factor(effects, x, slip%in_position)
       force = force - slip%direction*(factor - 1)*(friction%kinetic + stribeck_excess(friction, slip%direction*v)) &
               - factor*effects%asymmetric_coulomb
     else
@@ -174,44 +175,44 @@ contains
     if (effects%upwards%count > 0) force = force - slip%direction* &
       friction_change(effects, slip%direction, slip%direction*v, slip%in_speed)
     if (effects%cubic_damping > 0) force = force - effects%cubic_damping*v**3
-    if (effects%by_position) force = force + play_and_table(effects, stretch, slip%in_spring, slip%in_play) &
+    if (effects%by_position_table) force = force + play_and_table(effects, extension, slip%in_spring, slip%in_play) &
                                      + continued_at(effects%force, x, slip%in_force)
   end function effect_force
 
-  !> Bound [N] on the change of the forces over a bounce of a given `speed` [m/s] and `height` [m] from a place where Dahl's
-  !> friction is `z` [N] and the spring stretched by `stretch` [m].
-  pure real(wp) function change_over_bounce(effects, friction, z, stretch, speed, height) result(change)
+  !> Bound [N] on the change of the forces over a bounce of a given `speed` [m/s] and `height` [m] from a position where Dahl's
+  !> friction is `z` [N] and the spring stretched by `extension` [m].
+  pure real(wp) function change_over_bounce(effects, friction, z, extension, speed, height) result(change)
     type(effects_t), intent(in) :: effects
     type(friction_t), intent(in) :: friction
-    real(wp), intent(in) :: z, stretch, speed, height
+    real(wp), intent(in) :: z, extension, speed, height
     real(wp) :: bounds(2)
     change = (effects%quadratic_drag*speed + abs(effects%asymmetric_viscous))*speed + height* &
-             (3*abs(effects%cubic)*stretch**2 + 2*effects%dahl_stiffness + &
-              (abs(effects%friction_slope) + steepest(effects%over_place))* &
+             (3*abs(effects%cubic)*extension**2 + 2*effects%dahl_stiffness + &
+              (abs(effects%friction_slope) + steepest(effects%over_position))* &
               (friction%kinetic + friction%excess + friction%second_excess + abs(effects%asymmetric_coulomb) + abs(z)))
     change = change + max(steepest(effects%upwards), steepest(effects%downwards))*speed + effects%cubic_damping*speed**3
-    if (.not. effects%by_position) return
-    bounds = stretch_bounds(effects)
+    if (.not. effects%by_position_table) return
+    bounds = extension_bounds(effects)
     change = change + height*(bounds(1) + steepest(effects%force))
   end function change_over_bounce
 
-  !> Force [N] by which cubic spring, table and free play change that of the spring at a `stretch` [m].
-  pure real(wp) function stretch_force(effects, stretch) result(force)
+  !> Force [N] by which cubic spring, table and free play change that of the spring at a `extension` [m].
+  pure real(wp) function extension_force(effects, extension) result(force)
     type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: stretch
-    force = effects%cubic*stretch**3
-    if (effects%by_position) force = force + play_and_table(effects, stretch)
-  end function stretch_force
+    real(wp), intent(in) :: extension
+    force = effects%cubic*extension**3
+    if (effects%by_position_table) force = force + play_and_table(effects, extension)
+  end function extension_force
 
-  pure real(wp) function play_and_table(effects, stretch, in_spring, in_play) result(force)
+  pure real(wp) function play_and_table(effects, extension, in_spring, in_play) result(force)
     type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: stretch
+    real(wp), intent(in) :: extension
     integer, intent(in), optional :: in_spring, in_play
-    force = continued_at(effects%spring, stretch, in_spring) &
-            + effects%series_stiffness*continued_at(effects%play, stretch, in_play)
+    force = continued_at(effects%spring, extension, in_spring) &
+            + effects%series_stiffness*continued_at(effects%play, extension, in_play)
   end function play_and_table
 
-  !> d(l) - l [m] over the stretch l for a play of `gap` [m]. Its corners are sharp, or rounded within `rounding` times the gap:
+  !> d(l) - l [m] over the extension l for a play of `gap` [m]. Its corners are sharp, or rounded within `rounding` times the gap:
   !> with the slope 0 beyond the play and -1 within, a cubic between is a parabola.
   pure type(curve_t) function play_of(gap, rounding) result(play)
     real(wp), intent(in) :: gap, rounding
@@ -232,40 +233,40 @@ contains
     play%slope(:4) = [0, -1, -1, 0]
   end function play_of
 
-  !> Derivative of `stretch_force` by the stretch [N/m].
-  pure real(wp) function stretch_slope(effects, stretch) result(slope)
+  !> Derivative of `extension_force` by the extension [N/m].
+  pure real(wp) function extension_slope(effects, extension) result(slope)
     type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: stretch
-    slope = 3*effects%cubic*stretch**2
-    if (.not. effects%by_position) return
-    slope = slope + slope_of(effects%spring, stretch) + effects%series_stiffness*slope_of(effects%play, stretch)
-  end function stretch_slope
+    real(wp), intent(in) :: extension
+    slope = 3*effects%cubic*extension**2
+    if (.not. effects%by_position_table) return
+    slope = slope + slope_of(effects%spring, extension) + effects%series_stiffness*slope_of(effects%play, extension)
+  end function extension_slope
 
-  !> Bounds on the first [N/m] and second [N/m^2] derivative of the table over the stretch and of the play. Those at a `stretch` [m]
-  !> hold up to the next sharp corner, the first with the sign of a sharp play.
-  pure function stretch_bounds(effects, stretch) result(bounds)
+  !> Bounds on the first [N/m] and second [N/m^2] derivative of the table over the extension and of the play. Those at a
+  !> `extension` [m] hold up to the next sharp corner, the first with the sign of a sharp play.
+  pure function extension_bounds(effects, extension) result(bounds)
     type(effects_t), intent(in) :: effects
-    real(wp), intent(in), optional :: stretch
+    real(wp), intent(in), optional :: extension
     real(wp) :: bounds(2), of_play(2)
     of_play = [steepest(effects%play), most_bent(effects%play)]
-    if (present(stretch) .and. effects%play%sharp) of_play = [slope_of(effects%play, stretch), 0.0_wp]
+    if (present(extension) .and. effects%play%sharp) of_play = [slope_of(effects%play, extension), 0.0_wp]
     bounds = [steepest(effects%spring), most_bent(effects%spring)] + effects%series_stiffness*of_play
-  end function stretch_bounds
+  end function extension_bounds
 
-  !> r [N], a force over the place `x` [m].
-  pure real(wp) function place_force(effects, x) result(force)
+  !> r [N], a force over the position `x` [m].
+  pure real(wp) function position_force(effects, x) result(force)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x
     force = continued_at(effects%force, x)
-  end function place_force
+  end function position_force
 
-  !> Energy [J] of a body at `x` [m], the spring being stretched by `stretch` [m], in what only the position sets.
-  pure real(wp) function effect_energy(effects, x, stretch) result(energy)
+  !> Energy [J] of a body at `x` [m], the spring being stretched by `extension` [m], in what only the position sets.
+  pure real(wp) function effect_energy(effects, x, extension) result(energy)
     type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: x, stretch
-    energy = effects%cubic*stretch**4/4 - effects%offset*x
-    if (.not. effects%by_position) return
-    energy = energy + integral_of(effects%spring, stretch) + effects%series_stiffness*integral_of(effects%play, stretch) &
+    real(wp), intent(in) :: x, extension
+    energy = effects%cubic*extension**4/4 - effects%offset*x
+    if (.not. effects%by_position_table) return
+    energy = energy + integral_of(effects%spring, extension) + effects%series_stiffness*integral_of(effects%play, extension) &
              - integral_of(effects%force, x)
   end function effect_energy
 
@@ -287,13 +288,13 @@ contains
     losses(2) = (effects%quadratic_drag*abs(v) + effects%asymmetric_viscous*slip%direction)*v**2 + effects%cubic_damping*v**4
   end function effect_losses
 
-  !> h, by which the place `x` [m] changes dry friction.
+  !> h, by which the position `x` [m] changes dry friction.
   pure elemental real(wp) function friction_factor(effects, x, piece) result(factor)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x
     integer, intent(in), optional :: piece
     factor = 1 + effects%friction_slope*x
-    if (effects%over_place%count > 0) factor = factor + continued_at(effects%over_place, x, piece)
+    if (effects%over_position%count > 0) factor = factor + continued_at(effects%over_position, x, piece)
     factor = max(0.0_wp, factor)
   end function friction_factor
 

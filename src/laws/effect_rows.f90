@@ -132,7 +132,7 @@ module effect_rows
                     'of the sensor behind the drive; negative if it is ahead')]
 
   character(len=*), parameter :: over_speed = 'friction over speed', over_impacts = 'restitution over impact speed', &
-    over_stretch = 'spring over stretch', over_penetration = 'contact over penetration', over_phase = 'drive over phase'
+    over_extension = 'spring over stretch', over_penetration = 'contact over penetration', over_phase = 'drive over phase'
 
   type(effect_trait_t), parameter, public :: effect_traits(size(effect_laws)) = [ &
     effect_trait_t('viscous', over_speed, 'flight', 'damping', '', ''), &
@@ -146,9 +146,9 @@ module effect_rows
     effect_trait_t('position_dependent_friction', 'friction over place', 'flight', 'slope', '', 'friction'), &
     effect_trait_t('friction_curve', over_speed, 'flight', 'upwards downwards', '', ''), &
     effect_trait_t('friction_place_curve', 'friction over place', 'flight', 'change', '', 'friction'), &
-    effect_trait_t('cubic_spring', over_stretch, 'flight', 'stiffness', '', ''), &
-    effect_trait_t('spring_curve', over_stretch, 'flight', 'force', '', ''), &
-    effect_trait_t('backlash', over_stretch, 'flight', '', 'gap', 'restoring.stiffness'), &
+    effect_trait_t('cubic_spring', over_extension, 'flight', 'stiffness', '', ''), &
+    effect_trait_t('spring_curve', over_extension, 'flight', 'force', '', ''), &
+    effect_trait_t('backlash', over_extension, 'flight', '', 'gap', 'restoring.stiffness'), &
     effect_trait_t('force_curve', 'force over place', 'flight', 'force', '', ''), &
     effect_trait_t('offset_force', 'constant force', 'flight', 'force', '', ''), &
     effect_trait_t('restitution_slope', over_impacts, 'barrier', 'slope', '', 'contact.restitution'), &

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Which places of a machine of several bodies have an angle for a position: those that a pendulum acts on, and those joined to
-!> them, as a joint takes the difference of two positions.
+!> Which positions of a machine of several bodies have an angle for a position: those that a pendulum acts on, and those
+!> joined to them, as a joint takes the difference of two positions.
 module part_angles
   use law_table, only: label_length, law_choice_t, part_family, value_of
   implicit none
@@ -12,12 +12,12 @@ module part_angles
 
 contains
 
-  !> For each place, bodies and points of structures in the order of the choices, whether it is an angle.
+  !> For each position, bodies and points of structures in the order of the choices, whether it is an angle.
   pure function are_angles(choices) result(angles)
     type(law_choice_t), intent(in) :: choices(:)
     logical, allocatable :: angles(:)
     integer :: ends(2), i, round
-    allocate (angles(count([(is_place(choices(i)), i=1, size(choices))])), source=.false.)
+    allocate (angles(count([(is_reference_point(choices(i)), i=1, size(choices))])), source=.false.)
     do round = 0, size(angles)
       do i = 1, size(choices)
         if (.not. is_joint(choices(i))) cycle
@@ -32,12 +32,12 @@ contains
     end do
   end function are_angles
 
-  !> Names of the places that are angles.
+  !> Names of the positions that are angles.
   pure function names_of_angles(choices) result(names)
     type(law_choice_t), intent(in) :: choices(:)
     character(len=label_length), allocatable :: names(:)
     integer :: i
-    names = pack(choices%label, [(is_place(choices(i)), i=1, size(choices))])
+    names = pack(choices%label, [(is_reference_point(choices(i)), i=1, size(choices))])
     names = pack(names, are_angles(choices))
   end function names_of_angles
 
@@ -49,8 +49,8 @@ contains
     integer :: ends(2), i
     angles = are_angles(choices)
     ends = 0
-    if (is_place(choices(part))) then
-      ends(1) = count([(is_place(choices(i)), i=1, part)])
+    if (is_reference_point(choices(part))) then
+      ends(1) = count([(is_reference_point(choices(i)), i=1, part)])
     else if (is_joint(choices(part))) then
       ends = nint([value_of(choices(part), 'first_end'), value_of(choices(part), 'second_end')])
     else if (index(choices(part)%name, 'drive:') == 1) then
@@ -72,12 +72,13 @@ contains
     end do
   end function watched_is_angle
 
-  pure logical function is_place(choice)
+  pure logical function is_reference_point(choice)
     type(law_choice_t), intent(in) :: choice
-    is_place = choice%family == part_family .and. (index(choice%name, 'body:') == 1 .or. index(choice%name, 'point:') == 1)
-  end function is_place
+    is_reference_point = choice%family == part_family .and. (index(choice%name, 'body:') == 1 .or. index(choice%name, &
+      'point:') == 1)
+  end function is_reference_point
 
-  !> Whether a part acts between two places, or one and the ground.
+  !> Whether a part acts between two positions, or one and the ground.
   pure logical function is_joint(choice)
     type(law_choice_t), intent(in) :: choice
     is_joint = choice%family == part_family .and. (index(choice%name, 'spring:') == 1 .or. &

@@ -66,8 +66,8 @@ module part_rows
     law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
     law_row_t('part', drives(4), 'impulse on a body at a time after the start', '')]
 
-  !> The ends of a part are numbers of places: bodies, then points of structures, in the order of the file, 0 the ground; of a
-  !> drive, one place.
+  !> The ends of a part are numbers of positions: bodies, then points of structures, in the order of the file, 0 the ground;
+  !> of a drive, one position.
   type(parameter_row_t), parameter, public :: part_parameters(*) = [ &
     parameter_row_t('body', 'structure', 'in_sequence', '1', zero_to_one, &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other', &

@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Restoring forces as functions of the stretch, (free length + foot position) - (body position).
+!> Restoring forces as functions of the extension, (free length + foot position) - (body position).
 !> A new law adds a kind here, a row to `law_table`, a branch to both functions and a test; if it is not
-!> linear in the stretch, `is_linear` stays false and the adaptive flight takes over.
+!> linear in the extension, `is_linear` stays false and the adaptive flight takes over.
 module restoring_law
   use constants, only: two_pi
   use elementary, only: sine_cosine
@@ -19,12 +19,12 @@ module restoring_law
 
   type, public :: restoring_t
     integer :: kind = kind_none
-    !> Stiffness at zero stretch [N/m]; gives the natural frequency.
+    !> Stiffness at zero extension [N/m]; gives the natural frequency.
     real(wp) :: stiffness = 0
     !> Stretch-free distance between foot and body [m].
     real(wp) :: free_length = 0
     logical :: is_linear = .true.
-    !> The stretch after which the force repeats, where it is an angle [rad]; 0 if it never does.
+    !> The extension after which the force repeats, where it is an angle [rad]; 0 if it never does.
     real(wp) :: turn = 0
   end type restoring_t
 
@@ -54,48 +54,48 @@ contains
     end do
   end function position_is_angle
 
-  !> Force on the body [N] at a stretch [m].
-  pure elemental real(wp) function restoring_force(law, stretch)
+  !> Force on the body [N] at a extension [m].
+  pure elemental real(wp) function restoring_force(law, extension)
     type(restoring_t), intent(in) :: law
-    real(wp), intent(in) :: stretch
+    real(wp), intent(in) :: extension
     real(wp) :: sine, cosine
     select case (law%kind)
     case (kind_linear)
-      restoring_force = law%stiffness*stretch
+      restoring_force = law%stiffness*extension
     case (kind_pendulum)
-      call sine_cosine(stretch, sine, cosine)
+      call sine_cosine(extension, sine, cosine)
       restoring_force = law%stiffness*sine
     case default
       restoring_force = 0
     end select
   end function restoring_force
 
-  !> Derivative of the force with respect to the stretch [N/m].
-  pure elemental real(wp) function restoring_stiffness(law, stretch)
+  !> Derivative of the force with respect to the extension [N/m].
+  pure elemental real(wp) function restoring_stiffness(law, extension)
     type(restoring_t), intent(in) :: law
-    real(wp), intent(in) :: stretch
+    real(wp), intent(in) :: extension
     real(wp) :: sine, cosine
     select case (law%kind)
     case (kind_linear)
       restoring_stiffness = law%stiffness
     case (kind_pendulum)
-      call sine_cosine(stretch, sine, cosine)
+      call sine_cosine(extension, sine, cosine)
       restoring_stiffness = law%stiffness*cosine
     case default
-      restoring_stiffness = 0*stretch
+      restoring_stiffness = 0*extension
     end select
   end function restoring_stiffness
 
-  !> Energy stored at a stretch [m], in J.
-  pure elemental real(wp) function restoring_energy(law, stretch)
+  !> Energy stored at a extension [m], in J.
+  pure elemental real(wp) function restoring_energy(law, extension)
     type(restoring_t), intent(in) :: law
-    real(wp), intent(in) :: stretch
+    real(wp), intent(in) :: extension
     real(wp) :: sine, cosine
     select case (law%kind)
     case (kind_linear)
-      restoring_energy = 0.5_wp*law%stiffness*stretch**2
+      restoring_energy = 0.5_wp*law%stiffness*extension**2
     case (kind_pendulum)
-      call sine_cosine(stretch/2, sine, cosine)
+      call sine_cosine(extension/2, sine, cosine)
       restoring_energy = 2*law%stiffness*sine**2
     case default
       restoring_energy = 0

@@ -12,10 +12,10 @@ module table_pieces
 
   public :: enter_pieces, list_ends, margin_of_end
 
-  !> Variables of tables: stretch of the spring, place, speed in the direction of the slip.
-  integer, parameter, public :: of_stretch = 1, of_place = 2, of_speed = 3
-  !> Margins that are not linear in the state: of the stretch of the spring below a constant, and above it.
-  integer, parameter, public :: stretch_below = 1, stretch_above = 2
+  !> Variables of tables: extension of the spring, position, speed in the direction of the slip.
+  integer, parameter, public :: of_extension = 1, of_position = 2, of_speed = 3
+  !> Margins that are not linear in the state: of the extension of the spring below a constant, and above it.
+  integer, parameter, public :: extension_below = 1, extension_above = 2
   !> Two each of spring, play, force, factor of dry friction, friction.
   integer, parameter, public :: most_ends = 10
 
@@ -27,15 +27,15 @@ module table_pieces
 
 contains
 
-  !> Keeps `slip` to the pieces that it is in at `x` [m], `v` [m/s] and a `stretch` [m] of the spring.
-  pure subroutine enter_pieces(effects, x, v, stretch, slip)
+  !> Keeps `slip` to the pieces that it is in at `x` [m], `v` [m/s] and a `extension` [m] of the spring.
+  pure subroutine enter_pieces(effects, x, v, extension, slip)
     type(effects_t), intent(in) :: effects
-    real(wp), intent(in) :: x, v, stretch
+    real(wp), intent(in) :: x, v, extension
     type(slip_memory_t), intent(inout) :: slip
-    slip%in_spring = piece_at(effects%spring, stretch)
-    slip%in_play = piece_at(effects%play, stretch)
+    slip%in_spring = piece_at(effects%spring, extension)
+    slip%in_play = piece_at(effects%play, extension)
     slip%in_force = piece_at(effects%force, x)
-    slip%in_place = piece_at(effects%over_place, x)
+    slip%in_position = piece_at(effects%over_position, x)
     if (slip%direction > 0) then
       slip%in_speed = piece_at(effects%upwards, v)
     else
@@ -50,10 +50,10 @@ contains
     type(piece_end_t), intent(out) :: ends(most_ends)
     integer, intent(out) :: count_ends
     count_ends = 0
-    call add_ends(effects%spring, slip%in_spring, of_stretch, ends, count_ends)
-    call add_ends(effects%play, slip%in_play, of_stretch, ends, count_ends)
-    call add_ends(effects%force, slip%in_force, of_place, ends, count_ends)
-    call add_ends(effects%over_place, slip%in_place, of_place, ends, count_ends)
+    call add_ends(effects%spring, slip%in_spring, of_extension, ends, count_ends)
+    call add_ends(effects%play, slip%in_play, of_extension, ends, count_ends)
+    call add_ends(effects%force, slip%in_force, of_position, ends, count_ends)
+    call add_ends(effects%over_position, slip%in_position, of_position, ends, count_ends)
     if (slip%direction > 0) then
       call add_ends(effects%upwards, slip%in_speed, of_speed, ends, count_ends)
     else
@@ -61,7 +61,7 @@ contains
     end if
   end subroutine list_ends
 
-  !> How far a slip in `direction` is from an end: constant + row(1) x + row(2) v, and for the stretch the `number` of a
+  !> How far a slip in `direction` is from an end: constant + row(1) x + row(2) v, and for the extension the `number` of a
   !> margin to be added, else 0.
   pure subroutine margin_of_end(one, direction, constant, row, number)
     type(piece_end_t), intent(in) :: one
@@ -71,9 +71,9 @@ contains
     constant = one%side*one%limit
     row = 0
     number = 0
-    if (one%variable == of_place) row(1) = -one%side
+    if (one%variable == of_position) row(1) = -one%side
     if (one%variable == of_speed) row(2) = -one%side*direction
-    if (one%variable == of_stretch) number = merge(stretch_below, stretch_above, one%side > 0)
+    if (one%variable == of_extension) number = merge(extension_below, extension_above, one%side > 0)
   end subroutine margin_of_end
 
   pure subroutine add_ends(curve, piece, variable, ends, count_ends)

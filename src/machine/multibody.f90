@@ -101,7 +101,7 @@ module multibody
     type(joint_t), allocatable :: joints(:)
     !> Names of the coordinates.
     character(len=name_length), allocatable :: names(:)
-    !> Names of the places whose positions are angles.
+    !> Names of the reference points whose positions are angles.
     character(len=name_length), allocatable :: angles(:)
     !> Bodies whose motion is given, and how they move.
     character(len=name_length), allocatable :: given_names(:)

@@ -135,15 +135,15 @@ contains
 
   !> Force of a joint along its row [N], that of a constraint excepted, and its derivatives with respect to s and u; the force of a
   !> spring is multiplied by `strength`.
-  pure subroutine joint_force(joint, phase, slider, touch_speed, s, u, strength, force, by_place, by_speed)
+  pure subroutine joint_force(joint, phase, slider, touch_speed, s, u, strength, force, by_position, by_speed)
     type(joint_t), intent(in) :: joint
     integer, intent(in) :: phase
     real(wp), intent(in) :: slider, touch_speed, s, u, strength
     real(wp), intent(out) :: force
-    real(wp), intent(out), optional :: by_place, by_speed
+    real(wp), intent(out), optional :: by_position, by_speed
     real(wp) :: direction, p, rate
     force = 0
-    if (present(by_place)) by_place = 0
+    if (present(by_position)) by_position = 0
     if (present(by_speed)) by_speed = 0
     select case (joint%kind)
     case (joint_friction)
@@ -154,7 +154,7 @@ contains
     case (joint_elastic)
       if (phase == 0) then
         force = -joint%stiffness*(s - slider)
-        if (present(by_place)) by_place = -joint%stiffness
+        if (present(by_position)) by_position = -joint%stiffness
       else
         direction = phase
         force = sliding_friction(joint%friction, u, direction)
@@ -166,30 +166,30 @@ contains
       p = merge(s - joint%upper, joint%lower - s, phase > 0)
       rate = direction*u
       if (joint%contact%by_impact) then
-        call press(contact_at_speed(joint%contact, touch_speed), direction, p, rate, force, by_place, by_speed)
+        call press(contact_at_speed(joint%contact, touch_speed), direction, p, rate, force, by_position, by_speed)
       else
-        call press(joint%contact, direction, p, rate, force, by_place, by_speed)
+        call press(joint%contact, direction, p, rate, force, by_position, by_speed)
       end if
     case (joint_spring)
-      call spring_force(joint, s, strength, force, by_place)
+      call spring_force(joint, s, strength, force, by_position)
     end select
   end subroutine joint_force
 
   !> Force of a spring [N] and its derivative with respect to s.
-  pure subroutine spring_force(joint, s, strength, force, by_place)
+  pure subroutine spring_force(joint, s, strength, force, by_position)
     type(joint_t), intent(in) :: joint
     real(wp), intent(in) :: s, strength
     real(wp), intent(out) :: force
-    real(wp), intent(out), optional :: by_place
+    real(wp), intent(out), optional :: by_position
     real(wp) :: sine, cosine, pull
     call sine_cosine(s, sine, cosine)
     pull = 0
     if (abs(joint%attraction) > 0) pull = joint%attraction/(joint%gap - s)**2
     force = strength*(pull - s*(joint%stiffness + s*(joint%quadratic + s*joint%cubic)) - joint%moment*sine)
-    if (.not. present(by_place)) return
-    by_place = -joint%stiffness - s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
-    if (abs(joint%attraction) > 0) by_place = by_place + 2*pull/(joint%gap - s)
-    by_place = strength*by_place
+    if (.not. present(by_position)) return
+    by_position = -joint%stiffness - s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
+    if (abs(joint%attraction) > 0) by_position = by_position + 2*pull/(joint%gap - s)
+    by_position = strength*by_position
   end subroutine spring_force
 
   !> The terms of the force of a spring without their signs, of which rounding takes a share [N].
@@ -219,16 +219,16 @@ contains
   end subroutine strength_now
 
   !> Force of a pressed contact and its derivatives.
-  pure subroutine press(law, direction, p, rate, force, by_place, by_speed)
+  pure subroutine press(law, direction, p, rate, force, by_position, by_speed)
     type(contact_t), intent(in) :: law
     real(wp), intent(in) :: direction, p, rate
     real(wp), intent(out) :: force
-    real(wp), intent(out), optional :: by_place, by_speed
+    real(wp), intent(out), optional :: by_position, by_speed
     real(wp) :: slopes(2)
     force = -direction*contact_force(law, p, rate)
-    if (.not. (present(by_place) .and. present(by_speed))) return
+    if (.not. (present(by_position) .and. present(by_speed))) return
     slopes = contact_force_slopes(law, p, rate)
-    by_place = -slopes(1)
+    by_position = -slopes(1)
     by_speed = -slopes(2)
   end subroutine press
 
@@ -264,7 +264,7 @@ contains
     real(wp), intent(out) :: force(:)
     real(wp), intent(in), optional :: a(:)
     real(wp), intent(out), optional :: rate(:)
-    real(wp) :: s, u, given, r, by_place, by_speed, strength, growth, gained
+    real(wp) :: s, u, given, r, by_position, by_speed, strength, growth, gained
     integer :: j, m, n
     n = machine%n
     force = machine%load - matmul(machine%damping, state%v(:n)) - matmul(machine%stiffness, state%q(:n))
@@ -283,10 +283,10 @@ contains
         if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
         call strength_now(joint, machine%frequency, turning, strength, growth)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, by_speed)
         force = force + r*joint%row
         if (.not. present(rate)) cycle
-        rate = rate + (by_place*u + by_speed*(sum(joint%row*a) + given))*joint%row
+        rate = rate + (by_position*u + by_speed*(sum(joint%row*a) + given))*joint%row
         if (.not. allocated(joint%strength)) cycle
         call spring_force(joint, s, growth, gained)
         rate = rate + gained*joint%row

@@ -55,9 +55,9 @@ contains
 
   !> How a structure starts where the point `row` is moved by one: displaced as a force there bends it at rest (of one that
   !> such a force moves away, its rigid motion), and with the velocities that an impulse there gives.
-  pure subroutine start_shapes(mass, stiffness, row, place, velocity)
+  pure subroutine start_shapes(mass, stiffness, row, position, velocity)
     real(wp), intent(in) :: mass(:, :), stiffness(:, :), row(:)
-    real(wp), intent(out) :: place(:), velocity(:)
+    real(wp), intent(out) :: position(:), velocity(:)
     real(wp) :: squares(size(row)), shapes(size(row), size(row)), share(size(row)), weight(size(row))
     logical :: rigid(size(row))
     call undamped_modes(stiffness, mass, squares, shapes)
@@ -70,11 +70,11 @@ contains
     else
       weight = merge(share/max(squares, tiny(1.0_wp)), 0.0_wp, squares > rigid_share*maxval(abs(squares)))
     end if
-    place = matmul(shapes, weight)/sum(share*weight)
+    position = matmul(shapes, weight)/sum(share*weight)
   end subroutine start_shapes
 
-  !> Makes the displacement row(:, k) of a place a coordinate, in the place of the one that has the largest part in it among
-  !> those not yet `taken`; `at` is its number, 0 if the place moves with those that are taken. All rows follow.
+  !> Makes the displacement row(:, k) of a position a coordinate, in the position of the one that has the largest part in it among
+  !> those not yet `taken`; `at` is its number, 0 if the position moves with those that are taken. All rows follow.
   pure subroutine make_coordinate(machine, rows, k, name, taken, at)
     type(multibody_t), intent(inout) :: machine
     real(wp), intent(inout) :: rows(:, :)

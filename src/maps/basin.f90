@@ -107,7 +107,7 @@ contains
       return
     end if
     allocate (starts(3 + size(grid%others), 0))
-    ! A start has no place for the driving body of two.
+    ! A start has no position for the driving body of two.
     if (is_pair(grid%laws)) return
     do i = 1, size(neighbours)
       if (neighbours(i)%rests) cycle
@@ -176,7 +176,7 @@ contains
           if (present(whole)) whole = done
           if (allocated(error) .or. .not. done) return
         else
-          call lone_points(grid, max_period, cache%ensemble, index, members, values)
+          call isolated_points(grid, max_period, cache%ensemble, index, members, values)
         end if
       end associate
     end do
@@ -207,7 +207,7 @@ contains
   end subroutine slice_points
 
   !> Points that are their own slices: each discovers its attractor.
-  subroutine lone_points(grid, max_period, ensemble, index, members, values)
+  subroutine isolated_points(grid, max_period, ensemble, index, members, values)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: max_period
     type(ensemble_t), intent(in) :: ensemble
@@ -224,6 +224,6 @@ contains
       call run_trajectory(ensemble%moving, own, ensemble%span, start(1), start(2), start(3), outcome, others=start(4:))
       values(members(i), :) = outcome_values(outcome)
     end do
-  end subroutine lone_points
+  end subroutine isolated_points
 
 end module basin

@@ -21,7 +21,7 @@ module bisection
   !> for the boundary itself.
   real(wp), parameter :: sliver = 1e-3_wp
 
-  !> A piece of an edge on which the label changes: places 0 to 1 along the edge, and the labels there.
+  !> A piece of an edge on which the label changes: positions 0 to 1 along the edge, and the labels there.
   type, public :: interval_t
     integer :: edge = 0
     real(wp) :: low = 0, high = 1
@@ -141,7 +141,7 @@ contains
     intervals = pack(intervals, kept)
   end subroutine join_slivers
 
-  !> By edge and place: insertion, for they are nearly in order.
+  !> By edge and position: insertion, for they are nearly in order.
   pure subroutine sort_intervals(intervals)
     type(interval_t), intent(inout) :: intervals(:)
     type(interval_t), allocatable :: sorted(:)

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The boundaries between the labels of a plane of points as lines: places where the label changes along the edges of the cells are
-!> linked through the cells. Any number of labels; where three or more meet in a cell, the lines end in a junction.
+!> The boundaries between the labels of a plane of points as lines: positions where the label changes along the edges of the
+!> cells are linked through the cells. Any number of labels; where three or more meet in a cell, the lines end in a junction.
 module boundary_lines
   use bisection, only: interval_t
   use kinds, only: wp
@@ -19,7 +19,7 @@ module boundary_lines
   !> A point of a line: in units of the axes, with the axis of its edge (0: a junction), the labels below and above it along that,
   !> half the width of the interval that holds it, and the number of the interval (0: a junction).
   type, public :: line_point_t
-    real(wp) :: place(2) = 0, error = 0
+    real(wp) :: position(2) = 0, error = 0
     integer :: along = 0, below = 0, above = 0, interval = 0
   end type line_point_t
 
@@ -151,8 +151,8 @@ contains
     number = count(mask)
   end function count_of
 
-  !> The lines of a plane with values `a`, `b` along its axes. `intervals` are sorted by edge and place; `centres` are the labels in
-  !> the middle of the crowded cells, in their order.
+  !> The lines of a plane with values `a`, `b` along its axes. `intervals` are sorted by edge and position; `centres` are the
+  !> labels in the middle of the crowded cells, in their order.
   subroutine link_lines(a, b, edges, intervals, centres, points, lines)
     real(wp), intent(in) :: a(:), b(:)
     type(edge_t), intent(in) :: edges(:)
@@ -194,10 +194,10 @@ contains
     type(line_point_t) :: point
     real(wp) :: length, share
     share = interval%low + (interval%high - interval%low)/2
-    point%place = [a(edge%i), b(edge%j)]
+    point%position = [a(edge%i), b(edge%j)]
     if (edge%along == 1) length = a(edge%i + 1) - a(edge%i)
     if (edge%along == 2) length = b(edge%j + 1) - b(edge%j)
-    point%place(edge%along) = point%place(edge%along) + share*length
+    point%position(edge%along) = point%position(edge%along) + share*length
     point%error = (interval%high - interval%low)/2*length
     point%along = edge%along
     point%below = interval%below
@@ -254,7 +254,7 @@ contains
     type(links_t), intent(inout) :: links
     type(line_point_t) :: junction
     integer :: i
-    junction%place = [(sum(points(group)%place(i))/size(group), i=1, 2)]
+    junction%position = [(sum(points(group)%position(i))/size(group), i=1, 2)]
     junction%error = maxval([a(cell(1) + 1) - a(cell(1)), b(cell(2) + 1) - b(cell(2))])/2
     points = [points, junction]
     do i = 1, size(group)

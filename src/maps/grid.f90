@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A map's grid: points over axes, some of which are starts (x0, v0, crank angle, places and velocities of further bodies)
+!> A map's grid: points over axes, some of which are starts (x0, v0, crank angle, positions and velocities of further bodies)
 !> and the others parameters. Starts may also be drawn at random: then one axis counts them.
 !> A slice is one combination of the parameters: one machine, one catalogue of attractors.
 module grid

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Which points of a map are computed and which are inferred: one square block at a time, a pure function of the settings,
-!> the place of the block and the values asked for. The caller computes what `next_points` wants, tells it to `learn_points`,
+!> the position of the block and the values asked for. The caller computes what `next_points` wants, tells it to `learn_points`,
 !> and once nothing is wanted takes the whole block out with `block_content`. docs/theory.md says what can be missed.
 module refinement
   use kinds, only: int64, wp

@@ -65,7 +65,7 @@ contains
     call begin_tally(moving, held%state, tally)
     do i = 1, periods
       if (i == periods - in_window + 1) then
-        tally%wants_v_max = .true.
+        tally%needs_v_max = .true.
         call begin_tally(moving, held%state, tally)
       end if
       call advance_section_period(moving, held%state, tally, held%reason)

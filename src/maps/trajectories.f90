@@ -307,7 +307,7 @@ contains
     integer :: k, i
     do k = 1, size(catalogue)
       associate (a => catalogue(k))
-        if (a%rests .or. a%any_place) cycle
+        if (a%rests .or. a%any_position) cycle
         do i = 1, a%period
           call add_capture(moving, lanes, k, a%points(:a%coordinates, i), a%scale(:a%coordinates), &
                            a%metric(:(a%coordinates*(a%coordinates + 1))/2, i), a%capture_radius**2)
@@ -326,7 +326,7 @@ contains
     type(lane_batch_t), intent(inout) :: batch
     batch%until(lane) = trajectory%until
     batch%sections(lane) = sections_ahead(ensemble%moving, ensemble%span, trajectory)
-    if (trajectory%phase == phase_extension .and. any(catalogue%any_place)) batch%sections(lane) = 0
+    if (trajectory%phase == phase_extension .and. any(catalogue%any_position)) batch%sections(lane) = 0
     batch%budget(lane) = real(ensemble%moving%options%event_budget - trajectory%tally%events, wp)
     batch%leaves(lane) = merge(1, 0, ends_converged(ensemble%span, trajectory))
     batch%elapsed(lane) = trajectory%elapsed

@@ -81,20 +81,20 @@ contains
     real(wp), intent(in) :: impulse(:)
     type(multibody_state_t), intent(inout) :: state
     real(wp), dimension(size(list)) :: left, r, y, none
-    real(wp) :: g(size(list), size(list)), swing(machine%n), kick(machine%n, size(list)), s, u
+    real(wp) :: g(size(list), size(list)), magnitude(machine%n), kick(machine%n, size(list)), s, u
     logical :: moves(size(list)), blurred, ok
     integer :: i, k, side(size(list))
-    swing = abs(state%v(:machine%n))
+    magnitude = abs(state%v(:machine%n))
     do i = 1, size(list)
       kick(:, i) = matmul(machine%mobility, machine%joints(list(i))%row)
-      swing = swing + abs(impulse(i)*kick(:, i))
+      magnitude = magnitude + abs(impulse(i)*kick(:, i))
     end do
     blurred = .false.
     do i = 1, size(list)
       g(:, i) = [(sum(machine%joints(list(k))%row*kick(:, i)), k=1, size(list))]
       call joint_motion(machine, list(i), state%q, state%v, state%time, turning, s, u)
       left(i) = u
-      moves(i) = abs(u) > 64*epsilon(u)*(sum(abs(machine%joints(list(i))%row)*swing) + abs(machine%joints(list(i))%offset%rate))
+      moves(i) = abs(u) > 64*epsilon(u)*(sum(abs(machine%joints(list(i))%row)*magnitude) + abs(machine%joints(list(i))%offset%rate))
       if (moves(i)) cycle
       blurred = blurred .or. abs(u) > machine%negligible_speed + rounding_of_speed(machine, list(i), state)
     end do

@@ -8,7 +8,7 @@ module build_control
   use multibody, only: controller_t, impulse_t, multibody_t
   use kinds, only: wp
   use law_table, only: law_choice_t, path_of, value_of
-  use places, only: place_of
+  use reference_points, only: reference_point_of
   use status, only: exit_bad_case
   use waves, only: wave_of
   implicit none
@@ -18,8 +18,8 @@ module build_control
 
 contains
 
-  !> The controllers, every joint and force being in place; `rows` are those of the places (columns), `given` the coordinates whose
-  !> motion is given.
+  !> The controllers, every joint and force being in position; `rows` are those of the positions (columns), `given` the
+  !> coordinates whose motion is given.
   pure subroutine add_controllers(choices, rows, given, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     real(wp), intent(in) :: rows(:, :)
@@ -35,7 +35,7 @@ contains
                   'motion is given, allowed one controller')
         return
       end if
-      controller%row = rows(:, place_of(choices(i)))
+      controller%row = rows(:, reference_point_of(choices(i)))
       controller%reference = wave_of(choices(i))
       controller%proportional = value_of(choices(i), 'proportional')
       controller%integral = value_of(choices(i), 'integral')
@@ -57,7 +57,7 @@ contains
     integer :: i, k
     do i = 1, size(choices)
       if (choices(i)%name /= 'drive:impulse') cycle
-      associate (row => rows(:, place_of(choices(i))))
+      associate (row => rows(:, reference_point_of(choices(i))))
         impulse%row = pack(row, [(all(given /= k), k=1, size(row))])
       end associate
       if (.not. any(abs(impulse%row) > 0)) then

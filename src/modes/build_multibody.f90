@@ -15,7 +15,7 @@ module build_multibody
     path_of, set_value, value_of
   use matrices, only: solve
   use part_angles, only: names_of_angles
-  use places, only: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of
+  use reference_points, only: add_structures, body_name, is_reference_point, name_coordinates, number, reference_point_of, row_of
   use status, only: exit_bad_case
   use waves, only: modulation_of, wave_of
   implicit none
@@ -60,7 +60,7 @@ contains
       select case (choices(i)%name)
       case ('drive:force')
         wave = wave_of(choices(i))
-        call add_force(machine, rows(:, place_of(choices(i))), wave%mean, wave%harmonic)
+        call add_force(machine, rows(:, reference_point_of(choices(i))), wave%mean, wave%harmonic)
       case default
         if (index(choices(i)%name, 'spring:') == 1) call add_spring(machine, choices(i), row_of(rows, choices(i)), error)
         if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
@@ -71,7 +71,7 @@ contains
     end do
     do i = 1, size(choices)
       if (choices(i)%name /= 'drive:motion') cycle
-      call give_motion(machine, trim(machine%names(coordinate(place_of(choices(i))))), wave_of(choices(i)))
+      call give_motion(machine, trim(machine%names(coordinate(reference_point_of(choices(i))))), wave_of(choices(i)))
     end do
     associate (given => given_of(choices, coordinate))
       call add_controllers(choices, rows, given, machine, error)
@@ -80,7 +80,7 @@ contains
     end associate
   end subroutine multibody_of
 
-  !> Laws of machines of one or two bodies, and effects, have no place here.
+  !> Laws of machines of one or two bodies, and effects, have no position here.
   pure subroutine refuse_others(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error
@@ -95,7 +95,7 @@ contains
                   'allowed in tables with a name: [spring.NAME], [friction.NAME], [contact.NAME], [drive.NAME]')
         return
       end if
-      if (is_place(choices(i))) bodies = bodies + 1
+      if (is_reference_point(choices(i))) bodies = bodies + 1
     end do
     if (bodies == 0) call fail(error, exit_bad_case, 'body: found no [body.NAME] and no point of a [structure.NAME], allowed '// &
                                'one or more')
@@ -265,7 +265,7 @@ contains
     integer :: i
     given = [integer ::]
     do i = 1, size(choices)
-      if (choices(i)%name == 'drive:motion') given = [given, coordinate(place_of(choices(i)))]
+      if (choices(i)%name == 'drive:motion') given = [given, coordinate(reference_point_of(choices(i)))]
     end do
   end function given_of
 

@@ -95,13 +95,14 @@ contains
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: force(:)
-    real(wp) :: size_of_y(most_joints), parts(machine%n), places(machine%n), s, u, r, by_place, by_speed, strength, energy
+    real(wp) :: size_of_y(most_joints), parts(machine%n), positions(machine%n), s, u, r, by_position, by_speed, strength, &
+      energy
     integer :: i, n
     n = machine%n
-    places = abs(state%q(:n)) + abs(state%v(:n)*state%time)
-    energy = energy_of_swing(machine, state)
+    positions = abs(state%q(:n)) + abs(state%v(:n)*state%time)
+    energy = energy_scale(machine, state)
     parts = abs(force) + abs(machine%load) + matmul(abs(machine%damping), abs(state%v(:n))) &
-            + matmul(abs(machine%stiffness), places)
+            + matmul(abs(machine%stiffness), positions)
     if (allocated(machine%controller)) then
       call running_control(machine%controller, state, s, u)
       parts = parts + (abs(state%control) + abs(s))*abs(machine%controller%row)
@@ -116,56 +117,56 @@ contains
       ! The force of a stiff joint is the small difference of large ones.
       call joint_motion(machine, i, state%q, state%v, state%time, turning, s, u)
       call strength_now(machine%joints(i), machine%frequency, turning, strength)
-      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, strength, r, by_place, &
+      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, strength, r, by_position, &
                        by_speed)
       associate (row => abs(machine%joints(i)%row))
-        parts = parts + row*(abs(by_place)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
+        parts = parts + row*(abs(by_position)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
         if (machine%joints(i)%kind /= joint_spring) cycle
-        parts = parts + row*(abs(by_place)*sum(row*places) + swing_of_force(energy, abs(by_place), &
+        parts = parts + row*(abs(by_position)*sum(row*positions) + magnitude_of_force(energy, abs(by_position), &
                                                                           sum(row*matmul(abs(machine%mobility), row)), order))
       end associate
     end do
     do i = 1, n
-      parts(i) = parts(i) + swing_of_force(energy, max(machine%stiffness(i, i), 0.0_wp), machine%mobility(i, i), order)
+      parts(i) = parts(i) + magnitude_of_force(energy, max(machine%stiffness(i, i), 0.0_wp), machine%mobility(i, i), order)
     end do
     size_of_y = 0
     do i = 1, lcp%count
       size_of_y(i) = sum(abs(machine%joints(lcp%joint(i))%row)*matmul(abs(machine%mobility), parts)) &
-                     + swing_of(machine, lcp%joint(i), order)
+                     + magnitude_of(machine, lcp%joint(i), order)
     end do
   end function sizes
 
-  !> What the modes of a motion may bring to one place, whatever of them is there now [J].
-  pure real(wp) function energy_of_swing(machine, state) result(energy)
+  !> What the modes of a motion may bring to one position, whatever of them is there now [J].
+  pure real(wp) function energy_scale(machine, state) result(energy)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
     associate (q => abs(state%q(:machine%n)), v => abs(state%v(:machine%n)))
       energy = 0.5_wp*sum(v*matmul(abs(machine%mass), v)) + 0.5_wp*sum(q*matmul(abs(machine%stiffness), q))
     end associate
-  end function energy_of_swing
+  end function energy_scale
 
   !> Largest force, or a rate of it (derivative number `order` - 2), of a spring [N/m] under a body with a mobility [1/kg] that has
-  !> an energy [J]: what places on their way through zero are the rounding of.
-  pure real(wp) function swing_of_force(energy, stiffness, mobility, order) result(force)
+  !> an energy [J]: what positions on their way through zero are the rounding of.
+  pure real(wp) function magnitude_of_force(energy, stiffness, mobility, order) result(force)
     real(wp), intent(in) :: energy, stiffness, mobility
     integer, intent(in) :: order
     force = sqrt(2*energy*stiffness)
     if (order > 2) force = force*sqrt(stiffness*mobility)**(order - 2)
-  end function swing_of_force
+  end function magnitude_of_force
 
   !> Bound on derivative number `order` of the given part of a joint coordinate.
-  pure real(wp) function swing_of(machine, j, order) result(swing)
+  pure real(wp) function magnitude_of(machine, j, order) result(magnitude)
     type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, order
     integer :: m
-    swing = 0
+    magnitude = 0
     associate (offset => machine%joints(j)%offset)
       if (.not. allocated(offset%harmonic)) return
       do m = 1, size(offset%harmonic)
-        swing = swing + (abs(real(offset%harmonic(m))) + abs(aimag(offset%harmonic(m))))*(m*machine%frequency)**order
+        magnitude = magnitude + (abs(real(offset%harmonic(m))) + abs(aimag(offset%harmonic(m))))*(m*machine%frequency)**order
       end do
     end associate
-  end function swing_of
+  end function magnitude_of
 
   !> Second rates of the forces, the laws taken as linear.
   pure subroutine second_rate(machine, state, turning, a, jerk, rate)
@@ -174,7 +175,7 @@ contains
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(in) :: a(:), jerk(:)
     real(wp), intent(out) :: rate(:)
-    real(wp) :: s, u, r, by_place, by_speed, strength, growth, curvature
+    real(wp) :: s, u, r, by_position, by_speed, strength, growth, curvature
     integer :: m, j
     rate = -matmul(machine%damping, jerk) - matmul(machine%stiffness, a)
     do m = 1, size(machine%force, 2)
@@ -185,12 +186,12 @@ contains
         if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
         call strength_now(joint, machine%frequency, turning, strength, growth, curvature)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
-        rate = rate + (by_place*(sum(joint%row*a) + surface(machine, j, state, turning, 2)) &
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, by_speed)
+        rate = rate + (by_position*(sum(joint%row*a) + surface(machine, j, state, turning, 2)) &
                        + by_speed*(sum(joint%row*jerk) + surface(machine, j, state, turning, 3)))*joint%row
         if (.not. allocated(joint%strength)) cycle
-        call spring_force(joint, s, growth, r, by_place)
-        rate = rate + 2*by_place*u*joint%row
+        call spring_force(joint, s, growth, r, by_position)
+        rate = rate + 2*by_position*u*joint%row
         call spring_force(joint, s, curvature, r)
         rate = rate + r*joint%row
       end associate

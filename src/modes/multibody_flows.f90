@@ -24,7 +24,7 @@ module multibody_flows
     !> Those of the velocities.
     real(wp), allocatable :: speeds(:, :)
     !> By how much stops are missed is noted: of two bodies, and where one position counts, for the stops alone, as motions without
-    !> impacts are then families, one at every place between them.
+    !> impacts are then families, one at every position between them.
     logical :: notes_misses = .false.
     integer :: harmonics = 0
     !> Number of the joint that is the section of a machine without a clock; 0: the section is a time.
@@ -41,17 +41,17 @@ contains
     type(options_t), intent(in) :: options
     type(multibody_motion_t), intent(out) :: moving
     real(wp) :: directions(most_degrees, most_degrees)
-    integer :: key, joints, i, places
+    integer :: key, joints, i, positions
     moving%machine = machine
     moving%options = options
     moving%harmonics = harmonics_of(machine)
-    call directions_of(machine, directions, places)
-    moving%directions = directions(:machine%n, :places)
-    call speeds_of(machine, directions, places)
-    moving%speeds = directions(:machine%n, :places)
+    call directions_of(machine, directions, positions)
+    moving%directions = directions(:machine%n, :positions)
+    call speeds_of(machine, directions, positions)
+    moving%speeds = directions(:machine%n, :positions)
     if (machine%driven .and. machine%linear .and. options%flight /= flight_adaptive .and. size(moving%directions, 2) == 1) then
-      call directions_of(without_contacts(machine), directions, places)
-      moving%notes_misses = places == 0
+      call directions_of(without_contacts(machine), directions, positions)
+      moving%notes_misses = positions == 0
     end if
     if (allocated(machine%driver)) moving%notes_misses = any(is_stop(machine%joints%kind))
     joints = size(machine%joints)

@@ -130,7 +130,7 @@ contains
     width = 0
     from = 0
     do while (from < duration)
-      call next_stretch(machine, flow, path, from, duration, until, panels)
+      call next_interval(machine, flow, path, from, duration, until, panels)
       length = (until - from)/(looks*panels)
       do i = 0, looks*panels
         found = pressed(from + i*length)
@@ -202,7 +202,7 @@ contains
     state = start
     from = first
     do while (from < last)
-      call next_stretch(machine, flow, path, from, last, until, panels)
+      call next_interval(machine, flow, path, from, last, until, panels)
       length = (until - from)/panels
       do i = 1, panels
         do k = 1, size(node)
@@ -222,7 +222,7 @@ contains
   end subroutine balance_flight
 
   !> An interval from `first` [s after the start of the path] to `last` at most, `until` the fastest part has decayed; its panels.
-  pure subroutine next_stretch(machine, flow, path, first, last, until, panels)
+  pure subroutine next_interval(machine, flow, path, first, last, until, panels)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(path_t), intent(in) :: path
@@ -246,7 +246,7 @@ contains
       fastest = max(fastest, flow%rate)
     end if
     panels = max(1, ceiling(3*fastest*(until - first)))
-  end subroutine next_stretch
+  end subroutine next_interval
 
   !> Powers lost to friction, dampers and contacts, and put in by forces and moving surfaces [W].
   pure subroutine powers(machine, flow, state, friction, damping, contact, work)

@@ -112,8 +112,8 @@ contains
     if (allocated(moving%machine%driver)) from = moving%machine%driver%stops_run*state%clock
     watch%extremes = [tally%x_min, tally%x_max] - from
     watch%top_speed = tally%v_max
-    watch%wants_speed = tally%wants_v_max
-    watch%wants_margin = moving%notes_misses
+    watch%needs_speed = tally%needs_v_max
+    watch%needs_margin = moving%notes_misses
     timed = acts_on_time(moving%machine)
     associate (machine => moving%machine)
       do while (state%time < time_end .and. .not. state%at_section)

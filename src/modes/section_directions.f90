@@ -29,11 +29,11 @@ contains
     call directions_with(machine, .true., directions, count_directions)
     call directions_with(machine, .false., between, count_between)
     if (count_between == count_directions .or. count_between == 0) return
-    call tell_apart(directions(:machine%n, :count_directions), between(:machine%n, :count_between))
+    call distinguish(directions(:machine%n, :count_directions), between(:machine%n, :count_between))
   end subroutine directions_of
 
   !> Turns orthonormal directions so that the last ones are `last`, which lie among them.
-  pure subroutine tell_apart(directions, last)
+  pure subroutine distinguish(directions, last)
     real(wp), intent(inout) :: directions(:, :)
     real(wp), intent(in) :: last(:, :)
     real(wp) :: rest(size(directions, 1), size(directions, 2))
@@ -51,7 +51,7 @@ contains
       call take_out(directions(:, k), rest)
     end do
     directions(:, first + 1:) = last
-  end subroutine tell_apart
+  end subroutine distinguish
 
   !> The same, with the stops or without.
   pure subroutine directions_with(machine, stops, directions, count_directions)

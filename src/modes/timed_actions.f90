@@ -129,7 +129,7 @@ contains
       log%balance%work = log%balance%work + energy_of_multibody(machine, pushed) - energy_of_multibody(machine, before)
       call balance_change(machine, pushed, state, log)
       call record_change(machine, event_blow, before, state, log)
-      ! In the place of a joint stands the number after the last.
+      ! In the position of a joint stands the number after the last.
       call put_column(log%event_joint, log%events, &
                       [count(machine%joints%kind /= joint_section) + 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
     end associate

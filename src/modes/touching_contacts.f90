@@ -17,31 +17,31 @@ module touching_contacts
 
 contains
 
-  !> Contacts that close, or have opened, within the rounding of places and of the clock take part in an impact: they touch. The
-  !> rounding of places on their way through zero is that of their swing, and a slow impact, of those that are `hit`, has no sharper
-  !> time.
+  !> Contacts that close, or have opened, within the rounding of positions and of the clock take part in an impact: they
+  !> touch. The rounding of positions on their way through zero is that of their magnitude, and a slow impact, of those that
+  !> are `hit`, has no sharper time.
   pure subroutine add_degenerate(machine, state, turning, hit, touching)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: hit(:)
     integer, intent(inout) :: touching(:)
-    real(wp) :: s, u, swing, reach, span
+    real(wp) :: s, u, magnitude, reach, span
     integer :: j, phase(most_joints)
     logical :: alone
     alone = .true.
-    swing = 16*epsilon(s)*swing_of(machine, state)
+    magnitude = 16*epsilon(s)*magnitude_of(machine, state)
     span = 8*spacing(state%time)
     do j = 1, size(machine%joints)
       if (hit(j) == 0) cycle
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-      span = max(span, min(longest_tie*machine%period, swing*sum(abs(machine%joints(j)%row))/max(abs(u), tiny(u))))
+      span = max(span, min(longest_tie*machine%period, magnitude*sum(abs(machine%joints(j)%row))/max(abs(u), tiny(u))))
     end do
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
         if (joint%kind /= joint_contact .or. touching(j) /= 0) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        reach = swing*sum(abs(joint%row)) + 16*epsilon(s)*abs(joint%offset%mean) + abs(u)*span
+        reach = magnitude*sum(abs(joint%row)) + 16*epsilon(s)*abs(joint%offset%mean) + abs(u)*span
         if (s >= joint%upper - reach) touching(j) = 1
         if (s <= joint%lower + reach) touching(j) = -1
         if (touching(j) /= 0) alone = .false.
@@ -72,25 +72,26 @@ contains
     end do
   end subroutine add_near
 
-  !> Takes gaps of contacts that touch, `slow`, from the places where bodies on their way through zero have no digits of them: the
-  !> rounding of their swing decides nothing.
+  !> Takes gaps of contacts that touch, `slow`, from the positions where bodies on their way through zero have no digits of
+  !> them: the rounding of their magnitude decides nothing.
   pure subroutine close_gaps(machine, state, turning, slow)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(inout) :: state
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: slow(:)
     real(wp), parameter :: rounding = 64*epsilon(1.0_wp)
-    real(wp) :: s, u, gap, swing
+    real(wp) :: s, u, gap, magnitude
     logical :: blurred(most_joints)
     integer :: j
     blurred = .false.
-    swing = swing_of(machine, state)
+    magnitude = magnitude_of(machine, state)
     do j = 1, size(machine%joints)
       if (slow(j) == 0) cycle
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
       gap = abs(s - merge(machine%joints(j)%upper, machine%joints(j)%lower, slow(j) > 0))
       associate (joint => machine%joints(j))
-        blurred(j) = gap > rounding*(sum(abs(joint%row*state%q(:machine%n))) + abs(joint%offset%mean)) .and. gap <= rounding*swing
+        blurred(j) = gap > rounding*(sum(abs(joint%row*state%q(:machine%n))) + abs(joint%offset%mean)) .and. &
+          gap <= rounding*magnitude
       end associate
     end do
     if (.not. any(blurred)) return
@@ -99,11 +100,11 @@ contains
     where (blurred) state%phase = 0
   end subroutine close_gaps
 
-  !> How far places go [m].
-  pure real(wp) function swing_of(machine, state) result(swing)
+  !> How far positions go [m].
+  pure real(wp) function magnitude_of(machine, state) result(magnitude)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
-    swing = maxval(abs(state%q(:machine%n))) + maxval(abs(state%v(:machine%n)))*machine%period
-  end function swing_of
+    magnitude = maxval(abs(state%q(:machine%n))) + maxval(abs(state%v(:machine%n)))*machine%period
+  end function magnitude_of
 
 end module touching_contacts

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What a transition of a multibody structure is told as: its events, and what it does to the energy.
+!> What a transition of a multibody structure is reported as: its events, and what it does to the energy.
 module transition_log
   use chatter, only: rest_of_chatter
   use guards, only: joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, slides_down, slides_up
@@ -31,7 +31,7 @@ contains
     type(log_t), intent(inout) :: log
     type(multibody_state_t) :: struck
     complex(wp) :: turning(moving%harmonics)
-    logical, dimension(size(moving%machine%joints)) :: told, stood, stands
+    logical, dimension(size(moving%machine%joints)) :: reported, stood, stands
     real(wp) :: rest
     integer :: g, j, kind
     associate (machine => moving%machine)
@@ -41,7 +41,7 @@ contains
       turning = turning_at(machine%frequency, before%time, moving%harmonics)
       stood = stand_still(machine, before, turning)
       stands = stand_still(machine, struck, turning)
-      told = .false.
+      reported = .false.
       do g = 1, size(list)
         if (.not. triggered(g)) cycle
         j = list(g)%joint
@@ -64,7 +64,7 @@ contains
         case default
           cycle
         end select
-        told(j) = .true.
+        reported(j) = .true.
         call log_event(machine, kind, j, before, struck, log)
         if (machine%joints(j)%kind == joint_contact .and. after%phase(j) /= 0 .and. before%phase(j) == 0 .and. &
             machine%joints(j)%contact%restitution > 0 .and. machine%joints(j)%upper > machine%joints(j)%lower) then
@@ -78,20 +78,20 @@ contains
         end if
       end do
       ! What an impact or a cascade does to other joints.
-      call log_friction(machine, before, struck, stood, stands, told, log)
+      call log_friction(machine, before, struck, stood, stands, reported, log)
     end associate
   end subroutine log_transition
 
-  !> Friction that holds from here on, or no longer, where that is not `told` yet; of two bodies it goes with what did it.
-  pure subroutine log_friction(machine, before, after, stood, stands, told, log)
+  !> Friction that holds from here on, or no longer, where that is not `reported` yet; of two bodies it goes with what did it.
+  pure subroutine log_friction(machine, before, after, stood, stands, reported, log)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: before, after
-    logical, intent(in) :: stood(:), stands(:), told(:)
+    logical, intent(in) :: stood(:), stands(:), reported(:)
     type(log_t), intent(inout) :: log
     integer :: j
     if (allocated(machine%driver)) return
     do j = 1, size(machine%joints)
-      if (told(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
+      if (reported(j) .or. machine%joints(j)%kind /= joint_friction .or. (stood(j) .eqv. stands(j))) cycle
       call log_event(machine, merge(event_stick, event_release, stands(j)), j, before, after, log)
     end do
   end subroutine log_friction
@@ -102,13 +102,13 @@ contains
     type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
     complex(wp) :: turning(moving%harmonics)
-    logical :: told(size(moving%machine%joints))
+    logical :: reported(size(moving%machine%joints))
     integer :: j
     associate (machine => moving%machine)
       turning = turning_at(machine%frequency, before%time, moving%harmonics)
-      told = .false.
+      reported = .false.
       call log_friction(machine, before, after, stand_still(machine, before, turning), stand_still(machine, after, turning), &
-                        told, log)
+                        reported, log)
       do j = 1, size(machine%joints)
         if (machine%joints(j)%kind /= joint_contact .or. before%phase(j) == 0 .or. after%phase(j) /= 0) cycle
         call log_event(machine, event_barrier_release, j, before, after, log)

@@ -106,20 +106,20 @@ contains
     end do
   end function maximum_until
 
-  !> The polynomial with given values at given places (Newton's divided differences).
-  pure function interpolate(place, value) result(p)
-    real(wp), intent(in) :: place(0:degree), value(0:degree)
+  !> The polynomial with given values at given positions (Newton's divided differences).
+  pure function interpolate(fractions, value) result(p)
+    real(wp), intent(in) :: fractions(0:degree), value(0:degree)
     real(wp) :: p(0:degree), difference(0:degree)
     integer :: i, k
     difference = value
     do k = 1, degree
       do i = degree, k, -1
-        difference(i) = (difference(i) - difference(i - 1))/(place(i) - place(i - k))
+        difference(i) = (difference(i) - difference(i - 1))/(fractions(i) - fractions(i - k))
       end do
     end do
     p = 0
     do k = degree, 0, -1
-      p = eoshift(p, -1) - place(k)*p
+      p = eoshift(p, -1) - fractions(k)*p
       p(0) = p(0) + difference(k)
     end do
   end function interpolate

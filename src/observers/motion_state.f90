@@ -10,7 +10,7 @@ module motion_state
   private
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
-    place_of, take_turns, move_turn, append_word, open_log, record_event, put_in_order, record_sample, put_sample_balance, &
+    position_of, take_turns, move_turn, append_word, open_log, record_event, put_in_order, record_sample, put_sample_balance, &
     put_column
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
@@ -78,7 +78,7 @@ module motion_state
     !> Turns of an angle, upwards.
     integer(int64) :: turns = 0
     !> The largest velocity costs a search in every flight: only when asked.
-    logical :: wants_v_max = .false.
+    logical :: needs_v_max = .false.
   end type tally_t
 
   !> Where the energy went since the start [J]: lost to dry friction, to viscous damping, to contacts; put in by the drive.
@@ -96,7 +96,7 @@ module motion_state
     real(wp) :: origin = 0
     !> Distance of samples within a period [s]; 0 = no samples.
     real(wp) :: sample_interval = 0
-    !> Instants of the samples [s], ascending, in place of the equidistant ones.
+    !> Instants of the samples [s], ascending, in position of the equidistant ones.
     real(wp), allocatable :: instants(:)
     integer :: events = 0, samples = 0
     !> Index of the next sample, from 0: within the current period, or of the chosen instants.
@@ -175,13 +175,13 @@ contains
     type(tally_t), intent(inout) :: tally
     type(state_t), intent(in) :: state
     logical, intent(in) :: two_bodies
-    logical :: wants_v_max
+    logical :: needs_v_max
     integer(int64) :: events, steps
-    wants_v_max = tally%wants_v_max
+    needs_v_max = tally%needs_v_max
     events = tally%events
     steps = tally%steps
     tally = tally_t()
-    tally%wants_v_max = wants_v_max
+    tally%needs_v_max = needs_v_max
     tally%events = events
     tally%steps = steps
     call note_position(tally, state)
@@ -190,11 +190,11 @@ contains
   end subroutine reset_tally
 
   !> Position since the start; of an angle with the turns that it has made.
-  pure real(wp) function place_of(state) result(x)
+  pure real(wp) function position_of(state) result(x)
     type(state_t), intent(in) :: state
     x = state%x
     if (abs(state%turned) > 0) x = x + state%turned
-  end function place_of
+  end function position_of
 
   !> Takes whole turns off an angle, so that it keeps its digits however often it goes round. The extremes go with it.
   pure subroutine take_turns(turn, state, tally)
@@ -271,7 +271,7 @@ contains
     end if
     log%events = log%events + 1
     log%event_kind(log%events) = kind
-    log%event_data(:, log%events) = [log%origin + state%time, place_of(state), state%v, v_after]
+    log%event_data(:, log%events) = [log%origin + state%time, position_of(state), state%v, v_after]
     if (present(driver)) call put_column(log%event_driver, log%events, driver)
   end subroutine record_event
 
@@ -306,7 +306,7 @@ contains
     log%samples = log%samples + 1
     log%next_sample = log%next_sample + 1
     log%sample_mode(log%samples) = state%mode
-    log%sample_data(:, log%samples) = [log%origin + state%time, place_of(state), state%v]
+    log%sample_data(:, log%samples) = [log%origin + state%time, position_of(state), state%v]
     if (log%balance%kept) call put_column(log%sample_touch, log%samples, [state%touch_speed])
     if (present(driver)) call put_column(log%sample_driver, log%samples, driver)
     if (present(balance)) call put_sample_balance(log, log%samples, balance)

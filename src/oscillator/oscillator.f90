@@ -8,8 +8,8 @@ module oscillator
   use contact_law, only: add_to_contact, barrier_positions, compliant_contact, contact_of, contact_t, force_on_body
   use drive_law, only: add_harmonics, add_ripple, drive_of, drive_t, foot_motion, measured_force
   use effect_check, only: refuse_effects
-  use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, place_force, replace_friction, &
-    sensor_t, slip_in_series, slip_memory_t, stretch_bounds, stretch_force, stretch_slope
+  use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, position_force, replace_friction, &
+    sensor_t, slip_in_series, slip_memory_t, extension_bounds, extension_force, extension_slope
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
@@ -52,7 +52,7 @@ contains
 
   !> The machine of one law per family: body, restoring, friction, contact, drive, and any number of effects, in any order.
   !> Parameters are taken as they are (the case reader checks bounds); what only the whole shows is
-  !> refused: a drive without a natural frequency, a series that does not converge, an effect that the laws have no place for.
+  !> refused: a drive without a natural frequency, a series that does not converge, an effect that the laws have no position for.
   pure subroutine build_oscillator(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(oscillator_t), intent(out) :: machine
@@ -156,7 +156,7 @@ contains
     real(wp) :: barriers(2)
     barriers = barrier_positions(machine%contact)
     turn = 0
-    if (machine%effects%by_place) return
+    if (machine%effects%by_position) return
     if (barriers(1) >= unreachable .and. barriers(2) <= -unreachable) turn = machine%restoring%turn
   end function turn_of
 
@@ -182,13 +182,13 @@ contains
       if (effects%present) machine%force_scale = machine%force_scale + abs(effects%offset) + abs(effects%asymmetric_coulomb) &
                                                  + effects%dahl_sliding + abs(effects%cubic)*length**3 &
                                                  + maxval(abs([effects%upwards%value, effects%downwards%value]))
-      if (effects%by_position) machine%force_scale = machine%force_scale + maxval(abs(effects%spring%value)) &
+      if (effects%by_position_table) machine%force_scale = machine%force_scale + maxval(abs(effects%spring%value)) &
                                                      + maxval(abs(effects%force%value)) + &
                                                      effects%series_stiffness*maxval(abs(effects%play%value))
     end associate
   end subroutine set_bounds
 
-  !> One body has no place for the laws of two. The message begins with the key.
+  !> One body has no position for the laws of two. The message begins with the key.
   pure subroutine refuse_pair(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error
@@ -213,36 +213,36 @@ contains
     type(oscillator_t), intent(in) :: machine
     real(wp), intent(in) :: x, phi
     real(wp), intent(out) :: force, rate, curvature_bound
-    real(wp) :: foot, foot_rate, stretch, longest, bounds(2)
+    real(wp) :: foot, foot_rate, extension, longest, bounds(2)
     call foot_motion(machine%drive, phi, foot, foot_rate)
-    stretch = machine%restoring%free_length + foot - x
-    force = restoring_force(machine%restoring, stretch)
-    rate = restoring_stiffness(machine%restoring, stretch)*foot_rate*machine%drive_frequency
+    extension = machine%restoring%free_length + foot - x
+    force = restoring_force(machine%restoring, extension)
+    rate = restoring_stiffness(machine%restoring, extension)*foot_rate*machine%drive_frequency
     if (machine%contact%soft) force = force + force_on_body(machine%contact, x, 0.0_wp)
     curvature_bound = machine%restoring%stiffness*machine%foot_acceleration_bound
     if (.not. machine%effects%present) return
-    force = force + machine%effects%offset + stretch_force(machine%effects, stretch)
-    rate = rate + stretch_slope(machine%effects, stretch)*foot_rate*machine%drive_frequency
+    force = force + machine%effects%offset + extension_force(machine%effects, extension)
+    rate = rate + extension_slope(machine%effects, extension)*foot_rate*machine%drive_frequency
     associate (cubic => machine%effects%cubic, speed => machine%foot_speed_bound)
       longest = abs(machine%restoring%free_length + machine%drive%mean - x) + sum(abs(machine%drive%cosine)) &
                 + sum(abs(machine%drive%sine))
       curvature_bound = curvature_bound + abs(cubic)*longest*(3*longest*machine%foot_acceleration_bound + 6*speed**2)
-      if (.not. machine%effects%by_position) return
-      force = force + place_force(machine%effects, x)
-      bounds = stretch_bounds(machine%effects, stretch)
+      if (.not. machine%effects%by_position_table) return
+      force = force + position_force(machine%effects, x)
+      bounds = extension_bounds(machine%effects, extension)
       curvature_bound = curvature_bound + bounds(1)*machine%foot_acceleration_bound + bounds(2)*speed**2
     end associate
   end subroutine holding_force
 
   !> Force [N] on a slipping body at `x` [m], `v` [m/s] at `time` [s after the section] beyond those of the laws, the
-  !> spring being stretched by `stretch` [m].
-  pure real(wp) function extra_force(machine, slip, time, x, v, stretch) result(force)
+  !> spring being stretched by `extension` [m].
+  pure real(wp) function extra_force(machine, slip, time, x, v, extension) result(force)
     type(oscillator_t), intent(in) :: machine
     type(slip_memory_t), intent(in) :: slip
-    real(wp), intent(in) :: time, x, v, stretch
+    real(wp), intent(in) :: time, x, v, extension
     real(wp) :: measured, rate
     force = 0
-    if (machine%effects%present) force = effect_force(machine%effects, machine%friction, slip, x, v, stretch)
+    if (machine%effects%present) force = effect_force(machine%effects, machine%friction, slip, x, v, extension)
     if (machine%drive%interval > 0) then
       call measured_force(machine%drive, time, measured, rate)
       force = force + measured

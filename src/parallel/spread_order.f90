@@ -9,7 +9,7 @@ module spread_order
   implicit none
   private
 
-  public :: new_spread_order, spread_place
+  public :: new_spread_order, spread_subscripts
 
   type, public :: spread_order_t
     integer(int64), private :: length = 0, step = 1
@@ -41,14 +41,14 @@ contains
 
   !> Place number `number` of a sample of a grid of so many points along each axis, from 1 along each: the additive
   !> recurrence with square roots of primes. Axes after the eighth repeat the others.
-  pure function spread_place(number, lengths) result(place)
+  pure function spread_subscripts(number, lengths) result(subscripts)
     integer, intent(in) :: number, lengths(:)
-    integer :: place(size(lengths)), k
+    integer :: subscripts(size(lengths)), k
     real(real64), parameter :: roots(8) = sqrt([2, 3, 5, 7, 11, 13, 17, 19]*1.0_real64)
     do k = 1, size(lengths)
-      place(k) = 1 + int(modulo(0.5_real64 + number*roots(1 + modulo(k - 1, size(roots))), 1.0_real64)*lengths(k))
+      subscripts(k) = 1 + int(modulo(0.5_real64 + number*roots(1 + modulo(k - 1, size(roots))), 1.0_real64)*lengths(k))
     end do
-  end function spread_place
+  end function spread_subscripts
 
   pure integer(int64) function common_divisor(a, b)
     integer(int64), intent(in) :: a, b

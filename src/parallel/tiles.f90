@@ -90,15 +90,15 @@ contains
   end function points
 
   !> The number (from 1) of the tile that is so many tiles from the origin along each axis.
-  pure integer(int64) function number_at(self, place)
+  pure integer(int64) function number_at(self, subscripts)
     class(tiling_t), intent(in) :: self
-    integer(int64), intent(in) :: place(:)
-    integer(int64) :: counts(size(place))
+    integer(int64), intent(in) :: subscripts(:)
+    integer(int64) :: counts(size(subscripts))
     integer :: k
     counts = tiles_along(self)
     number_at = 0
-    do k = 1, size(place)
-      number_at = number_at*counts(k) + place(k)
+    do k = 1, size(subscripts)
+      number_at = number_at*counts(k) + subscripts(k)
     end do
     number_at = number_at + 1
   end function number_at
@@ -109,13 +109,13 @@ contains
     counts = (self%lengths + self%shape - 1)/self%shape
   end function tiles_along
 
-  pure function unravel(index, lengths) result(place)
+  pure function unravel(index, lengths) result(subscripts)
     integer(int64), intent(in) :: index, lengths(:)
-    integer(int64) :: place(size(lengths)), rest
+    integer(int64) :: subscripts(size(lengths)), rest
     integer :: i
     rest = index
     do i = size(lengths), 1, -1
-      place(i) = mod(rest, lengths(i))
+      subscripts(i) = mod(rest, lengths(i))
       rest = rest/lengths(i)
     end do
   end function unravel

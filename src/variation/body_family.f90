@@ -18,7 +18,7 @@ module body_family
   implicit none
   private
 
-  public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, place_neighbour, size_of_motion, vary_period
+  public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, position_neighbour, size_of_motion, vary_period
 
   !> Distance of the neighbours, as a share of the parameter's size, and at least.
   real(wp), parameter, public :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
@@ -43,7 +43,7 @@ module body_family
 
 contains
 
-  !> Half range of x [m] that the drive alone brings about, at least a thousandth of the length that the forces stretch the
+  !> Half range of x [m] that the drive alone brings about, at least a thousandth of the length that the forces extension the
   !> spring by: a size for differences, never 0.
   pure real(wp) function size_of_motion(moving) result(length)
     type(motion_t), intent(in) :: moving
@@ -100,7 +100,7 @@ contains
       machines%side = sides_tried(side)
       if (allocated(error)) deallocate (error)
       do i = 1, 4
-        call place_neighbour(family, value, machines, i, there, error)
+        call position_neighbour(family, value, machines, i, there, error)
         if (.not. allocated(error)) call body_of_family(family, there, near(i), error)
         if (allocated(error)) exit
         ! The same difference steps in all.
@@ -114,7 +114,7 @@ contains
   end subroutine body_neighbourhood
 
   !> Where the neighbour `i` of the machine at `value` is; code 65 if that is out of the parameter's range.
-  pure subroutine place_neighbour(family, value, machines, i, there, error)
+  pure subroutine position_neighbour(family, value, machines, i, there, error)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: value
     type(neighbourhood_t), intent(in) :: machines
@@ -123,7 +123,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     there = value + stencil_offset(machines%side, i)*machines%step
     if (there < family%lowest .or. there > family%highest) call fail(error, exit_bad_case, 'parameter out of its range')
-  end subroutine place_neighbour
+  end subroutine position_neighbour
 
   !> Distance of the neighbours of a machine, as a share of the parameter's size: events of theirs must stay within a thin
   !> Stribeck layer.

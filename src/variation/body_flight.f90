@@ -18,7 +18,7 @@ module body_flight
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
   use oscillator, only: extra_force, oscillator_t
   use restoring_law, only: restoring_force, restoring_stiffness
-  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, stretch_above
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above
   implicit none
   private
 
@@ -47,7 +47,7 @@ module body_flight
     type(slip_memory_t) :: pieces
   contains
     procedure :: slope => slope_of_slip
-    procedure :: margin => stretch_margin
+    procedure :: margin => extension_margin
   end type slip_t
 
 contains
@@ -82,15 +82,15 @@ contains
     integer, intent(in) :: mode
     real(wp), intent(out) :: y1(:)
     real(wp), intent(out), optional :: flight(:, :)
-    real(wp) :: place(2)
+    real(wp) :: position(2)
     integer :: side
     side = pressed_side(mode)
     if (side == 0 .and. moving%exact .and. .not. moving%layer > 0) then
       call fly_closed(moving%flow, direction_in(mode), t0, y0, t1, y1, flight)
     else if (side /= 0 .and. moving%pressed%available) then
-      place = [surface_of(moving%machine, side), 0.0_wp]
-      call fly_closed(moving%pressed%flow(side), direction_in(mode), t0, y0 - place, t1, y1, flight)
-      y1 = y1 + place
+      position = [surface_of(moving%machine, side), 0.0_wp]
+      call fly_closed(moving%pressed%flow(side), direction_in(mode), t0, y0 - position, t1, y1, flight)
+      y1 = y1 + position
     else
       call fly_by_steps(moving, sizes, steps, mode, t0, y0, t1, y1, flight)
     end if
@@ -189,7 +189,7 @@ contains
   end subroutine cross_layers
 
   !> From the edge of the layer to rest, or from rest to its edge. With the speed as the independent variable the variations are
-  !> those of time and place; `t1` may be passed on the way to rest, by half of it.
+  !> those of time and position; `t1` may be passed on the way to rest, by half of it.
   pure subroutine cross_straight(moving, system, t1, t, y, ok, flight)
     type(motion_t), intent(in) :: moving
     type(slip_t), intent(in) :: system
@@ -325,7 +325,7 @@ contains
     type(piece_end_t) :: ends(most_ends)
     integer :: i, count_ends
     system%pieces%direction = direction
-    call enter_pieces(system%machine%effects, y(1), y(2), stretch_margin(system, stretch_above, time, y), system%pieces)
+    call enter_pieces(system%machine%effects, y(1), y(2), extension_margin(system, extension_above, time, y), system%pieces)
     call list_ends(system%machine%effects, system%pieces, ends, count_ends)
     do i = 1, count_ends
       associate (guard => cut(count_cuts + i))
@@ -335,15 +335,15 @@ contains
     count_cuts = count_cuts + count_ends
   end subroutine keep_to_pieces
 
-  !> The stretch [m] of the spring, with the sign that it has in a margin.
-  pure real(wp) function stretch_margin(self, number, time, y)
+  !> The extension [m] of the spring, with the sign that it has in a margin.
+  pure real(wp) function extension_margin(self, number, time, y)
     class(slip_t), intent(in) :: self
     integer, intent(in) :: number
     real(wp), intent(in) :: time, y(:)
     real(wp) :: foot
     call foot_motion(self%machine%drive, self%machine%drive_frequency*sign(1, self%mode)*(self%start + time), foot)
-    stretch_margin = merge(1, -1, number == stretch_above)*(self%machine%restoring%free_length + foot - y(1))
-  end function stretch_margin
+    extension_margin = merge(1, -1, number == extension_above)*(self%machine%restoring%free_length + foot - y(1))
+  end function extension_margin
 
   pure function slope_of_slip(self, time, y) result(slope)
     class(slip_t), intent(in) :: self
@@ -408,16 +408,16 @@ contains
     real(wp), intent(in) :: t, x, v
     type(slip_memory_t), intent(in), optional :: pieces
     type(slip_memory_t) :: slip
-    real(wp) :: foot, stretch, direction
+    real(wp) :: foot, extension, direction
     integer :: side
     direction = direction_in(mode)
     if (present(pieces)) slip = pieces
     slip%direction = direction
     slip%x = x
     call foot_motion(machine%drive, machine%drive_frequency*t, foot)
-    stretch = machine%restoring%free_length + foot - x
-    a = restoring_force(machine%restoring, stretch) + sliding_friction(machine%friction, v, direction)
-    if (machine%extra) a = a + extra_force(machine, slip, t, x, v, stretch)
+    extension = machine%restoring%free_length + foot - x
+    a = restoring_force(machine%restoring, extension) + sliding_friction(machine%friction, v, direction)
+    if (machine%extra) a = a + extra_force(machine, slip, t, x, v, extension)
     side = pressed_side(mode)
     if (side /= 0 .and. pushing) a = a - side*contact_force(machine%contact, side*(x - surface_of(machine, side)), side*v)
     a = a/machine%mass

@@ -3,7 +3,7 @@
 
 !> A machine as smooth flights between events: what linearisation, periodic orbits and their continuation need to know of it.
 !> Every event has a guard, which is zero at it, and a jump. Flights are of a given duration and guards are smooth functions,
-!> both also beyond the place where the real motion would have had another event.
+!> both also beyond the position where the real motion would have had another event.
 module hybrid_machine
   use kinds, only: wp
   implicit none
@@ -30,8 +30,8 @@ module hybrid_machine
 
   !> A machine at one value of its parameters.
   type, abstract, public :: hybrid_t
-    !> Number of coordinates of a state, and of those of them that are places; velocities follow.
-    integer :: n = 0, places = 1
+    !> Number of coordinates of a state, and of those of them that are positions; velocities follow.
+    integer :: n = 0, positions = 1
     !> Time from section to section [s]; without a clock an event is the section, and this a size of times.
     real(wp) :: period = 0
     logical :: has_clock = .true.
@@ -97,7 +97,7 @@ contains
   !> Natural size of times [s].
   pure real(wp) function size_of_time(self)
     class(hybrid_t), intent(in) :: self
-    size_of_time = self%size_of(1)/self%size_of(self%places + 1)
+    size_of_time = self%size_of(1)/self%size_of(self%positions + 1)
   end function size_of_time
 
 end module hybrid_machine

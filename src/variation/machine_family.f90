@@ -213,11 +213,11 @@ contains
     end select
   end subroutine map_with_variation
 
-  !> Natural sizes of a place and of a speed.
+  !> Natural sizes of a position and of a speed.
   pure function section_sizes(machine) result(sizes)
     class(hybrid_t), intent(in) :: machine
     real(wp) :: sizes(2)
-    sizes = machine%size_of([1, machine%places + 1])
+    sizes = machine%size_of([1, machine%positions + 1])
   end function section_sizes
 
   !> The copy of a point nearest to another: an angle is on a circle.
@@ -232,7 +232,7 @@ contains
     end select
   end function nearest_copy
 
-  !> Rows that give place [m] and speed [m/s] of what is watched from a section point.
+  !> Rows that give position [m] and speed [m/s] of what is watched from a section point.
   pure function watched_rows(machine) result(rows)
     class(hybrid_t), intent(in) :: machine
     real(wp) :: rows(2, machine%n)
@@ -246,9 +246,9 @@ contains
     end select
   end function watched_rows
 
-  !> Section points (columns) for searches: `watched` (columns) are places and speeds of what is watched. Of a structure the other
-  !> coordinates of every second one are as the machine says, those of the rest spread evenly over twice their sizes, or over the
-  !> share `spread` of that, start by start.
+  !> Section points (columns) for searches: `watched` (columns) are positions and speeds of what is watched. Of a structure
+  !> the other coordinates of every second one are as the machine says, those of the rest spread evenly over twice their sizes, or
+  !> over the share `spread` of that, start by start.
   pure function starts_of_section(machine, watched, spread) result(points)
     class(hybrid_t), intent(in) :: machine
     real(wp), intent(in) :: watched(:, :)
@@ -277,7 +277,7 @@ contains
             end associate
             if (ok) points(:, i) = coordinates_of(machine, state)
           end if
-          if (.not. machine%has_clock) points(machine%places + w, i) = 0
+          if (.not. machine%has_clock) points(machine%positions + w, i) = 0
         end do
       end associate
     end select

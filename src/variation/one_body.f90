@@ -192,14 +192,14 @@ contains
   contains
 
     !> Without the force of a soft barrier.
-    pure real(wp) function level_at(place) result(level)
-      real(wp), intent(in) :: place
+    pure real(wp) function level_at(position) result(level)
+      real(wp), intent(in) :: position
       real(wp) :: holding, rate, bound
       associate (machine => self%moving%machine)
-        call holding_force(machine, place, machine%drive_frequency*t, holding, rate, bound)
+        call holding_force(machine, position, machine%drive_frequency*t, holding, rate, bound)
         level = machine%friction%break_away
-        if (machine%effects%present) level = break_away_level(machine%effects, machine%friction, place, direction)
-        level = level - direction*(holding - force_on_body(machine%contact, place, 0.0_wp))
+        if (machine%effects%present) level = break_away_level(machine%effects, machine%friction, position, direction)
+        level = level - direction*(holding - force_on_body(machine%contact, position, 0.0_wp))
       end associate
     end function level_at
 

@@ -42,7 +42,7 @@ contains
     end do
   end subroutine slopes_of
 
-  !> The machine whose variations are those of a motion; nothing where they are not known. `sizes`: of a place [m] and of a speed
+  !> The machine whose variations are those of a motion; nothing where they are not known. `sizes`: of a position [m] and of a speed
   !> [m/s].
   pure subroutine varied_machine(moving, sizes, machines)
     type(motion_t), intent(in) :: moving

@@ -22,7 +22,7 @@ module structure
 
   type, extends(hybrid_t), public :: structure_t
     type(frame_t) :: frame
-    !> Rows that give place [m] and speed [m/s] of what is watched.
+    !> Rows that give position [m] and speed [m/s] of what is watched.
     real(wp), allocatable :: watched(:, :)
   contains
     procedure :: rests => structure_rests
@@ -37,32 +37,32 @@ module structure
 
 contains
 
-  !> The hybrid machine of a structure; `sizes` are those of a place [m] and of a speed [m/s].
+  !> The hybrid machine of a structure; `sizes` are those of a position [m] and of a speed [m/s].
   pure function structure_of(moving, sizes) result(structure)
     type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: sizes(2)
     type(structure_t) :: structure
     real(wp) :: q(moving%machine%n), v(moving%machine%n)
-    integer :: places, speeds, j
+    integer :: positions, speeds, j
     associate (machine => moving%machine)
       structure%frame%moving = moving
       structure%frame%directions = moving%directions
       structure%frame%velocities = moving%speeds
-      places = size(moving%directions, 2)
+      positions = size(moving%directions, 2)
       speeds = size(moving%speeds, 2)
       structure%frame%elastic = pack([(j, j=1, size(machine%joints))], machine%joints%kind == joint_elastic)
-      structure%frame%places = places
+      structure%frame%positions = positions
       structure%frame%speeds = speeds
-      structure%places = places
-      structure%n = places + speeds + size(structure%frame%elastic)
+      structure%positions = positions
+      structure%n = positions + speeds + size(structure%frame%elastic)
       structure%has_clock = moving%section == 0
       structure%period = machine%period
       allocate (structure%size_of(structure%n))
       structure%size_of = sizes(1)
-      structure%size_of(places + 1:places + speeds) = sizes(2)
+      structure%size_of(positions + 1:positions + speeds) = sizes(2)
       allocate (structure%watched(2, structure%n), source=0.0_wp)
-      do j = 1, places + speeds
-        call lay_out(moving, unit_vector(places + speeds, j), q, v)
+      do j = 1, positions + speeds
+        call lay_out(moving, unit_vector(positions + speeds, j), q, v)
         structure%watched(:, j) = [q(machine%watched), v(machine%watched)]
       end do
     end associate
@@ -122,25 +122,25 @@ contains
     real(wp) :: y(self%n), s, u
     complex(wp) :: turning(self%frame%moving%harmonics)
     integer :: j, k
-    associate (machine => self%frame%moving%machine, n => self%places + self%frame%speeds)
-      y(:self%places) = matmul(state%q(:machine%n), self%frame%directions)
-      y(self%places + 1:n) = matmul(state%v(:machine%n), self%frame%velocities)
+    associate (machine => self%frame%moving%machine, n => self%positions + self%frame%speeds)
+      y(:self%positions) = matmul(state%q(:machine%n), self%frame%directions)
+      y(self%positions + 1:n) = matmul(state%v(:machine%n), self%frame%velocities)
       turning = turning_at(machine%frequency, state%time, self%frame%moving%harmonics)
       do k = 1, size(self%frame%elastic)
         j = self%frame%elastic(k)
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
         y(n + k) = s - state%slider(j)
-        if (state%phase(j) /= 0) y(n + k) = sliding_stretch(machine, j, state%phase(j))
+        if (state%phase(j) /= 0) y(n + k) = sliding_interval(machine, j, state%phase(j))
       end do
     end associate
   end function coordinates_of
 
   !> Stretch of the spring of elastic friction that slides [m].
-  pure real(wp) function sliding_stretch(machine, j, phase)
+  pure real(wp) function sliding_interval(machine, j, phase)
     type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, phase
-    sliding_stretch = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
-  end function sliding_stretch
+    sliding_interval = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
+  end function sliding_interval
 
   !> Whether the joints that are held leave no coordinate free.
   pure logical function structure_rests(self, mode)
@@ -171,7 +171,7 @@ contains
   end subroutine fly_structure
 
   !> Moves a state onto what the joints of the mode hold, least in the metric of the masses: no sliding speed, a closed gap, the
-  !> stretch of a spring that slides; with the derivatives by the state and by the time at which this is done.
+  !> extension of a spring that slides; with the derivatives by the state and by the time at which this is done.
   pure subroutine settle(self, mode, t, y, by_state, by_time)
     class(structure_t), intent(in) :: self
     integer, intent(in) :: mode
@@ -189,8 +189,9 @@ contains
     do k = 1, self%n
       by_state(k, k) = 1
     end do
-    associate (machine => self%frame%moving%machine, d => self%frame%directions, e => self%frame%velocities, p => self%places, &
-               n => self%places + self%frame%speeds)
+    associate (machine => self%frame%moving%machine, d => self%frame%directions, e => self%frame%velocities, &
+      p => self%positions, &
+               n => self%positions + self%frame%speeds)
       phase = phases_in(machine, mode)
       turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
       call carried_by(machine, phase, .true., held, carried)
@@ -223,7 +224,7 @@ contains
       do k = 1, size(self%frame%elastic)
         j = self%frame%elastic(k)
         if (phase(j) == 0) cycle
-        y(n + k) = sliding_stretch(machine, j, phase(j))
+        y(n + k) = sliding_interval(machine, j, phase(j))
         by_state(n + k, :) = 0
       end do
     end associate
@@ -280,7 +281,7 @@ contains
     by_state = 0
     by_time = 0
     value = ieee_value(1.0_wp, ieee_quiet_nan)
-    associate (machine => self%frame%moving%machine, p => self%places, n => self%places + self%frame%speeds)
+    associate (machine => self%frame%moving%machine, p => self%positions, n => self%positions + self%frame%speeds)
       call guards_of(machine, flow, state, list, count_guards)
       do g = 1, count_guards
         if (list(g)%joint == event%joint .and. list(g)%meaning == event%guard) exit
@@ -289,15 +290,15 @@ contains
       turning = turning_at(machine%frequency, t, self%frame%moving%harmonics)
       associate (guard => list(g), joint => machine%joints(event%joint))
         call joint_motion(machine, event%joint, state%q, state%v, t, turning, s, u, given)
-        value = guard%constant + guard%place*s + guard%speed*u
+        value = guard%constant + guard%position*s + guard%speed*u
         by_state(p + 1:n) = guard%speed*matmul(joint%row, self%frame%velocities)
         by_time = guard%speed*given
         i = findloc(self%frame%elastic, event%joint, 1)
         if (i > 0) then
-          by_state(n + i) = guard%place
+          by_state(n + i) = guard%position
         else
-          by_state(:p) = guard%place*matmul(joint%row, self%frame%directions)
-          by_time = by_time + guard%place*(u - sum(joint%row*state%v(:machine%n)))
+          by_state(:p) = guard%position*matmul(joint%row, self%frame%directions)
+          by_time = by_time + guard%position*(u - sum(joint%row*state%v(:machine%n)))
         end if
         if (guard%held > 0) call add_force(self, flow, state, turning, guard%held, guard%force, value, by_state, by_time)
       end associate
@@ -351,8 +352,8 @@ contains
     do k = 1, self%n
       struck(k, k) = 1
     end do
-    associate (machine => self%frame%moving%machine, e => self%frame%velocities, p => self%places, &
-               n => self%places + self%frame%speeds)
+    associate (machine => self%frame%moving%machine, e => self%frame%velocities, p => self%positions, &
+               n => self%positions + self%frame%speeds)
       hits = event%guard == meets_upper .or. event%guard == meets_lower
       if (hits) hits = machine%joints(event%joint)%kind == joint_contact
       if (hits) then
@@ -370,7 +371,7 @@ contains
       ! A slider stops with its spring stretched by what friction was.
       k = findloc(self%frame%elastic, event%joint, 1)
       if (k > 0 .and. event%guard == slide_ends) then
-        after(n + k) = sliding_stretch(machine, event%joint, event%side)
+        after(n + k) = sliding_interval(machine, event%joint, event%side)
         struck(n + k, :) = 0
       end if
       call settle(self, event%after, t, after, by_state, by_time)

@@ -4,7 +4,7 @@
 !> A structure over a parameter of its laws, and the map from one section to the next with derivatives by the start and by the
 !> parameter. Of a machine without a clock the section is an event, and the time to it changes with both.
 module structure_family
-  use body_family, only: family_t, likeness, place_neighbour, share, sides_tried
+  use body_family, only: family_t, likeness, position_neighbour, share, sides_tried
   use build_motion, only: machine_of
   use errors, only: error_t, fail
   use guarded_march, only: most_equations
@@ -130,7 +130,7 @@ contains
       machines%side = sides_tried(side)
       if (allocated(error)) deallocate (error)
       do i = 1, 4
-        call place_neighbour(family, value, machines, i, there, error)
+        call position_neighbour(family, value, machines, i, there, error)
         if (.not. allocated(error)) call structure_of_family(family, there, near(i), error)
         if (allocated(error)) exit
         near(i)%size_of = centre%size_of

@@ -25,10 +25,10 @@ module structure_flight
   !> A mode, what its coordinates are, and what may change in it.
   type, public :: frame_t
     type(multibody_motion_t) :: moving
-    !> Directions of the positions and of the velocities (columns), joints with a stretch, numbers of positions and velocities.
+    !> Directions of the positions and of the velocities (columns), joints with a extension, numbers of positions and velocities.
     real(wp), allocatable :: directions(:, :), velocities(:, :)
     integer, allocatable :: elastic(:)
-    integer :: places = 0, speeds = 0
+    integer :: positions = 0, speeds = 0
   end type frame_t
 
   !> The displacement from a start and, after it, changes of it, column by column.
@@ -103,7 +103,8 @@ contains
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: i, j, k
     span = t1 - state%time
-    associate (machine => frame%moving%machine, d => frame%directions, p => frame%places, n => frame%places + frame%speeds)
+    associate (machine => frame%moving%machine, d => frame%directions, p => frame%positions, &
+      n => frame%positions + frame%speeds)
       call begin_path(machine, flow, state, path)
       call path_at(machine, flow, path, span, q, v)
       y1(:p) = matmul(q, d)
@@ -219,7 +220,7 @@ contains
     complex(wp) :: turning(frame%moving%harmonics)
     real(wp) :: s, u
     integer :: k
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds)
+    associate (machine => frame%moving%machine, p => frame%positions, n => frame%positions + frame%speeds)
       state%phase = mode%phase
       state%time = time
       state%q(:machine%n) = matmul(frame%directions, y(:p))
@@ -238,10 +239,10 @@ contains
     type(frame_t), intent(in) :: frame
     type(mode_flow_t), intent(in) :: flow
     type(multibody_state_t), intent(in) :: state
-    real(wp) :: slope(frame%places + frame%speeds + size(frame%elastic)), s, u
+    real(wp) :: slope(frame%positions + frame%speeds + size(frame%elastic)), s, u
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: k
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds)
+    associate (machine => frame%moving%machine, p => frame%positions, n => frame%positions + frame%speeds)
       turning = turning_at(machine%frequency, state%time, frame%moving%harmonics)
       slope(:p) = matmul(state%v(:machine%n), frame%directions)
       slope(p + 1:n) = matmul(accelerations(machine, flow, state, turning), frame%velocities)
@@ -264,7 +265,7 @@ contains
     real(wp) :: by_time(frame%moving%machine%n)
     complex(wp) :: turning(frame%moving%harmonics)
     integer :: i, k, j
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds)
+    associate (machine => frame%moving%machine, p => frame%positions, n => frame%positions + frame%speeds)
       turning = turning_at(machine%frequency, state%time, frame%moving%harmonics)
       call force_slopes(frame, state, turning, force, by_time)
       force = matmul(machine%mobility, force)
@@ -309,9 +310,9 @@ contains
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(out) :: by_state(:, :), by_time(:)
-    real(wp) :: s, u, given, r, by_place, by_speed, surface, rate, strength, growth
+    real(wp) :: s, u, given, r, by_position, by_speed, surface, rate, strength, growth
     integer :: i, j, m
-    associate (machine => frame%moving%machine, p => frame%places, n => frame%places + frame%speeds, &
+    associate (machine => frame%moving%machine, p => frame%positions, n => frame%positions + frame%speeds, &
                d => frame%directions, e => frame%velocities)
       by_state = 0
       by_state(:, :p) = -matmul(machine%stiffness, d)
@@ -330,16 +331,16 @@ contains
           end if
           call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
           call strength_now(joint, machine%frequency, turning, strength, growth)
-          call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_place, by_speed)
+          call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, by_speed)
           surface = u - sum(joint%row*state%v(:machine%n))
-          rate = by_place*surface + by_speed*given
+          rate = by_position*surface + by_speed*given
           if (allocated(joint%strength)) then
             call spring_force(joint, s, growth, r)
             rate = rate + r
           end if
           by_time = by_time + rate*joint%row
           do i = 1, p
-            by_state(:, i) = by_state(:, i) + by_place*sum(joint%row*d(:, i))*joint%row
+            by_state(:, i) = by_state(:, i) + by_position*sum(joint%row*d(:, i))*joint%row
           end do
           do i = 1, n - p
             by_state(:, p + i) = by_state(:, p + i) + by_speed*sum(joint%row*e(:, i))*joint%row

@@ -113,7 +113,7 @@ contains
     m = size(list)
     slopes = 0
     if (m == 1) then
-      call lone_impulse(machine, list(1), gamma(1), plastic, impulse(1), slopes(1, 1))
+      call single_impulse(machine, list(1), gamma(1), plastic, impulse(1), slopes(1, 1))
       return
     end if
     call impulses(gamma, impulse)
@@ -156,7 +156,7 @@ contains
   end subroutine find_impulses
 
   !> The impulse of one contact alone, -(1 + e) gamma/g, and how it changes with its opening speed.
-  pure subroutine lone_impulse(machine, j, gamma, plastic, impulse, slope)
+  pure subroutine single_impulse(machine, j, gamma, plastic, impulse, slope)
     type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j
     real(wp), intent(in) :: gamma
@@ -177,6 +177,6 @@ contains
       impulse = -(1 + e(0))*gamma/g
       slope = -(1 + e(0) + change*gamma)/g
     end associate
-  end subroutine lone_impulse
+  end subroutine single_impulse
 
 end module structure_impact

@@ -23,8 +23,8 @@ module structure_rest
 contains
 
   !> The modes that a structure may be at rest in without dry friction that holds it: surfaces slide as they run, stops are free,
-  !> or pressed above or below. None where dry friction holds a joint, whose places of rest are a continuum, and where there are
-  !> too many stops.
+  !> or pressed above or below. None where dry friction holds a joint, whose positions of rest are a continuum, and where
+  !> there are too many stops.
   pure function modes_at_rest(structure) result(modes)
     type(structure_t), intent(in) :: structure
     integer, allocatable :: modes(:)

@@ -38,7 +38,7 @@ contains
     complex(wp) :: turning(structure%frame%moving%harmonics)
     integer :: j, k
     length = structure%size_of(1)
-    speed = structure%size_of(structure%places + 1)
+    speed = structure%size_of(structure%positions + 1)
     associate (moving => structure%frame%moving, machine => structure%frame%moving%machine)
       y = point
       raw = state_in(structure, mode_number(machine, [(0, j=1, most_joints)]), 0.0_wp, y)
@@ -55,7 +55,7 @@ contains
             if (abs(s - joint%upper) <= held_within*length .and. abs(u) <= held_within*speed) raw%phase(j) = 1
             if (abs(s - joint%lower) <= held_within*length .and. abs(u) <= held_within*speed) raw%phase(j) = -1
           case (joint_elastic)
-            k = structure%places + structure%frame%speeds + findloc(structure%frame%elastic, j, 1)
+            k = structure%positions + structure%frame%speeds + findloc(structure%frame%elastic, j, 1)
             associate (limit => joint%friction%kinetic/joint%stiffness)
               raw%phase(j) = 0
               if (abs(point(k)) >= limit*(1 - held_within) .and. point(k)*u > 0) raw%phase(j) = merge(1, -1, u > 0)

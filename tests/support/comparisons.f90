@@ -207,18 +207,18 @@ contains
     character(len=*), intent(in) :: expected, found
     integer, intent(in) :: i, form(:)
     character(len=:), allocatable :: text
-    text = 'expected '//expected//', found '//found//place(i, form)
+    text = 'expected '//expected//', found '//found//position(i, form)
   end function differs
 
   pure function not_ordered(a, relation, b, i, form) result(text)
     character(len=*), intent(in) :: a, relation, b
     integer, intent(in) :: i, form(:)
     character(len=:), allocatable :: text
-    text = 'expected '//a//' '//relation//' '//b//place(i, form)
+    text = 'expected '//a//' '//relation//' '//b//position(i, form)
   end function not_ordered
 
   !> ' at (i,j)' for element number i of an array of this shape, nothing for a scalar.
-  pure function place(i, form) result(text)
+  pure function position(i, form) result(text)
     integer, intent(in) :: i, form(:)
     character(len=:), allocatable :: text
     integer :: rest, d, subscripts(size(form))
@@ -230,7 +230,7 @@ contains
       rest = rest/form(d)
     end do
     text = ' at '//shape_text(subscripts)
-  end function place
+  end function position
 
   pure function shape_text(form) result(text)
     integer, intent(in) :: form(:)

@@ -47,7 +47,7 @@ contains
   end function machine_number
 
   !> Machine number i with an equation of its own in each mode: soft barriers that may pull or not, one or two, friction that
-  !> depends on the direction or the place.
+  !> depends on the direction or the position.
   function machine_of_modes(i) result(moving)
     integer, intent(in) :: i
     type(motion_t) :: moving

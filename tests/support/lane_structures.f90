@@ -67,9 +67,9 @@ contains
     moving = made_ready(machine)
   end function oscillating_structure
 
-  !> Two or four bodies in a row that may rub at up to three places: stops with a spring and a damper, light or so strong that the
-  !> body creeps back, some of which pull; on one side of the last body or both, between bodies, on a surface that moves, beside
-  !> rigid ones.
+  !> Two or four bodies in a row that may rub at up to three positions: stops with a spring and a damper, light or so strong
+  !> that the body creeps back, some of which pull; on one side of the last body or both, between bodies, on a surface that moves,
+  !> beside rigid ones.
   function pressing_structure(i) result(moving)
     integer, intent(in) :: i
     type(motion_t) :: moving

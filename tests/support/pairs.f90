@@ -43,7 +43,7 @@ contains
     if (allocated(error)) error stop 'pairs: '//error%message
   end function build_pair_from
 
-  !> m2 at `x`, `v` and m1 at `driver` (place, velocity), with the drive at `angle` [rad]. `driver` is not looked at where the
+  !> m2 at `x`, `v` and m1 at `driver` (position, velocity), with the drive at `angle` [rad]. `driver` is not looked at where the
   !> motion of m1 is given.
   function start_pair(moving, x, v, driver, angle) result(state)
     type(motion_t), intent(in) :: moving

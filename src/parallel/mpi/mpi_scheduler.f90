@@ -40,7 +40,7 @@ module mpi_scheduler
     integer, allocatable, private :: reported(:)
     !> Notices of a stop: sent to rank 0, received by rank 0, sent on by rank 0, received by a leader.
     integer, private :: notices_sent = 0, notices_received = 0
-    logical, private :: told_nodes = .false., was_told = .false.
+    logical, private :: nodes_informed = .false., was_informed = .false.
     type(MPI_Request), allocatable, private :: sending(:)
   contains
     procedure :: start
@@ -89,8 +89,8 @@ contains
     self%all_done = 0
     self%notices_sent = 0
     self%notices_received = 0
-    self%told_nodes = .false.
-    self%was_told = .false.
+    self%nodes_informed = .false.
+    self%was_informed = .false.
     if (allocated(self%reported)) deallocate (self%reported)
     if (allocated(self%sending)) deallocate (self%sending)
     allocate (self%reported(size(self%node%leaders)), source=0)
@@ -132,7 +132,7 @@ contains
     if (self%stop_is_due()) call self%request_stop()
     if (self%rank == 0) then
       call serve(self)
-    else if (self%node%rank == 0 .and. self%node%number > 1 .and. .not. self%was_told) then
+    else if (self%node%rank == 0 .and. self%node%number > 1 .and. .not. self%was_informed) then
       call MPI_Iprobe(0, tag_stop, self%comm, found, MPI_STATUS_IGNORE)
       if (found) call hear_stop(self)
     end if
@@ -198,8 +198,8 @@ contains
         call hear_notice(self)
       end do
     end if
-    call MPI_Bcast(self%told_nodes, 1, MPI_LOGICAL, 0, self%comm)
-    if (self%told_nodes .and. self%node%rank == 0 .and. self%node%number > 1 .and. .not. self%was_told) then
+    call MPI_Bcast(self%nodes_informed, 1, MPI_LOGICAL, 0, self%comm)
+    if (self%nodes_informed .and. self%node%rank == 0 .and. self%node%number > 1 .and. .not. self%was_informed) then
       call hear_stop(self)
     end if
     call MPI_Waitall(size(self%sending), self%sending, MPI_STATUSES_IGNORE)
@@ -243,12 +243,12 @@ contains
     if (size(self%node%leaders) == 1) return
     call MPI_Iprobe(MPI_ANY_SOURCE, tag_stop, self%comm, found, MPI_STATUS_IGNORE)
     if (found) call hear_notice(self)
-    if (self%node%is_stopped() .and. .not. self%told_nodes) then
+    if (self%node%is_stopped() .and. .not. self%nodes_informed) then
       do i = 2, size(self%node%leaders)
         call MPI_Isend(nothing, 0, MPI_INTEGER, self%node%leaders(i), tag_stop, self%comm, request)
         self%sending = [self%sending, request]
       end do
-      self%told_nodes = .true.
+      self%nodes_informed = .true.
     end if
     do
       call MPI_Iprobe(MPI_ANY_SOURCE, tag_request, self%comm, found, from)
@@ -278,7 +278,7 @@ contains
     integer :: nothing(0)
     logical :: first
     call MPI_Recv(nothing, 0, MPI_INTEGER, 0, tag_stop, self%comm, MPI_STATUS_IGNORE)
-    self%was_told = .true.
+    self%was_informed = .true.
     first = self%node%set_stop()
   end subroutine hear_stop
 

@@ -3,7 +3,7 @@
 
 !> Places of a machine between which joints act: bodies, then named points of structures. Each has a row: its displacement
 !> for one of each coordinate.
-module places
+module reference_points
   use errors, only: error_t, fail
   use multibody, only: multibody_t, most_degrees
   use kinds, only: real64, wp
@@ -14,7 +14,7 @@ module places
   implicit none
   private
 
-  public :: add_structures, body_name, is_place, name_coordinates, number, place_of, row_of, watched_body
+  public :: add_structures, body_name, is_reference_point, name_coordinates, number, reference_point_of, row_of, watched_body
 
   !> A mass matrix with a smaller share of the smallest eigenvalue in the largest is singular.
   real(wp), parameter :: singular_share = 1e-14_wp
@@ -32,8 +32,8 @@ contains
     end do
   end function watched_body
 
-  !> Places that are coordinates of their own: bodies, the watched place, and those whose motion is given; 0 for others. A
-  !> place has one given motion at most, and not the watched one.
+  !> Places that are coordinates of their own: bodies, the watched reference_point, and those whose motion is given; 0 for others. A
+  !> reference_point has one given motion at most, and not the watched one.
   pure subroutine name_coordinates(choices, machine, rows, coordinate, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(multibody_t), intent(inout) :: machine
@@ -47,7 +47,7 @@ contains
     k = 0
     watched = 0
     do i = 1, size(choices)
-      if (.not. is_place(choices(i))) cycle
+      if (.not. is_reference_point(choices(i))) cycle
       k = k + 1
       if (part_kind(choices(i)%name) == 'body') coordinate(k) = k
       if (part_kind(choices(i)%name) == 'body') taken(k) = .true.
@@ -64,8 +64,8 @@ contains
                                                  '.frequency: missing, allowed more than 0 rad/s')
       if (.not. allocated(error)) call check_given(choices, i, watched, error)
       if (allocated(error)) return
-      k = place_of(choices(i))
-      if (coordinate(k) == 0) call make_coordinate(machine, rows, k, place_name(choices, k), taken, coordinate(k))
+      k = reference_point_of(choices(i))
+      if (coordinate(k) == 0) call make_coordinate(machine, rows, k, reference_point_name(choices, k), taken, coordinate(k))
       if (coordinate(k) > 0) cycle
       call fail(error, exit_bad_case, path_of(choices(i))//'.body: found a point that moves with the watched one, or with '// &
                 'others whose motion is given, allowed one that is free of them')
@@ -73,47 +73,47 @@ contains
     end do
   end subroutine name_coordinates
 
-  pure logical function is_place(choice)
+  pure logical function is_reference_point(choice)
     type(law_choice_t), intent(in) :: choice
-    is_place = index(choice%name, 'body:') == 1 .or. index(choice%name, 'point:') == 1
-  end function is_place
+    is_reference_point = index(choice%name, 'body:') == 1 .or. index(choice%name, 'point:') == 1
+  end function is_reference_point
 
-  !> Label of a place, for messages and results.
-  pure function place_name(choices, place) result(name)
+  !> Label of a reference_point, for messages and results.
+  pure function reference_point_name(choices, reference_point) result(name)
     type(law_choice_t), intent(in) :: choices(:)
-    integer, intent(in) :: place
+    integer, intent(in) :: reference_point
     character(len=:), allocatable :: name
     integer :: i, k
     k = 0
     name = ''
     do i = 1, size(choices)
-      if (.not. is_place(choices(i))) cycle
+      if (.not. is_reference_point(choices(i))) cycle
       k = k + 1
-      if (k == place) name = body_name(choices(i), k)
+      if (k == reference_point) name = body_name(choices(i), k)
     end do
-  end function place_name
+  end function reference_point_name
 
-  !> A place whose motion is given is not the watched one, and has one motion.
+  !> A reference_point whose motion is given is not the watched one, and has one motion.
   pure subroutine check_given(choices, i, watched, error)
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: i, watched
     type(error_t), allocatable, intent(out) :: error
     integer :: k
-    if (place_of(choices(i)) == watched) then
+    if (reference_point_of(choices(i)) == watched) then
       call fail(error, exit_bad_case, path_of(choices(i))//'.body: found the watched body, allowed one that is not: name '// &
                 'another in watch.body')
       return
     end if
     do k = 1, i - 1
       if (choices(k)%name /= 'drive:motion') cycle
-      if (place_of(choices(k)) /= place_of(choices(i))) cycle
+      if (reference_point_of(choices(k)) /= reference_point_of(choices(i))) cycle
       call fail(error, exit_bad_case, path_of(choices(i))//'.body: found a body whose motion '//path_of(choices(k))// &
                 ' gives, allowed one motion each')
       return
     end do
   end subroutine check_given
 
-  !> The structures, and the rows (columns here) of all places: bodies, then points.
+  !> The structures, and the rows (columns here) of all reference points: bodies, then points.
   pure subroutine add_structures(choices, machine, rows, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(multibody_t), intent(inout) :: machine
@@ -136,7 +136,7 @@ contains
                 to_text(most_degrees)//'; fewer modes of a structure')
       return
     end if
-    allocate (rows(machine%n, count([(is_place(choices(i)), i=1, size(choices))])), source=0.0_wp)
+    allocate (rows(machine%n, count([(is_reference_point(choices(i)), i=1, size(choices))])), source=0.0_wp)
     do k = 1, bodies
       rows(k, k) = 1
     end do
@@ -261,11 +261,11 @@ contains
     if (second > 0) row = row + rows(:, second)
   end function row_of
 
-  !> Number of the place that a drive acts on.
-  pure integer function place_of(choice)
+  !> Number of the reference_point that a drive acts on.
+  pure integer function reference_point_of(choice)
     type(law_choice_t), intent(in) :: choice
-    place_of = nint(value_of(choice, 'body'))
-  end function place_of
+    reference_point_of = nint(value_of(choice, 'body'))
+  end function reference_point_of
 
   pure function number(value) result(text)
     real(wp), intent(in) :: value
@@ -273,4 +273,4 @@ contains
     text = to_text(real(value, real64))
   end function number
 
-end module places
+end module reference_points
