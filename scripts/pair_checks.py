@@ -208,12 +208,12 @@ def bouncing(program: Program) -> list[Check]:
 
 
 def hammer(program: Program) -> list[Check]:
-    """A blow on a body on a resting platform; two free bodies with a stop between them."""
+    """An impulse on a body on a resting platform; two free bodies with a stop between them."""
     m2, b, distance, e, v0 = 0.5, 1.5, 0.2, 0.7, 2.0
     run = program.trajectory("hammer")
     arrival = math.sqrt(v0**2 - 2 * b / m2 * distance)
     rest = distance - m2 * (e * arrival) ** 2 / (2 * b)
-    pair = 'law="backlash_pair", mass=1, driven_mass=0.5, friction=0, blow=0.5'
+    pair = 'law="backlash_pair", mass=1, driven_mass=0.5, friction=0, impulse=0.5'
     both = program.trajectory("pair_backlash", f"body={{{pair}}}", 'drive={law="none"}', "start.v0=0")
     w, v2 = (both.of(name, "impact_upper")[0] for name in ("event_v_before", "event_v_after"))
     # the driving body was at rest, and keeps its velocity up to the next impact

@@ -18,7 +18,7 @@ _REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck
 _REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget mode_cycle"
 _EVENTS = (
     "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release "
-    "touch_upper touch_lower separation blow"
+    "touch_upper touch_lower separation impulse"
 )
 _MODES = "slip_plus slip_minus stick upper_barrier lower_barrier held"
 
@@ -120,7 +120,7 @@ SAMPLES = {
         "energy put into barriers since the start; of a pressed soft one, part comes back",
         {},
     ),
-    "drive_work": ("J", "work of drive and blows since the start", {}),
+    "drive_work": ("J", "work of drive and impulses since the start", {}),
 }
 EVENTS = {
     "kind": ("1", "kind of event", _flags(_EVENTS, 1)),

@@ -192,7 +192,7 @@ ROWS = (
     Row("drag", "quadratic drag, 0.05 N s^2/m^2", 10_000, effect("quadratic_drag", coefficient=0.05)),
     Row("dahl", "Dahl's friction, 300 N/m", 5_000, effect("dahl", stiffness=300.0)),
     Row(
-        "place",
+        "position",
         "position-dependent friction",
         10_000,
         effect("position_dependent_friction", slope=0.2),
@@ -224,7 +224,7 @@ ROWS = (
         "spring_curve",
         "spring by a table",
         10_000,
-        effect("spring_curve", stretch=[-1.0, 0.0, 1.0], force=[-5.0, 0.0, 6.0]),
+        effect("spring_curve", extension=[-1.0, 0.0, 1.0], force=[-5.0, 0.0, 6.0]),
     ),
     Row("backlash", "free play of the spring, 50 mm", 10_000, effect("backlash", gap=0.05)),
     Row("cubic_damping", "cubic damping, 0.05 N s^3/m^3", 10_000, effect("cubic_damping", coefficient=0.05)),

@@ -27,7 +27,7 @@ UNNAMED = ("not-in-catalogue", "characterised")
 """A gap that no effect closes; where the force is known to depend on something, that is told."""
 ANSWERS = ("named", "ambiguous", "none", *UNNAMED)
 DEPENDS_ON = {
-    "parametric_stiffness": {"oscillating time", "place"},
+    "parametric_stiffness": {"oscillating time", "position"},
     "drifting_friction": {"slow time", "direction of motion"},
     "second_mode": {"memory"},
     "delayed_force": {"memory"},
@@ -50,8 +50,8 @@ FAMILIES = {
         "static_excess",
         "friction_curve",
     },
-    "friction over place": {"position_dependent_friction", "friction_place_curve"},
-    "spring over stretch": {"cubic_spring", "backlash", "spring_curve"},
+    "friction over position": {"position_dependent_friction", "friction_position_curve"},
+    "spring over extension": {"cubic_spring", "backlash", "spring_curve"},
     "restitution over impact speed": {"restitution_slope", "restitution_curve"},
     "contact over penetration": {"compliant_contact", "kelvin_voigt_contact", "contact_curve"},
     "drive over phase": {"drive_ripple", "drive_harmonics"},

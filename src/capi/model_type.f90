@@ -4,6 +4,7 @@
 !> What a handle of the C interface stands for: a case and the list of its numbers.
 module model_type
   use case_echo, only: echo_case
+  use case_parameters, only: canonical_name
   use case_reader, only: load_case, load_case_text
   use case_setup, only: options_of
   use case_type, only: case_t, drive_law
@@ -59,7 +60,7 @@ contains
     integer, intent(out) :: position
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: meant
-    position = findloc(model%parameters%path == path, .true., dim=1)
+    position = findloc(model%parameters%path == canonical_name(path), .true., dim=1)
     if (position > 0) return
     meant = nearest_word(path, model%parameters%path)
     if (len(meant) > 0) meant = ' (did you mean '''//meant//'''?)'

@@ -4,6 +4,7 @@
 !> Values from the command line on top of the entries of a case's text.
 module case_overrides
   use errors, only: error_t, fail
+  use old_keys, only: current_key
   use status, only: exit_bad_case
   use toml_bindings, only: read_toml, toml_array, toml_entry_t
   implicit none
@@ -29,7 +30,7 @@ contains
     character(len=:), allocatable :: key, problem
     integer :: mark
     mark = index(override, '=')
-    key = placed(entries, trim(adjustl(override(1:max(mark - 1, 0)))))
+    key = current_key(placed(entries, trim(adjustl(override(1:max(mark - 1, 0))))))
     problem = key_problem(entries, key)
     if (mark == 0) problem = 'found no ''='', allowed KEY=VALUE'
     if (len(problem) == 0) then

@@ -6,6 +6,7 @@ module case_parameters
   use angle_units, only: unit_of
   use case_values, only: allowed_range, any_number, between, bounds_t
   use errors, only: error_t, fail
+  use old_keys, only: current_key
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
     part_family, path_of, split_element
@@ -21,11 +22,11 @@ module case_parameters
 
 contains
 
-  !> The full name of a parameter: 'ratio' is short for 'drive.ratio'.
+  !> The full name of a parameter as it is called today: 'ratio' is short for 'drive.ratio'.
   pure function canonical_name(name) result(path)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: path
-    path = trim(name)
+    path = current_key(trim(name))
     if (path == 'ratio') path = 'drive.ratio'
   end function canonical_name
 

@@ -6,6 +6,7 @@
 module case_source
   use case_overrides, only: apply_override, is_or_is_below, source_entry_t
   use errors, only: error_t, fail
+  use old_keys, only: current_key
   use status, only: exit_bad_case, exit_no_input
   use structure_data, only: structure_file_reader
   use suggest, only: nearest_word
@@ -59,11 +60,29 @@ contains
     do i = 1, size(entries)
       source%entries(i)%entry = entries(i)
     end do
+    call rename_old_keys(source)
     do i = 1, size(overrides)
       call apply_override(source%entries, trim(overrides(i)), error)
       if (allocated(error)) return
+      call rename_old_keys(source)
     end do
   end subroutine open_source
+
+  !> Gives keys of older case files their names of today. A key that is there under both is an error.
+  subroutine rename_old_keys(source)
+    type(case_source_t), intent(inout) :: source
+    character(len=:), allocatable :: current
+    integer :: i
+    do i = 1, size(source%entries)
+      current = current_key(source%entries(i)%entry%path)
+      if (current == source%entries(i)%entry%path) cycle
+      if (find(source, current) > 0) then
+        call report(source, source%entries(i)%entry%path, 'found beside '''//current//''', the name of today; allowed one of them')
+      else
+        source%entries(i)%entry%path = current
+      end if
+    end do
+  end subroutine rename_old_keys
 
   !> Position of a path in the entries, 0 if it is absent; the search may begin at `from`.
   pure integer function find(source, path, from)

@@ -46,7 +46,7 @@ contains
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
     if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
-    call warn_about_blow(the_case, journal)
+    call warn_about_impulse(the_case, journal)
     obstacle = section_obstacle(moving)
     if ((command == 'basin' .or. command == 'sweep') .and. len(obstacle) > 0) then
       call journal%line('warning', 'warning: no attractors are looked for: '//obstacle//'. Points get the regime at the end of '// &
@@ -59,17 +59,17 @@ contains
     if (stops%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
-  !> Says if a blow falls after the end.
-  subroutine warn_about_blow(the_case, journal)
+  !> Says if an impulse falls after the end.
+  subroutine warn_about_impulse(the_case, journal)
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
     real(wp) :: time
-    if (.not. abs(parameter_value(the_case%laws, 'body.blow', 0.0_wp)) > 0) return
-    time = parameter_value(the_case%laws, 'body.blow_time', 0.0_wp)
+    if (.not. abs(parameter_value(the_case%laws, 'body.impulse', 0.0_wp)) > 0) return
+    time = parameter_value(the_case%laws, 'body.impulse_time', 0.0_wp)
     if (time <= the_case%run%duration) return
-    call journal%line('warning', 'warning: body.blow_time = '//to_text(time)//' s is after the end, run.duration = '// &
-      to_text(the_case%run%duration)//' s: no blow falls')
-  end subroutine warn_about_blow
+    call journal%line('warning', 'warning: body.impulse_time = '//to_text(time)//' s is after the end, run.duration = '// &
+      to_text(the_case%run%duration)//' s: no impulse falls')
+  end subroutine warn_about_impulse
 
   !> Says which impulses of a structure fall after the end.
   subroutine warn_about_impulses(the_case, journal)

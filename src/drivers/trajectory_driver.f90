@@ -309,7 +309,7 @@ contains
       call add('friction_loss', balance(1, :), 'energy lost to dry friction since the start')
       call add('damping_loss', balance(2, :), 'energy lost to viscous damping since the start')
       call add('contact_loss', balance(3, :), 'energy put into barriers since the start; of a pressed soft one, part comes back')
-      call add('drive_work', balance(4, :), 'work of drive and blows since the start')
+      call add('drive_work', balance(4, :), 'work of drive and impulses since the start')
     end associate
 
   contains

@@ -55,9 +55,9 @@ contains
     call finish(machine, error)
     if (allocated(error)) return
     call name_driver(pair, wave, machine)
-    if (.not. abs(pair%blow) > 0) return
-    call add_impulse(machine, impulse_t(row=merge(1.0_wp, 0.0_wp, machine%names == 'driven'), amount=pair%blow, &
-                                        time=pair%blow_time))
+    if (.not. abs(pair%impulse) > 0) return
+    call add_impulse(machine, impulse_t(row=merge(1.0_wp, 0.0_wp, machine%names == 'driven'), amount=pair%impulse, &
+                                        time=pair%impulse_time))
   end subroutine structure_of_pair
 
   !> What is told of the driving body, and where it starts.

@@ -87,7 +87,7 @@ contains
   end function coordinates_of
 
   !> Whether the state on the section tells what follows: not with a controller that acts at times of its own, nor before
-  !> a blow.
+  !> an impulse.
   pure logical function has_section(moving)
     type(motion_t), intent(in) :: moving
     has_section = .true.
@@ -107,7 +107,7 @@ contains
         'with impulses, or samples of a controller, the state at crank angle 0 '// &
                                                        'does not tell what follows'
     end if
-    if (has_driver(moving)) text = 'with '//trim(merge('body.blow        ', 'drive.sample_time', &
+    if (has_driver(moving)) text = 'with '//trim(merge('body.impulse     ', 'drive.sample_time', &
                                                        allocated(moving%multibody%machine%impulses)))// &
                                    ' the state at crank angle 0 does not tell what follows'
   end function section_obstacle

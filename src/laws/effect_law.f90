@@ -26,7 +26,7 @@ module effect_law
 
   !> The effects whose force lanes have a series for (`lane_preparation`): machines with others fly in the event loop.
   character(len=*), parameter :: with_series(12) = [character(len=27) :: 'quadratic_drag', 'cubic_damping', 'asymmetric_friction', &
-    'position_dependent_friction', 'cubic_spring', 'offset_force', 'dahl', 'friction_curve', 'friction_place_curve', &
+    'position_dependent_friction', 'cubic_spring', 'offset_force', 'dahl', 'friction_curve', 'friction_position_curve', &
     'spring_curve', 'force_curve', 'backlash']
 
   type, public :: effects_t
@@ -91,15 +91,15 @@ contains
       if (.not. any(abs([list_of(choice, 'upwards'), list_of(choice, 'downwards')]) > 0)) return
       effects%upwards = curve_of(list_of(choice, 'speed'), list_of(choice, 'upwards'))
       effects%downwards = curve_of(list_of(choice, 'speed'), list_of(choice, 'downwards'))
-    case ('friction_place_curve')
+    case ('friction_position_curve')
       if (.not. any(abs(list_of(choice, 'change')) > 0)) return
-      effects%over_position = curve_of(list_of(choice, 'place'), list_of(choice, 'change'))
+      effects%over_position = curve_of(list_of(choice, 'position'), list_of(choice, 'change'))
     case ('spring_curve')
       if (.not. any(abs(list_of(choice, 'force')) > 0)) return
-      effects%spring = curve_of(list_of(choice, 'stretch'), list_of(choice, 'force'))
+      effects%spring = curve_of(list_of(choice, 'extension'), list_of(choice, 'force'))
     case ('force_curve')
       if (.not. any(abs(list_of(choice, 'force')) > 0)) return
-      effects%force = curve_of(list_of(choice, 'place'), list_of(choice, 'force'))
+      effects%force = curve_of(list_of(choice, 'position'), list_of(choice, 'force'))
     case ('backlash')
       if (value_of(choice, 'gap') > 0) effects%play = play_of(value_of(choice, 'gap'), value_of(choice, 'rounding'))
     case default

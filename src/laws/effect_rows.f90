@@ -30,14 +30,14 @@ module effect_rows
               'Armstrong-Helouvry, Control of Machines with Friction (1991)'), &
     law_row_t('effect', 'friction_curve', '-change(|v|) sgn v, of each direction its own: a table over the speed, C1', &
               'Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083'), &
-    law_row_t('effect', 'friction_place_curve', 'dry friction times max(0, 1 + change(x)): a table over the place, C1', &
+    law_row_t('effect', 'friction_position_curve', 'dry friction times max(0, 1 + change(x)): a table over the position, C1', &
               'Armstrong-Helouvry, Control of Machines with Friction (1991)'), &
     law_row_t('effect', 'cubic_spring', 'k3 s^3, s = l0 + x_A - x', 'Duffing, Erzwungene Schwingungen (1918)'), &
-    law_row_t('effect', 'spring_curve', 'q(s), a force over the stretch s = l0 + x_A - x: a table, C1', &
+    law_row_t('effect', 'spring_curve', 'q(s), a force over the extension s = l0 + x_A - x: a table, C1', &
               'Nayfeh, Mook, Nonlinear Oscillations (1979)'), &
     law_row_t('effect', 'backlash', 'free play in series with the spring: no force within the gap', &
               'Kahraman, Singh, J. Sound Vib. 142 (1990) 49'), &
-    law_row_t('effect', 'force_curve', 'r(x), a force over the place: a table, C1', sum_of_laws), &
+    law_row_t('effect', 'force_curve', 'r(x), a force over the position: a table, C1', sum_of_laws), &
     law_row_t('effect', 'offset_force', 'constant force: preload or tilt', sum_of_laws), &
     law_row_t('effect', 'restitution_slope', 'k falls with the speed of impact: k - slope |v|, not below 0', &
               'Goldsmith, Impact (1960)'), &
@@ -81,22 +81,22 @@ module effect_rows
     parameter_row_t('effect', 'friction_curve', 'upwards', 'N', any_value, &
                     'change of the friction at these speeds upwards; at speed 0 also of break-away', list=.true.), &
     parameter_row_t('effect', 'friction_curve', 'downwards', 'N', any_value, 'the same downwards', list=.true.), &
-    parameter_row_t('effect', 'friction_place_curve', 'place', 'm', any_value, &
-                    'places, ascending; straight on beyond the first and the last', list=.true.), &
-    parameter_row_t('effect', 'friction_place_curve', 'change', '1', any_value, &
-                    'relative change of dry friction at these places', list=.true.), &
+    parameter_row_t('effect', 'friction_position_curve', 'position', 'm', any_value, &
+                    'positions, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'friction_position_curve', 'change', '1', any_value, &
+                    'relative change of dry friction at these positions', list=.true.), &
     parameter_row_t('effect', 'cubic_spring', 'stiffness', 'N/m^3', any_value, 'k3'), &
-    parameter_row_t('effect', 'spring_curve', 'stretch', 'm', any_value, &
-                    'stretches, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'spring_curve', 'extension', 'm', any_value, &
+                    'extensions, ascending; straight on beyond the first and the last', list=.true.), &
     parameter_row_t('effect', 'spring_curve', 'force', 'N', any_value, &
-                    'force beyond that of the spring at these stretches', list=.true.), &
+                    'force beyond that of the spring at these extensions', list=.true.), &
     parameter_row_t('effect', 'backlash', 'gap', 'm', not_negative, &
-                    'g, stretch from one end of the play to the other'), &
+                    'g, extension from one end of the play to the other'), &
     parameter_row_t('effect', 'backlash', 'rounding', '1', range_t(0.0_wp, 0.49_wp), &
                     'e/g: parabolas round the corners of the force within e of them; 0 = sharp corners', optional=.true.), &
-    parameter_row_t('effect', 'force_curve', 'place', 'm', any_value, &
-                    'places, ascending; straight on beyond the first and the last', list=.true.), &
-    parameter_row_t('effect', 'force_curve', 'force', 'N', any_value, 'force upwards at these places', list=.true.), &
+    parameter_row_t('effect', 'force_curve', 'position', 'm', any_value, &
+                    'positions, ascending; straight on beyond the first and the last', list=.true.), &
+    parameter_row_t('effect', 'force_curve', 'force', 'N', any_value, 'force upwards at these positions', list=.true.), &
     parameter_row_t('effect', 'offset_force', 'force', 'N', any_value, 'constant force upwards'), &
     parameter_row_t('effect', 'restitution_slope', 'slope', 's/m', not_negative, 'loss of restitution per speed'), &
     parameter_row_t('effect', 'restitution_curve', 'speed', 'm/s', not_negative, &
@@ -132,7 +132,7 @@ module effect_rows
                     'of the sensor behind the drive; negative if it is ahead')]
 
   character(len=*), parameter :: over_speed = 'friction over speed', over_impacts = 'restitution over impact speed', &
-    over_extension = 'spring over stretch', over_penetration = 'contact over penetration', over_phase = 'drive over phase'
+    over_extension = 'spring over extension', over_penetration = 'contact over penetration', over_phase = 'drive over phase'
 
   type(effect_trait_t), parameter, public :: effect_traits(size(effect_laws)) = [ &
     effect_trait_t('viscous', over_speed, 'flight', 'damping', '', ''), &
@@ -143,20 +143,20 @@ module effect_rows
     effect_trait_t('static_excess', over_speed, 'flight', '', 'force', ''), &
     effect_trait_t('dahl', 'friction before sliding', 'flight', '', 'stiffness', 'friction'), &
     effect_trait_t('asymmetric_friction', 'friction by direction', 'flight', 'coulomb viscous', '', ''), &
-    effect_trait_t('position_dependent_friction', 'friction over place', 'flight', 'slope', '', 'friction'), &
+    effect_trait_t('position_dependent_friction', 'friction over position', 'flight', 'slope', '', 'friction'), &
     effect_trait_t('friction_curve', over_speed, 'flight', 'upwards downwards', '', ''), &
-    effect_trait_t('friction_place_curve', 'friction over place', 'flight', 'change', '', 'friction'), &
+    effect_trait_t('friction_position_curve', 'friction over position', 'flight', 'change', '', 'friction'), &
     effect_trait_t('cubic_spring', over_extension, 'flight', 'stiffness', '', ''), &
     effect_trait_t('spring_curve', over_extension, 'flight', 'force', '', ''), &
     effect_trait_t('backlash', over_extension, 'flight', '', 'gap', 'restoring.stiffness'), &
-    effect_trait_t('force_curve', 'force over place', 'flight', 'force', '', ''), &
+    effect_trait_t('force_curve', 'force over position', 'flight', 'force', '', ''), &
     effect_trait_t('offset_force', 'constant force', 'flight', 'force', '', ''), &
     effect_trait_t('restitution_slope', over_impacts, 'barrier', 'slope', '', 'contact.restitution'), &
     effect_trait_t('restitution_curve', over_impacts, 'barrier', 'change', '', 'contact.restitution'), &
     effect_trait_t('compliant_contact', over_penetration, 'barrier', '', 'stiffness damping', 'contact.restitution'), &
     effect_trait_t('kelvin_voigt_contact', over_penetration, 'barrier', '', 'stiffness damping', 'contact.restitution'), &
     effect_trait_t('contact_curve', over_penetration, 'barrier', 'force', '', 'contact.restitution'), &
-    effect_trait_t('second_barrier', 'contact over place', 'barrier', '', '', 'contact.restitution'), &
+    effect_trait_t('second_barrier', 'contact over position', 'barrier', '', '', 'contact.restitution'), &
     effect_trait_t('drive_ripple', over_phase, 'flight', 'sine cosine', '', 'drive.ratio'), &
     effect_trait_t('drive_harmonics', over_phase, 'flight', 'cosine sine', '', 'drive.ratio'), &
     effect_trait_t('sensor_bias', 'sensor', 'sensor', 'bias', '', ''), &

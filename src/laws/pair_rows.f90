@@ -38,9 +38,9 @@ module pair_rows
     (parameter_row_t('body', bodies(i), 'driver_v0', 'm/s', any_value, &
                      'velocity of the driving body at the start; without effect where its motion is given', &
                      optional=.true.), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'blow', 'N s', any_value, 'impulse of a hammer on the driven body', &
+    (parameter_row_t('body', bodies(i), 'impulse', 'N s', any_value, 'impulse of a hammer on the driven body', &
                      optional=.true.), i=1, 2), &
-    (parameter_row_t('body', bodies(i), 'blow_time', 's', not_negative, 'time of the blow since the start', &
+    (parameter_row_t('body', bodies(i), 'impulse_time', 's', not_negative, 'time of the impulse since the start', &
                      optional=.true.), i=1, 2), &
     parameter_row_t('drive', 'force', 'mean', 'N', any_value, 'mean force', optional=.true.), &
     parameter_row_t('drive', 'force', 'amplitude', 'N', not_negative, 'amplitude of the force'), &

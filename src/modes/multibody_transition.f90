@@ -3,7 +3,7 @@
 
 !> What follows a triggered guard of a multibody structure: impacts, sticking and sliding, the completion of chatter.
 module multibody_transition
-  use blow, only: apply_impact
+  use simultaneous_impact, only: apply_impact
   use chatter, only: look_ahead
   use guards, only: force_ends, force_returns, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, slide_ends, &
     slides_down, slides_up

@@ -3,7 +3,7 @@
 
 !> What happens to a multibody structure at times of its own: the samples of a controller, impulses on bodies.
 module timed_actions
-  use blow, only: apply_impact
+  use simultaneous_impact, only: apply_impact
   use control, only: error_of
   use multibody, only: joint_contact, joint_friction, joint_section, multibody_t, most_joints
   use multibody_flows, only: multibody_motion_t
@@ -11,7 +11,7 @@ module timed_actions
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use multibody_transition, only: judge_friction, settle
   use kinds, only: wp
-  use motion_state, only: event_blow, log_t, put_column
+  use motion_state, only: event_impulse, log_t, put_column
   implicit none
   private
 
@@ -128,7 +128,7 @@ contains
       if (.not. present(log) .or. .not. ok) return
       log%balance%work = log%balance%work + energy_of_multibody(machine, pushed) - energy_of_multibody(machine, before)
       call balance_change(machine, pushed, state, log)
-      call record_change(machine, event_blow, before, state, log)
+      call record_change(machine, event_impulse, before, state, log)
       ! In the position of a joint stands the number after the last.
       call put_column(log%event_joint, log%events, &
                       [count(machine%joints%kind /= joint_section) + 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])

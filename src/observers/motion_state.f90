@@ -22,10 +22,10 @@ module motion_state
   !> Events.
   integer, parameter, public :: event_impact_upper = 1, event_impact_lower = 2, event_stick = 3, &
     event_release = 4, event_turning_point = 5, event_chatter_upper = 6, event_chatter_lower = 7, &
-    event_barrier_release = 8, event_touch_upper = 9, event_touch_lower = 10, event_separation = 11, event_blow = 12
+    event_barrier_release = 8, event_touch_upper = 9, event_touch_lower = 10, event_separation = 11, event_impulse = 12
   character(len=*), parameter, public :: event_names(12) = [character(len=15) :: 'impact_upper', &
     'impact_lower', 'stick', 'release', 'turning_point', 'chatter_upper', 'chatter_lower', &
-    'barrier_release', 'touch_upper', 'touch_lower', 'separation', 'blow']
+    'barrier_release', 'touch_upper', 'touch_lower', 'separation', 'impulse']
 
   !> Symbols of event words, three bits each.
   integer, parameter, public :: word_upper = 1, word_lower = 2, word_stick = 3, &

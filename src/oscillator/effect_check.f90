@@ -41,12 +41,12 @@ contains
         problem = table_problem(choices(i), 'speed', 'upwards')
         if (len(problem) == 0) problem = table_problem(choices(i), 'speed', 'downwards')
         if (has_effect(choices, 'dahl')) problem = ': found with effect.dahl, allowed one of them'
-      case ('friction_place_curve')
-        problem = table_problem(choices(i), 'place', 'change')
+      case ('friction_position_curve')
+        problem = table_problem(choices(i), 'position', 'change')
       case ('force_curve')
-        problem = table_problem(choices(i), 'place', 'force')
+        problem = table_problem(choices(i), 'position', 'force')
       case ('spring_curve')
-        problem = table_problem(choices(i), 'stretch', 'force')
+        problem = table_problem(choices(i), 'extension', 'force')
       case ('backlash')
         problem = ''
         if (value_of(choices(i), 'rounding') > 0 .and. value_of(choices(i), 'rounding') < least_rounding) problem = &

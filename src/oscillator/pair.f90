@@ -37,7 +37,7 @@ module pair
     !> The stop is carried by m1.
     logical :: carried = .false.
     !> Impulse on m2 [N s] and its time since the start [s].
-    real(wp) :: blow = 0, blow_time = 0
+    real(wp) :: impulse = 0, impulse_time = 0
     !> Position [m] and velocity [m/s] of m1 at the start.
     real(wp) :: driver_x0 = 0, driver_v0 = 0
     !> Period of the section [s]: of the drive, the spring with both bodies, or one second.
@@ -120,8 +120,8 @@ contains
     machine%friction = value_of(choice, 'friction')
     machine%driver_x0 = value_of(choice, 'driver_x0')
     machine%driver_v0 = value_of(choice, 'driver_v0')
-    machine%blow = value_of(choice, 'blow')
-    machine%blow_time = value_of(choice, 'blow_time')
+    machine%impulse = value_of(choice, 'impulse')
+    machine%impulse_time = value_of(choice, 'impulse_time')
   end subroutine take_bodies
 
   pure subroutine take_drive(choice, machine, error)

@@ -101,7 +101,7 @@ contains
       call fail(error, exit_bad_case, 'drive.law: found two bodies without a periodic drive, allowed force, sine: their '// &
                 'variations are known from one drive period to the next')
     else if (allocated(machine%impulses)) then
-      call fail(error, exit_bad_case, 'body.blow: found a blow, allowed 0 N s: variations of two bodies have no law for it')
+      call fail(error, exit_bad_case, 'body.impulse: found an impulse, allowed 0 N s: variations of two bodies have no law for it')
     end if
   end subroutine refuse_two_bodies
 

@@ -3,7 +3,7 @@
 
 !> What impacts and constraints do to the state of a multibody structure, with derivatives.
 module structure_impact
-  use blow, only: speeds_after
+  use simultaneous_impact, only: speeds_after
   use contact_law, only: contact_t, restitution_at
   use multibody, only: joint_contact, multibody_t, most_joints, together_sequence
   use multibody_state, only: is_held, joint_motion, multibody_state_t
@@ -59,7 +59,7 @@ contains
     end do
   end subroutine carried_by
 
-  !> Speeds after an impact of the contacts with `side` +1, -1 (0: not touching), see module `blow`, and their derivatives by the
+  !> Speeds after an impact of the contacts with `side` +1, -1 (0: not touching), see module `simultaneous_impact`, and their derivatives by the
   !> speeds before and by the time. Not a number where the impact is not smooth.
   pure subroutine apply_impact_with_slopes(machine, state, turning, side, plastic, v, by_speed, by_time)
     type(multibody_t), intent(in) :: machine

@@ -12,7 +12,7 @@ REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
 REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget mode_cycle"
 EVENTS = (
     "impact_upper impact_lower stick release turning_point chatter_upper chatter_lower barrier_release"
-    " touch_upper touch_lower separation blow"
+    " touch_upper touch_lower separation impulse"
 )
 MODES = "slip_plus slip_minus stick upper_barrier lower_barrier held"
 AXES = {

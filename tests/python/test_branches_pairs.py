@@ -161,7 +161,7 @@ def test_what_has_no_variations_is_refused(separatrix: Path, source_dir: Path, t
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        (("body.blow=1",), "body.blow: found a blow"),
+        (("body.impulse=1",), "body.impulse: found an impulse"),
         (
             ("drive={law='pid_sine', amplitude=1, frequency=1, proportional=5}",),
             "drive.law: found a controller",

@@ -119,6 +119,6 @@ def test_what_starts_cannot_say_is_refused(source_dir) -> None:
     assert one_body.coordinates == ()
     with pytest.raises(CaseError, match="allowed for segments of coordinates structure"):
         one_body.coordinate_segments([], np.zeros(0), np.zeros((1, 1)), np.array([0, 0]), np.zeros(0))
-    struck = Model.from_text(CASE + '[drive.blow]\nlaw = "impulse"\nbody = "first"\nimpulse = 1\ntime = 2\n')
+    struck = Model.from_text(CASE + '[drive.impulse]\nlaw = "impulse"\nbody = "first"\nimpulse = 1\ntime = 2\n')
     with pytest.raises(CaseError, match="impulses, or samples of a controller"):
         struck.coordinate_segments([], np.zeros(0), np.zeros((1, 5)), np.array([0, 0]), np.zeros(0))

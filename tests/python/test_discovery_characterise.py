@@ -18,7 +18,7 @@ SEED = 31
 CASES = {
     187: ("maxwell_element", ["memory"], "maxwell_time"),
     122: ("drifting_restitution", ["oscillating time", "impacts"], "restitution_wave_frequency"),
-    229: ("parametric_stiffness", ["oscillating time", "place"], "stiffness_wave_frequency"),
+    229: ("parametric_stiffness", ["oscillating time", "position"], "stiffness_wave_frequency"),
     204: ("drifting_friction", ["slow time", "direction of motion"], None),
 }
 # one with an effect of the catalogue

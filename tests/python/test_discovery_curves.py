@@ -280,10 +280,10 @@ def test_friction_that_varies_over_the_place_as_a_sine_is_found_as_a_function():
     table = {f"place[{i}]": one for i, one in enumerate(places, start=1)}
     table |= {f"change[{i}]": 0.6 * np.sin(9 * one) for i, one in enumerate(places, start=1)}
     base = Model.from_text(case)
-    records = records_of(base.with_effect("friction_place_curve", table), seconds=8.0)
+    records = records_of(base.with_effect("friction_position_curve", table), seconds=8.0)
     options = Options(quick=True, most_effects=1, candidates=("position_dependent_friction",))
     verdict = discover(base, records[:2], records[2:], options)
-    assert verdict["effects"] == ["friction_place_curve"]
+    assert verdict["effects"] == ["friction_position_curve"]
     part = verdict["function"]["parts"][0]
     at, value, band = (np.array(part[key]) for key in ("at", "value", "band_95"))
     right = 0.08 * (1 + 0.6 * np.sin(9 * at))

@@ -83,7 +83,7 @@ def magnet(x: np.ndarray) -> np.ndarray:
 def with_magnet(model: Model) -> Model:
     """The model with the magnet as a table of its own knots."""
     places = np.linspace(-0.1, 1.0, 16)
-    return model.with_effect("force_curve", table("place", places, "force", magnet(places)))
+    return model.with_effect("force_curve", table("position", places, "force", magnet(places)))
 
 
 def ask(true: Model, without: Model, names: tuple[str, ...], **options) -> tuple[dict, Findings]:
@@ -112,7 +112,7 @@ def test_a_force_without_a_name_is_added_as_a_table_and_the_case_runs(separatrix
     without = base(upper=1.1)
     verdict, findings = ask(with_magnet(without), without, ("drive_ripple",))
     assert (verdict["outcome"], verdict["effects"]) == ("characterised", [])
-    assert ["place"] in [one["depends_on"] for one in verdict["character"]]
+    assert ["position"] in [one["depends_on"] for one in verdict["character"]]
     assert verdict["added"] == ["force_curve"]
     for gap in verdict["gap"].values():
         assert gap["after"] - 1 < 0.05 * (gap["before"] - 1)
@@ -142,7 +142,7 @@ def test_free_play_in_the_spring_is_named_and_no_cubic_spring():
     true = without.with_effect("backlash", {"gap": 0.03})
     verdict, _ = ask(true, without, ("backlash", "cubic_spring", "quadratic_drag"))
     assert (verdict["outcome"], verdict["effects"]) == ("named", ["backlash"])
-    assert verdict["families"] == ["spring over stretch"]
+    assert verdict["families"] == ["spring over extension"]
     found = verdict["parameters"]["effect.backlash.gap"]
     assert found["interval_95"][0] < 0.03 < found["interval_95"][1] or abs(found["value"] - 0.03) < 3e-5
 

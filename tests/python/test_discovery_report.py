@@ -95,7 +95,7 @@ CHARACTER = [
         "text": "a force that depends on memory, -a z, with a time constant tau of about 0.203 s",
     },
     {
-        "depends_on": ["speed", "place"],
+        "depends_on": ["speed", "position"],
         "formula": "",
         "constant": None,
         "size": None,

@@ -481,6 +481,6 @@ def test_forms_of_one_family_leave_the_family_in_no_doubt():
     # without a rival something else is in doubt, as where another gate failed
     assert families(drag) == families(one("quadratic_drag", stable=False), one("viscous")) == []
     pair = one("cubic_spring", "viscous")
-    both = ["friction over speed", "spring over stretch"]
+    both = ["friction over speed", "spring over extension"]
     assert families(pair, one("quadratic_drag", "cubic_spring")) == both
     assert families(pair, one("quadratic_drag")) == []

@@ -142,10 +142,10 @@ def test_what_is_far_below_the_noise_of_a_sample_is_no_gap():
 @pytest.mark.parametrize(
     ("speed", "place", "pieces", "mostly"),
     # p of gains as large is 0 for all of them
-    [(2e3, 1.5e5, 1.6e5, "place"), (2e3, 1.5e3, 1.6e5, ""), (90, 30, 60, "speed")],
+    [(2e3, 1.5e5, 1.6e5, "position"), (2e3, 1.5e3, 1.6e5, ""), (90, 30, 60, "speed")],
 )
 def test_what_a_force_depends_on_is_what_explains_most(speed, place, pieces, mostly):
-    gains = {"speed": speed, "place": place, "pieces": pieces}
+    gains = {"speed": speed, "position": place, "pieces": pieces}
     families = [Family(name, gain, 5, float(chi2.sf(gain, 5))) for name, gain in gains.items()]
     assert Ceiling(families, None).mostly == mostly
 
@@ -165,7 +165,7 @@ def test_a_law_that_leaves_more_than_noise_says_that_its_errors_count_noise_alon
 
 def test_a_function_is_told_with_its_hump():
     none = np.zeros((5, 5))
-    member = next(one for one in MEMBERS if one.effect == "friction_place_curve")
+    member = next(one for one in MEMBERS if one.effect == "friction_position_curve")
     at = np.linspace(-0.02, 0.02, 5)
 
     def hump(value: list[float], error: float) -> str:

@@ -99,7 +99,7 @@ def test_a_very_stiff_stop_that_moves(separatrix, tmp_path):
 
 def test_a_motion_given_up_at_once(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(PAIR + "[integrator]\nevent_budget = 1\n")
-    outcome = run(separatrix, "trajectory", "case.toml", "--set", "body.blow=1", folder=tmp_path)
+    outcome = run(separatrix, "trajectory", "case.toml", "--set", "body.impulse=1", folder=tmp_path)
     assert outcome.code == 78
     assert "given up before the end: event_budget (flights count" in outcome.out
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
@@ -124,17 +124,17 @@ def test_a_stiff_barrier_ends_by_the_step_budget(separatrix, tmp_path):
         assert file["reason"][()].tolist() == [7, 7]
 
 
-def test_a_blow_after_the_end_is_told(separatrix, tmp_path):
+def test_an_impulse_after_the_end_is_reported(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(PAIR)
-    blow = ["--set", "body.blow=1", "--set", "body.blow_time=2.5"]
-    told = succeed(separatrix, "trajectory", "case.toml", *blow, folder=tmp_path).out
-    assert "body.blow_time = 2.5 s is after the end" in told
+    impulse = ["--set", "body.impulse=1", "--set", "body.impulse_time=2.5"]
+    told = succeed(separatrix, "trajectory", "case.toml", *impulse, folder=tmp_path).out
+    assert "body.impulse_time = 2.5 s is after the end" in told
 
 
 @pytest.mark.parametrize(
     ("setting", "key"),
     [
-        ("body.blow=0.1", "body.blow"),
+        ("body.impulse=0.1", "body.impulse"),
         (
             'drive={law="pid_velocity",velocity=0.2,proportional=50,sample_time=0.05}',
             "drive.sample_time",

@@ -74,14 +74,14 @@ def test_what_the_map_alone_tells_holds_what_new_starts_tell(crank) -> None:
 
 
 def test_measures_over_phases(crank) -> None:
-    found = sx.measures(crank, ["local_integrity_over_phases", "critical_blow"], attractors=1, phases=4)
-    ball, blow = found
+    found = sx.measures(crank, ["local_integrity_over_phases", "critical_impulse"], attractors=1, phases=4)
+    ball, impulse = found
     fixed = sx.measures(crank, "local_integrity", attractors=1)[0]
     assert ball.value <= fixed.value
     assert ball.details["radius"][0] == pytest.approx(fixed.value, rel=1e-6)
-    # a blow leaves the ball before it leaves the basin: in the same units
-    assert blow.value >= ball.value * 3 * np.pi * (1 - 1e-9)
-    assert len(blow.details["up"]) == 4
+    # an impulse leaves the ball before it leaves the basin: in the same units
+    assert impulse.value >= ball.value * 3 * np.pi * (1 - 1e-9)
+    assert len(impulse.details["up"]) == 4
 
 
 @pytest.mark.long
@@ -273,7 +273,7 @@ def test_the_command_is_installed(separatrix: Path) -> None:
     assert done.stdout.startswith("separatrix-measures ")
 
 
-def test_rare_blows_have_an_exponential_law_and_frequent_ones_do_worse(crank) -> None:
+def test_rare_impulses_have_an_exponential_law_and_frequent_ones_do_worse(crank) -> None:
     rare = sx.survival(crank, 1, rate=0.02, deviation=1.0, motions=400, horizon=1000)
     assert rare["survival"].values[0] == 1
     # the law's band and the band of the motions meet at every time
@@ -281,7 +281,7 @@ def test_rare_blows_have_an_exponential_law_and_frequent_ones_do_worse(crank) ->
     assert np.all(rare["law_lower"] <= rare["survival_upper"])
     assert np.all(np.diff(rare["survival"].values) <= 0)
     often = sx.survival(crank, 1, rate=1.0, deviation=1.0, motions=400, horizon=20)
-    # as many blows, but they meet motions that have not settled
+    # as many impulses, but they meet motions that have not settled
     assert often["survival_upper"].values[-1] < rare["survival"].values[-1]
     assert often.separatrix.plot() is not None
     with pytest.raises(sx.SeparatrixError, match="found attractor 9, allowed 1, 2"):

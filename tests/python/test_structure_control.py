@@ -86,7 +86,7 @@ CASES = {
     "impulse": (
         RIGID
         + SPRUNG
-        + f"body = {{ {PAIR.format('backlash_pair')}, blow = -0.3, blow_time = 3.7 }}\n"
+        + f"body = {{ {PAIR.format('backlash_pair')}, impulse = -0.3, impulse_time = 3.7 }}\n"
         + 'drive = { law = "force", amplitude = 1, frequency = 2 }\n',
         STOPS
         + SPRING

@@ -92,11 +92,11 @@ contains
     character(len=*), parameter :: effects(0:9) = [character(len=130) :: &
       'friction_curve speed=0,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3', &
       'friction_curve speed=0.2,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3; effect asymmetric_friction coulomb=0.2', &
-      'spring_curve stretch=-0.4,0,0.3,0.6 force=-5,0,2,9', 'force_curve place=0,0.3,0.5,1 force=1,-1,2,0', &
-      'friction_place_curve place=0,0.5,1 change=0.3,-0.2,0.4', &
-      'friction_place_curve place=0,0.5,1 change=0.3,-0.2,0.4; effect stribeck excess=1 velocity=0.2', &
-      'backlash gap=0.1', 'cubic_damping coefficient=0.1; effect spring_curve stretch=-0.4,0,0.3 force=-5,0,2', &
-      'friction_place_curve place=0.1,0.4,0.8,1.1 change=0.5,-1.2,-1.2,0.5', 'position_dependent_friction slope=-1.5']
+      'spring_curve extension=-0.4,0,0.3,0.6 force=-5,0,2,9', 'force_curve position=0,0.3,0.5,1 force=1,-1,2,0', &
+      'friction_position_curve position=0,0.5,1 change=0.3,-0.2,0.4', &
+      'friction_position_curve position=0,0.5,1 change=0.3,-0.2,0.4; effect stribeck excess=1 velocity=0.2', &
+      'backlash gap=0.1', 'cubic_damping coefficient=0.1; effect spring_curve extension=-0.4,0,0.3 force=-5,0,2', &
+      'friction_position_curve position=0.1,0.4,0.8,1.1 change=0.5,-1.2,-1.2,0.5', 'position_dependent_friction slope=-1.5']
     laws = laws_from('body point_mass mass=1 gravity=9.81; restoring linear stiffness=88.8 free_length=0.4; contact newton '// &
       'restitution=0.7 upper=1.1; friction coulomb kinetic_coefficient=0.1; drive fourier ratio=1 mean=0.31 '// &
       'cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 10))))
@@ -119,8 +119,8 @@ contains
       'dahl stiffness=300', 'viscous damping=0.3', 'stribeck excess=0.3 velocity=0.1', 'offset_force force=-20', &
       'stribeck excess=0.3 velocity=0.03 exponent=1', 'backlash gap=0.1 rounding=0.2', &
       'friction_curve speed=0,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3', &
-      'spring_curve stretch=-1,0,1 force=-5,0,6; effect force_curve place=0,1.09,1.1,1.13 force=0,0,0.5,2', &
-      'friction_place_curve place=0,0.5,1.1,1.14 change=0.3,-0.2,0.4,0']
+      'spring_curve extension=-1,0,1 force=-5,0,6; effect force_curve position=0,1.09,1.1,1.13 force=0,0,0.5,2', &
+      'friction_position_curve position=0,0.5,1.1,1.14 change=0.3,-0.2,0.4,0']
     laws = laws_from('body point_mass mass=2 gravity=9.81; restoring linear stiffness=88.8 free_length=0.4; contact '// &
       trim(contacts(modulo(i, 6)))//' upper=1.1; friction coulomb kinetic_coefficient=0.1; drive fourier ratio=1 '// &
       'mean=0.31 cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 11))))

@@ -30,7 +30,7 @@ _WORDS = {
     "safe_basin_integrity_factor": "IF, safe at all phases",
     "basin_stability": "basin stability",
     "convergence_time": "time to settle",
-    "critical_blow": "critical blow",
+    "critical_impulse": "critical impulse",
     "basin_entropy": "$S_b$",
     "boundary_basin_entropy": "$S_{bb}$",
     "uncertainty_exponent": r"$\alpha$",

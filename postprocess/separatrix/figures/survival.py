@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The share of motions that random blows have not taken out of their basin, and the law of rare blows."""
+"""The share of motions that random impulses have not taken out of their basin, and the law of rare impulses."""
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -14,7 +14,7 @@ from separatrix.labels import axis_label, plain
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure by name."""
-    look.require("survival under blows")
+    look.require("survival under impulses")
     return Figures({"survival": lambda: diagram(result, title, look)})
 
 
@@ -26,7 +26,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     lines = []
     for name, colour, text in (
         ("survival", style.OKABE_ITO[1], "motions struck again and again"),
-        ("law", style.OKABE_ITO[0], "law of rare blows, exp(-rate p t)"),
+        ("law", style.OKABE_ITO[0], "law of rare impulses, exp(-rate p t)"),
     ):
         lines += ax.plot(time, result[name].values, color=colour, label=text)
         low, high = result[f"{name}_lower"].values, result[f"{name}_upper"].values
@@ -38,7 +38,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     about = result.attrs
     caption = [
         *caption_pieces(result, look, describe_case(result)),
-        f"attractor {about['attractor']}, {about['motions']} motions, {about['rate']:.4g} blows a second of "
+        f"attractor {about['attractor']}, {about['motions']} motions, {about['rate']:.4g} impulses a second of "
         f"standard deviation {about['deviation']:.4g} m/s, p = {about['p']:.4g}; bands: 95 % confidence",
         plain(version_text(result)),
     ]

@@ -28,7 +28,7 @@ EACH: dict[str, Callable[[Slice, int], Measure | list[Measure]]] = {
     "basin_stability": integrity.basin_stability,
     "convergence_time": integrity.convergence_time,
     "local_integrity_over_phases": phases.local_integrity_over_phases,
-    "critical_blow": phases.critical_blow,
+    "critical_impulse": phases.critical_impulse,
     "safe_basin": phases.safe_basin,
 }
 #: Measures of a map as a whole.
@@ -39,7 +39,7 @@ WHOLE: dict[str, Callable[[Slice], Measure | list[Measure]]] = {
     "wada_grid": boundaries.wada_grid,
 }
 NAMES = (*EACH, *WHOLE)
-_OVER_PHASES = ("local_integrity_over_phases", "critical_blow", "safe_basin")
+_OVER_PHASES = ("local_integrity_over_phases", "critical_impulse", "safe_basin")
 USUAL = tuple(name for name in NAMES if name not in (*_OVER_PHASES, "uncertainty_exponent"))
 #: Crank angles where none are asked for.
 PHASES = 32

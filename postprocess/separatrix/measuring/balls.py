@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The largest ball round a motion (LIM), the largest ball of a basin (IF), the least blow out of a basin."""
+"""The largest ball round a motion (LIM), the largest ball of a basin (IF), the least impulse out of a basin."""
 
 from dataclasses import dataclass
 

@@ -187,7 +187,7 @@ def _parser() -> Parser:
         "--phases",
         metavar="N",
         type=whole_number(2),
-        help="also the measures over N crank angles; critical blow, safe basin, local integrity of the orbit",
+        help="also the measures over N crank angles; critical impulse, safe basin, local integrity of the orbit",
     )
     parser.add_argument(
         "--along",

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures over all phases of the drive: local integrity, phase-robust safe basin, critical blow."""
+"""Measures over all phases of the drive: local integrity, phase-robust safe basin, critical impulse."""
 
 import math
 
@@ -11,7 +11,7 @@ from separatrix.measuring.integrity import RAY, ball_at, basis
 from separatrix.measuring.maps import Slice
 from separatrix.measuring.report import Measure
 
-#: Steps along a blow.
+#: Steps along an impulse.
 _STEPS = 256
 
 
@@ -68,16 +68,16 @@ def local_integrity_over_phases(found: Slice, own: int) -> Measure:
     )
 
 
-def critical_blow(found: Slice, own: int) -> Measure:
+def critical_impulse(found: Slice, own: int) -> Measure:
     """Least change of velocity that takes the machine out of the basin, over the crank angles."""
     told = (
-        "critical blow: the least sudden change of velocity at a point of the motion that leaves "
+        "critical impulse: the least sudden change of velocity at a point of the motion that leaves "
         "the basin; the "
         "least over the crank angles and both directions"
     )
     if found.machine is None or found.names != ("x0", "v0"):
         return Measure(
-            "critical_blow", told, "m/s", own, limits=(*found.limits, "needs new starts over x0 and v0")
+            "critical_impulse", told, "m/s", own, limits=(*found.limits, "needs new starts over x0 and v0")
         )
     turns = angles(found.phases)
     reach = float(found.region.size[1])
@@ -86,7 +86,7 @@ def critical_blow(found: Slice, own: int) -> Measure:
     for angle in turns:
         points = found.machine.section(own, float(angle))
         if points is None:
-            return Measure("critical_blow", told, "m/s", own, limits=(*found.limits, "needs a cycle"))
+            return Measure("critical_impulse", told, "m/s", own, limits=(*found.limits, "needs a cycle"))
 
         def labels(starts: np.ndarray, angle: float = float(angle)) -> np.ndarray:
             return found.machine.labels(starts, angle)
@@ -108,7 +108,7 @@ def critical_blow(found: Slice, own: int) -> Measure:
     ]
     value = upper
     if math.isinf(upper):
-        limits.append("no blow up to the height of the window leaves the basin")
+        limits.append("no impulse up to the height of the window leaves the basin")
         value = math.nan
     elif label == 0:
         limits.append("it leads to a start without a known label")
@@ -121,7 +121,7 @@ def critical_blow(found: Slice, own: int) -> Measure:
     if mass is not None and math.isfinite(upper):
         parameters["impulse"] = f"{upper * float(mass):.9g} N s"
     return Measure(
-        "critical_blow",
+        "critical_impulse",
         told,
         "m/s",
         own,

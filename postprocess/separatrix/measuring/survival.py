@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long a motion survives random blows: motions that are struck, beside the law of rare blows."""
+"""How long a motion survives random impulses: motions that are struck, beside the law of rare impulses."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from separatrix.version import __version__
 __all__ = ["survival"]
 
 _TIMES = 60
-# More blows than anybody waits for: the horizon ends a motion.
+# More impulses than anybody waits for: the horizon ends a motion.
 _MOST_BLOWS = 100_000
 
 
@@ -35,24 +35,24 @@ def survival(
     threads: int | None = None,
     progress: bool | Report | None = None,
 ) -> xr.Dataset:
-    """Return the share of motions that random blows have not taken out of their basin, over the time.
+    """Return the share of motions that random impulses have not taken out of their basin, over the time.
 
-    A motion has left when the state right after a blow lies in another basin, or its label is not known
+    A motion has left when the state right after an impulse lies in another basin, or its label is not known
     (`not_known` counts these). `survival` is the share that has not left, with its 95 % interval;
-    `law` is exp(-rate p t) of rare blows, which find the machine settled again: `p` is the probability that
-    one blow at a random crank angle leaves the basin, from `motions` blows of its own. Where the two differ,
-    blows meet motions that have not settled.
+    `law` is exp(-rate p t) of rare impulses, which find the machine settled again: `p` is the probability that
+    one impulse at a random crank angle leaves the basin, from `motions` impulses of its own. Where the two differ,
+    impulses meet motions that have not settled.
 
     Parameters
     ----------
     result, attractor, slice
         A map over x0 and v0 of one machine, the motion that is struck, and values of the map's parameters.
     rate
-        Mean number of blows a second; they come at random (Poisson).
+        Mean number of impulses a second; they come at random (Poisson).
     deviation
         Each changes the velocity by a normal random number of this standard deviation [m/s].
     horizon
-        Seconds that are watched; None: 20 blows on average.
+        Seconds that are watched; None: 20 impulses on average.
     motions
         How many motions are struck, all from the attractor at random crank angles.
     seed, threads
@@ -72,7 +72,7 @@ def survival(
     staying = np.arange(motions)
     with Progress(progress) as told:
         for _ in range(_MOST_BLOWS):
-            # drawn for all, so that a motion's blows do not depend on the others
+            # drawn for all, so that a motion's impulses do not depend on the others
             waits = random.exponential(1 / rate, motions)[staying]
             going = clock[staying] + waits <= length
             told("motions", motions - int(going.sum()), motions)

@@ -21,7 +21,7 @@ __all__ = ["Machine"]
 
 EVENTS = (
     "impact_upper", "impact_lower", "stick", "release", "turning_point", "chatter_upper", "chatter_lower",
-    "barrier_release", "touch_upper", "touch_lower", "separation", "blow",
+    "barrier_release", "touch_upper", "touch_lower", "separation", "impulse",
 )  # fmt: skip
 REGIMES = ("unresolved", "non_impact", "impact", "sticking", "mixed", "chattering", "at_rest", "stuck")
 REASONS = (

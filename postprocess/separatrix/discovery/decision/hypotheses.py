@@ -136,7 +136,7 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
             ("speed",), lambda m, n=power: -(np.sign(m.v) * np.abs(m.v) ** n)[:, :, None], formula
         )
     yield _function(("speed",), lambda m: splines(m.v, over_v, m.good))
-    yield _function(("place",), lambda m: splines(m.x, over_x, m.good))
+    yield _function(("position",), lambda m: splines(m.x, over_x, m.good))
     if training.spring is not None:
         over_s = knots_of(training.spring[training.good], 7)
 
@@ -145,15 +145,15 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
             known = m.good if m.spring is not None else np.zeros_like(m.good)
             return splines(m.x if m.spring is None else m.spring, over_s, known)
 
-        yield _function(("stretch",), stretched)
+        yield _function(("extension",), stretched)
     yield _function(
-        ("speed", "place"), lambda m: products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
+        ("speed", "position"), lambda m: products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
     )
     if training.phase is not None:
         middle, size = x.mean(), x.std()
         yield _function(("drive phase",), lambda m: _harmonics(m, 6))
         yield _function(
-            ("drive phase", "place"), lambda m: _harmonics(m, 2) * ((m.x - middle) / size)[:, :, None]
+            ("drive phase", "position"), lambda m: _harmonics(m, 2) * ((m.x - middle) / size)[:, :, None]
         )
 
 
@@ -163,7 +163,7 @@ def _times(training: Motion) -> Iterator[Hypothesis]:
     factors = (
         ((), lambda m: np.ones_like(m.x)[:, :, None], ""),
         (("direction of motion",), lambda m: np.sign(m.v)[:, :, None], " sign(v)"),
-        (("place",), lambda m: np.stack([m.x - middle, np.ones_like(m.x)], axis=2), " (x - x0)"),
+        (("position",), lambda m: np.stack([m.x - middle, np.ones_like(m.x)], axis=2), " (x - x0)"),
     )
     waves = _frequencies(training, _WAVES)
     for names, factor, text in factors:

@@ -40,12 +40,12 @@ _SPEED, _PLACE, _PLANE, _PHASE = "velocity", "position", "position and velocity"
 _OF_FAMILY = {
     "friction over speed": (_SPEED, _LOW),
     "friction before sliding": (_LOW, _PLANE),
-    "friction over place": (_PLANE,),
-    "spring over stretch": (_PLACE,),
-    "force over place": (_PLACE,),
+    "friction over position": (_PLANE,),
+    "spring over extension": (_PLACE,),
+    "force over position": (_PLACE,),
     "restitution over impact speed": (IMPACT_SPEED,),
     "contact over penetration": (IMPACT_SPEED, _SINCE),
-    "contact over place": (_PLACE,),
+    "contact over position": (_PLACE,),
     "drive over phase": (_PHASE,),
 }
 

@@ -123,8 +123,8 @@ def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
     one = np.ones_like(x)
     forces = {
         "speed": splines(v, knots_of(v[good], 7), good),
-        "place": splines(x, knots_of(x[good], 7), good),
-        "speed and place": products(
+        "position": splines(x, knots_of(x[good], 7), good),
+        "speed and position": products(
             splines(v, knots_of(v[good], 4), good), splines(x, knots_of(x[good], 4), good)
         ),
         "time": np.stack(

@@ -17,7 +17,7 @@ from separatrix.errors import SeparatrixError
 _INSTANT, _SHARE = 1e-7, 1e-2
 _TOLERANCE = 1e-12
 _DAHL = "effect.dahl.stiffness"
-_OVER_PLACE = ("effect.position_dependent_friction.", "effect.friction_place_curve.")
+_OVER_PLACE = ("effect.position_dependent_friction.", "effect.friction_position_curve.")
 
 
 def force_needed(

@@ -157,22 +157,22 @@ JOINT_EFFECTS = {
             ("static_force",), ("stribeck_velocity",),
         ),
         JointEffect(
-            "cubic_spring", "a force that grows with the cube of the stretch", "spring over stretch",
+            "cubic_spring", "a force that grows with the cube of the stretch", "spring over extension",
             _new("spring", law="polynomial", stiffness=0.0, cubic=0.0),
             lambda s: {"cubic": [0.02 * s.force / s.length**3]}, ("cubic",),
         ),
         JointEffect(
-            "quadratic_spring", "a force that grows with the square of the stretch", "spring over stretch",
+            "quadratic_spring", "a force that grows with the square of the stretch", "spring over extension",
             _new("spring", law="polynomial", stiffness=0.0, quadratic=0.0),
             lambda s: {"quadratic": [0.02 * s.force / s.length**2]}, ("quadratic",),
         ),
         JointEffect(
-            "linear_spring", "a spring that the case lacks", "spring over stretch",
+            "linear_spring", "a spring that the case lacks", "spring over extension",
             _new("spring", stiffness=0.0),
             lambda s: {"stiffness": [0.02 * s.force / s.length]}, ("stiffness",),
         ),
         JointEffect(
-            "backlash", "free play in series with a spring", "spring over stretch", _played,
+            "backlash", "free play in series with a spring", "spring over extension", _played,
             lambda s: {"upper": [share * s.length for share in (0.025, 0.1, 0.005)]}, (), ("upper",),
             ("spring", "linear"), moved=("stiffness",), mirrored=("upper", "lower"),
         ),
@@ -184,7 +184,7 @@ JOINT_EFFECTS = {
             (), ("stiffness", "force"), ("friction", "coulomb"),
         ),
         JointEffect(
-            "offset_force", "a constant force", "force over place", _load,
+            "offset_force", "a constant force", "force over position", _load,
             lambda s: {"load": [0.02 * s.force]}, ("load",),
         ),
         JointEffect(

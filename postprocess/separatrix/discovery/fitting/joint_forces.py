@@ -36,7 +36,7 @@ def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
             continue
         over = {
             "speed": splines(u, knots_of(u[good], _KNOTS), good),
-            "stretch": splines(s, knots_of(s[good], _KNOTS), good),
+            "extension": splines(s, knots_of(s[good], _KNOTS), good),
             "time": np.stack([time, time * u / np.std(u[good]), time * np.sign(u)], axis=2)
             * good[:, :, None],
         }

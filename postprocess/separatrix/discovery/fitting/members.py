@@ -250,17 +250,17 @@ MEMBERS = (
         None, False, "friction.", "speed", _speeds, _known_friction, ("speed",), from_zero=True,
     ),
     Member(
-        "friction_place_curve", "place", ("change",), "place", "m", "coefficient of kinetic friction",
-        "friction.kinetic_coefficient", True, None, "speed and place", _places, _known_over_place,
-        ("speed", "place"),
+        "friction_position_curve", "position", ("change",), "position", "m", "coefficient of kinetic friction",
+        "friction.kinetic_coefficient", True, None, "speed and position", _places, _known_over_place,
+        ("speed", "position"),
     ),
     Member(
-        "spring_curve", "stretch", ("force",), "stretch", "m", "force beyond the spring of the case (N)",
-        None, False, "restoring.", "place", _stretches, _known_spring, ("stretch",),
+        "spring_curve", "extension", ("force",), "extension", "m", "force beyond the spring of the case (N)",
+        None, False, "restoring.", "position", _stretches, _known_spring, ("extension",),
     ),
     Member(
-        "force_curve", "place", ("force",), "place", "m", "force beyond the spring of the case (N)",
-        None, False, "restoring.", "place", _everywhere, _known_force, ("place",),
+        "force_curve", "position", ("force",), "position", "m", "force beyond the spring of the case (N)",
+        None, False, "restoring.", "position", _everywhere, _known_force, ("position",),
     ),
     Member(
         "contact_curve", "penetration", ("force",), "penetration", "m", "contact force (N)",

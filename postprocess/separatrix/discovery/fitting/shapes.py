@@ -51,7 +51,7 @@ FORMS: dict[str, dict[str, Form]] = {
             lambda x: [[0.5, 0.2, share * x[-1]] for share in (0.1, 0.3, 0.6)],
         ),
     },
-    "friction_place_curve": {
+    "friction_position_curve": {
         "constant": _CONSTANT,
         "linear": _LINEAR,
         "quadratic": _SQUARE,

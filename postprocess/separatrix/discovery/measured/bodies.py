@@ -154,11 +154,11 @@ def pair_as_structure(model: Model) -> Model:
     case = tomllib.loads(model.to_text({}))
     body, drive, contact = case["body"], case["drive"], case["contact"]
     driving, driven = _PAIR
-    if drive["law"] not in ("none", "force", "sine") or body.get("blow"):
+    if drive["law"] not in ("none", "force", "sine") or body.get("impulse"):
         raise SeparatrixError(
-            f"drive.law: found {drive['law']}{' with a blow' if body.get('blow') else ''}, allowed "
+            f"drive.law: found {drive['law']}{' with an impulse' if body.get('impulse') else ''}, allowed "
             "for a pair as "
-            "base machine none, force, sine, without a blow"
+            "base machine none, force, sine, without an impulse"
         )
     made = {key: case[key] for key in ("title", "run", "integrator") if key in case}
     made["body"] = {

@@ -6,7 +6,7 @@
 !>   newton    0 <= gamma+ + e gamma- is complementary to P (Moreau; Glocker, Set-Valued Force Laws), all contacts together,
 !>             with the smallest restitution of those that touch each other: never a gain of energy;
 !>   sequence  one after the other, the fastest first, until none closes.
-module blow
+module simultaneous_impact
   use bounded_lcp, only: solve_bounded_lcp
   use contact_law, only: restitution_at
   use multibody, only: joint_contact, multibody_t, most_joints, together_sequence
@@ -166,4 +166,4 @@ contains
     end do
   end function shared
 
-end module blow
+end module simultaneous_impact
