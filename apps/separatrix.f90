@@ -28,7 +28,7 @@ program separatrix
   type(error_t), allocatable :: error
   logical :: first
 
-  ! What the processes of mpirun do not share is done and said by the first of them.
+  ! Work that is not shared among the processes of mpirun is done and reported by the first of them.
   first = launched_rank() == 0
   call read_command_line(command, error)
   if (.not. allocated(error)) then

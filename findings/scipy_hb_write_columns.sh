@@ -5,9 +5,9 @@
 # SciPy 1.17.1, scipy.io.hb_write. Harwell-Boeing is a format of fixed columns: the header states the format of the values, and a
 # reader in Fortran takes them by it.
 #
-# Guess before trying: the fields are as wide as the header says.
-# Seen: the header says (3E25.16), fields of 25 columns; the fields have 24. Taken by the header, the second value of a line is no
-# number and the third has lost its sign: -1 becomes 1. scipy.io.hb_read splits at blanks and reads its own files.
+# Guess before trying: the fields are as wide as the header states.
+# Seen: the header states (3E25.16), fields of 25 columns; the fields have 24. Read by the header, the second value of a line is
+# not a number and the third has lost its sign: -1 becomes 1. scipy.io.hb_read splits at blanks and reads its own files.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -44,7 +44,7 @@ class Shell:
     folder: Path
 
     def run(self, *words: object) -> tuple[str, float, float]:
-        """What a command says, and its processor and wall seconds."""
+        """Output, processor seconds and wall seconds of a command."""
         cpu, wall = children(), time.monotonic()
         ended = subprocess.run(
             [str(word) for word in (self.program, *words)],
@@ -66,8 +66,8 @@ def spectrum(shell: Shell) -> Figure:
     """Lyapunov exponents of a chaotic motion with impacts."""
     case = EXAMPLES / "validation" / "budd_dux.toml"
     words = ("stability", case, "--set", "contact.upper=0", "--periods", 950_000)
-    said, cpu, wall = shell.run(*words)
-    impacts = int(re.search(r"with (\d+) impacts", said)[1])
+    output, cpu, wall = shell.run(*words)
+    impacts = int(re.search(r"with (\d+) impacts", output)[1])
     share = IMPACTS / impacts
     return Figure(
         "Lyapunov spectrum of 1e6 impacts, with its transient and the 0-1 test",
@@ -101,8 +101,8 @@ def boundary(shell: Shell) -> Figure:
     text = (EXAMPLES / "basin_coulomb.toml").read_text().replace("count = 400", "count = 1000")
     (shell.folder / "map.toml").write_text(text + "\n[refine]\n")
     shell.run("basin", "map.toml", "-q", "--force", "-o", "map.h5")
-    said, cpu, wall = shell.run("boundary", "map.h5", "--force", "-o", "boundary.h5")
-    points = int(re.search(r"(\d+) boundary points", said)[1])
+    output, cpu, wall = shell.run("boundary", "map.h5", "--force", "-o", "boundary.h5")
+    points = int(re.search(r"(\d+) boundary points", output)[1])
     return Figure(
         "boundary of a map of 1000 x 1000 starts, named, with the sets of its saddle",
         "`basin_coulomb`",

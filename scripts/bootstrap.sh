@@ -3,19 +3,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
 # Installs what Separatrix needs on Debian or Ubuntu and makes .venv with the Python packages.
-# Running it again is quick: it does only what is missing. With --browser also what the browser tests of the viewer need:
-# Chromium, and Playwright to drive it. With --docs also what scripts/docs builds the site with.
+# Running it again is quick: it does only what is missing. With --develop also what the Python tests and scripts/format.sh
+# need; with --browser what the browser tests of the viewer need, Chromium and Playwright; with --docs what scripts/docs needs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+develop=false
 browser=false
 docs=false
 for option in "$@"; do
   case "$option" in
+    --develop) develop=true ;;
     --browser) browser=true ;;
     --docs) docs=true ;;
     *)
-      echo "usage: bootstrap.sh [--browser] [--docs]" >&2
+      echo "usage: bootstrap.sh [--develop] [--browser] [--docs]" >&2
       exit 64
       ;;
   esac
@@ -80,7 +82,7 @@ find_python() {
 # What .venv depends on; it is made again if the interpreter is gone or broken.
 wanted() {
   .venv/bin/python --version
-  cat requirements.txt requirements-dev.txt pyproject.toml
+  cat requirements.txt pyproject.toml
 }
 
 make_venv() {
@@ -95,11 +97,21 @@ make_venv() {
     "$python" -m venv --clear .venv
   fi
   echo "bootstrap: installing the Python packages into .venv"
-  local install=(.venv/bin/python -m pip install --quiet --disable-pip-version-check)
-  "${install[@]}" -r requirements.txt -r requirements-dev.txt
+  # Modules are compiled when they are first imported, most of them never.
+  local install=(.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile)
+  "${install[@]}" -r requirements.txt
   # The Python package alone: the program is that of build/.
   "${install[@]}" -e . --config-settings=wheel.cmake=false
   wanted > "$stamp"
+}
+
+add_development() {
+  local stamp=.venv/development.txt
+  if ! cmp -s requirements-dev.txt "$stamp"; then
+    echo "bootstrap: installing requirements-dev.txt into .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
+    cp requirements-dev.txt "$stamp"
+  fi
 }
 
 # Kept out of .venv's stamp: who does not test the browser or build the site has neither.
@@ -113,6 +125,9 @@ add_packages() {
 
 install_packages
 make_venv
+if $develop; then
+  add_development
+fi
 if $browser; then
   add_packages playwright requirements-browser.txt
 fi

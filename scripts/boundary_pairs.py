@@ -6,7 +6,7 @@
     scripts/boundary_pairs.py [CASE ...] [--points 4096] [--step 16] [--distance 1e-8] [--referee 50]
 
 Computes the map of each case (default examples/basin_coulomb.toml) with POINTS points along each axis, from a
-lattice of STEP, and its boundary into a temporary folder. So many of the pairs are also judged by the
+lattice of STEP, and its boundary into a temporary folder. REFEREE of the pairs are also checked by the
 integrator of tests/referee/, which shares no code with the program: do its two motions end on two
 attractors?
 """
@@ -49,7 +49,7 @@ def main() -> int:
         "--step", type=int, default=16, help="lattice of the refined map; 0: every point is computed"
     )
     parser.add_argument("--distance", type=float, default=1e-8)
-    parser.add_argument("--referee", type=int, default=0, help="pairs that the referee judges")
+    parser.add_argument("--referee", type=int, default=0, help="pairs that the referee checks")
     options = parser.parse_args()
     lines, wrong = [], 0
     for path in options.cases:
@@ -80,15 +80,15 @@ def row(path: Path, options: argparse.Namespace) -> tuple[list[str], int]:
             labels = [catalogue.labels(start)["attractor"] for start in starts]
             right = (np.stack(labels) == sides).all(axis=0)
             names = decode_flags(result["name"]).values[result["across"].values >= 0]
-    judged = "not asked"
+    refereed = "not asked"
     if options.referee:
         chosen = np.random.default_rng(1).permutation(right.size)[: options.referee]
-        judged = f"{parted(case, starts[:, chosen])} of {chosen.size}"
+        refereed = f"{parted(case, starts[:, chosen])} of {chosen.size}"
     kinds = ", ".join(
         f"{name} {count}" for name, count in zip(*np.unique(names, return_counts=True), strict=True)
     )
     size = f"{options.points}^2" + (f", refined from {options.step}" if options.step else "")
-    line = [f"`{path.stem}`", size, str(right.size), str(int(right.sum())), judged, kinds, f"{seconds:.1f}"]
+    line = [f"`{path.stem}`", size, str(right.size), str(int(right.sum())), refereed, kinds, f"{seconds:.1f}"]
     return line, int((~right).sum())
 
 

@@ -4,7 +4,7 @@
 """Follows the orbits of every example over a parameter, checks what must hold, writes docs/branch_checks.md.
 
 On every branch: a fold has the multiplier +1 and a doubling -1; the multipliers have the product
-that damping and impacts allow; a second run from other orbits finds the labels at the same places;
+that damping and impacts allow; a second run from other orbits finds the labels at the same values;
 no branch is listed twice. Of the examples with a sweep: where its motion jumps there is a fold or a
 graze. What cannot be followed is refused in words.
 """
@@ -65,7 +65,7 @@ class Branches:
     branch: np.ndarray
     word: np.ndarray
     seconds: float = 0
-    places: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
+    labelled: dict[tuple[str, int], np.ndarray] = field(default_factory=dict)
 
 
 def turn(ratio: float) -> float:
@@ -147,12 +147,12 @@ def follow(program: Path, folder: Path, case: Case, searches: int) -> Branches:
     found = Branches(labels, values, period, impacts, multipliers, branch, word, seconds)
     for name in LABELS:
         for n in np.unique(period):
-            found.places[name, int(n)] = np.unique(values[(labels == name) & (period == n)])
+            found.labelled[name, int(n)] = np.unique(values[(labels == name) & (period == n)])
     return found
 
 
 def multiplier_misses(found: Branches) -> dict[str, float]:
-    """How far a multiplier is from where the label says, at most; a branch may end in a doubling, with +1."""
+    """Largest distance of a multiplier from that of its label; a branch may end in a doubling, with +1."""
     ends = np.flatnonzero(np.diff(found.branch, append=0, prepend=0))
     last = set(ends) | set(ends - 1)
     worst = {}
@@ -189,15 +189,15 @@ def apart(case: Case, one: Branches, other: Branches) -> tuple[list[float], int,
     """How far labels of two runs are apart, those of a release last; how many both and how many one found."""
     worst, both, alone = [0.0, 0.0], 0, 0
     near = SAME * (case.ends[1] - case.ends[0])
-    for key in one.places.keys() | other.places.keys():
-        first, second = one.places.get(key, np.empty(0)), other.places.get(key, np.empty(0))
+    for key in one.labelled.keys() | other.labelled.keys():
+        first, second = one.labelled.get(key, np.empty(0)), other.labelled.get(key, np.empty(0))
         gaps = np.abs(first[:, None] - second[None, :])
         matched = gaps.min(axis=1, initial=np.inf) < near
         if matched.any():
             release = key[0] == "release"
             worst[release] = max(worst[release], float(gaps.min(axis=1)[matched].max()))
         both += int(matched.sum())
-        # mirror images have labels at one place to rounding: two of one run may be one of the other
+        # mirror images have labels at one value to rounding: two of one run may be one of the other
         alone += int((~matched).sum() + (gaps.min(axis=0, initial=np.inf) >= near).sum())
     return worst, both, alone
 
@@ -229,11 +229,11 @@ def row(case: Case, one: Branches, other: Branches) -> tuple[list[str], list[str
     if twice(one) or twice(other):
         wrong.append("a branch twice")
     counts = {name: int((one.labels == name).sum()) for name in LABELS}
-    said = ", ".join(f"{count} {NAMES.get(name, name)}" for name, count in counts.items() if count)
+    listed = ", ".join(f"{count} {NAMES.get(name, name)}" for name, count in counts.items() if count)
     numbers = [
         f"{np.unique(one.branch).size}",
         f"{one.values.size}",
-        said or "none",
+        listed or "none",
         f"{max(misses.values()):.0e}" if misses else "",
         "" if products is None else "; ".join(f"{miss:.0e}" for miss in products),
         f"{max(worst):.0e} ({both}; {alone})",
@@ -259,7 +259,7 @@ def jumps(program: Path, folder: Path, name: str, found: Branches) -> tuple[list
             continue
         inside = [
             f"{label} {value:.12g}"
-            for (label, _), values in found.places.items()
+            for (label, _), values in found.labelled.items()
             if label in ("SN", "GR", "GR-fold", "PD")
             for value in values
             if low <= value <= high
@@ -271,16 +271,16 @@ def jumps(program: Path, folder: Path, name: str, found: Branches) -> tuple[list
 
 
 def refusals(program: Path) -> tuple[list[list[str]], list[str]]:
-    """What the program says of examples whose orbits it does not follow."""
+    """Messages of the program for examples whose orbits it does not follow."""
     lines, wrong = [], []
     for name, parameter in REFUSED.items():
         words = [program.resolve(), "branches", f"examples/{name}.toml", "--dry-run"]
         words += ["--parameter", parameter, "--from", "1", "--to", "2"]
         # from there, so that the page names no folder of the machine
         ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=SOURCE)
-        said = ended.stderr.strip().removeprefix("separatrix: ")
-        lines.append([f"`{name}`", f"`{said}`"])
-        if ended.returncode != 65 or "\n" in said:
+        message = ended.stderr.strip().removeprefix("separatrix: ")
+        lines.append([f"`{name}`", f"`{message}`"])
+        if ended.returncode != 65 or "\n" in message:
             wrong.append(f"{name}: code {ended.returncode}")
     return lines, wrong
 

@@ -48,7 +48,7 @@ TARGETS = (10.0, 30.0)
 FAMILY = "restitution over impact speed"
 FORMS = ("restitution_slope", "restitution_curve")
 POINTS = 101
-"""Speeds at which the function is held against its band."""
+"""Speeds at which the function is compared with its band."""
 BAR_FAMILY, BAR_BAND = 0.95, 0.90
 
 PAGE = """# Restitutions of several shapes: the function that is found
@@ -70,7 +70,7 @@ instrument imperfections. {unreachable} cases were left out: their effect reache
 | figure | bar | found | met |
 | --- | --- | --- | --- |
 | family right, of all | >= 95 % | {family_all} | {family_all_met} |
-| family right, if there is a name or a set | >= 95 % | {family_said} | {family_said_met} |
+| family right, if there is a name or a set | >= 95 % | {family_named} | {family_named_met} |
 | law within the band, share of the support, mean | >= 90 % | {band:.1f} % of {shown} functions | {band_met} |
 | functions with the law within the band on 90 % of the support | - | {inside} | |
 
@@ -82,11 +82,11 @@ Where the family is not right:
 
 @dataclass(frozen=True)
 class Found:
-    """One case: its shape, what was said, and how much of the support has the law within the band."""
+    """One case: its shape, the answer, and the share of the support with the law within the band."""
 
     shape: str
     target: float
-    said: str
+    answer: str
     named: bool
     """Whether there is a name or a set."""
     right: bool
@@ -143,10 +143,10 @@ def examine(seed: int, number: int) -> Found | None:
         except Exception as reason:
             # one broken case must not end the measurement, and counts as a failure
             return Found(name, target, f"failed: {reason}", False, False, math.nan, math.nan)
-    said = ["+".join(verdict["effects"]), *verdict["alternatives"]]
+    answers = ["+".join(verdict["effects"]), *verdict["alternatives"]]
     named = verdict["outcome"] in ("named", "ambiguous")
-    right = named and all(one in FORMS for one in said)
-    text = f"{verdict['outcome']} {' or '.join(one for one in said if one)}".strip()
+    right = named and all(one in FORMS for one in answers)
+    text = f"{verdict['outcome']} {' or '.join(one for one in answers if one)}".strip()
     return Found(name, target, text, named, right, *within(verdict, case.machine))
 
 
@@ -179,7 +179,7 @@ def main() -> None:
     scored = [one for one in found if one is not None]
     shown = [one.within for one in scored if not math.isnan(one.within)]
     whole = rate([one.right for one in scored])
-    said = rate([one.right for one in scored if one.named])
+    of_named = rate([one.right for one in scored if one.named])
     head = ["restitution loss", "d'", "cases", "family right", "functions", "law in the band", "half width"]
     page = PAGE.format(
         asked=options.cases,
@@ -192,15 +192,15 @@ def main() -> None:
         "over its support.",
         family_all=whole,
         family_all_met=met(whole, BAR_FAMILY, 1),
-        family_said=said,
-        family_said_met=met(said, BAR_FAMILY, 1),
+        family_named=of_named,
+        family_named_met=met(of_named, BAR_FAMILY, 1),
         band=100 * float(np.mean(shown)) if shown else math.nan,
         band_met="yes" if shown and np.mean(shown) >= BAR_BAND else "**no**",
         shown=len(shown),
         inside=rate([one >= BAR_BAND for one in shown]),
         others=table(
             ["shape", "d'", "verdict"],
-            [[one.shape, f"{one.target:g}", one.said] for one in scored if not one.right],
+            [[one.shape, f"{one.target:g}", one.answer] for one in scored if not one.right],
         ),
     )
     if options.print:

@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Times the discovery workflow on records as long as a rig's, writes docs/performance_discovery.md.
 
-Records come from the independent simulator (tests/generator); each verdict is a process of its own, whose
-processor time and largest memory the system tells.
+Records come from the independent simulator (tests/generator). Each verdict is a process of its own, whose
+processor time and largest memory the system reports.
 """
 
 import argparse
@@ -95,8 +95,8 @@ def run(folder: Path, out: Path, *words: str) -> Run:
     if not (out / "verdict.json").is_file():
         sys.exit(f"discovery_speed: no verdict, exit code {started.returncode}: see {folder / 'log'}")
     verdict = json.loads((out / "verdict.json").read_text())
-    said = f"{verdict['outcome']} {', '.join(verdict['effects'] or verdict['added'])}".strip()
-    return Run(said, wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6)
+    outcome = f"{verdict['outcome']} {', '.join(verdict['effects'] or verdict['added'])}".strip()
+    return Run(outcome, wall, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6)
 
 
 def main() -> None:

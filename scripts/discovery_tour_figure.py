@@ -21,7 +21,7 @@ _WRONG = "#000000"
 
 
 def regimes(path: Path) -> tuple[np.ndarray, dict[int, str], list[float], tuple[str, str]]:
-    """Names of the regimes by place (v0, x0), the extent of the axes and their labels."""
+    """Names of the regimes over (v0, x0), the extent of the axes and their labels."""
     with open_result(path) as result:
         table = result["regime"].transpose("v0", "x0")
         x, v = result["x0"].values, result["v0"].values

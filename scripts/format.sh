@@ -17,7 +17,7 @@ case "${1:-}" in
     ;;
 esac
 
-scripts/bootstrap.sh
+scripts/bootstrap.sh --develop
 tools=.venv/bin
 failed=0
 present=()

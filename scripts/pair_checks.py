@@ -119,8 +119,8 @@ def free_pair(program: Program) -> list[Check]:
         )
         for i, expected in enumerate(FREE_PAIR)
     ]
-    places = np.concatenate([[1.0], columns[1] - columns[3]])
-    slid = np.abs(np.diff(places)).sum()
+    positions = np.concatenate([[1.0], columns[1] - columns[3]])
+    slid = np.abs(np.diff(positions)).sum()
     lost = run.number("energy_start") - float(energies[-1])
     return [
         *checks,
@@ -240,7 +240,7 @@ def hammer(program: Program) -> list[Check]:
 def recovered(record: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return durations (s) and heights (m) of the first five flights between impacts in a record with noise.
 
-    A parabola is fitted to each flight, for single samples say little about the instant of an impact.
+    A parabola is fitted to each flight, for single samples determine the instant of an impact poorly.
     """
     t, x = record["t"], record["x"]
     stop = x[t > 7].mean()

@@ -85,7 +85,7 @@ class Program:
         path = self.folder / f"{case}.h5"
         words = [word for text in settings for word in ("--set", text)]
         case_file = f"examples/{case}.toml"
-        # any other folder would do: the case is named by its place in the repository
+        # any other folder would do: the case is named by its path in the repository
         subprocess.run(
             [self.program, command, SOURCE / case_file, "-q", "--force", "-o", path, *words, *extra],
             check=True,
@@ -96,7 +96,7 @@ class Program:
         return path
 
     def refused(self, command: str, case: str, *settings: str) -> int:
-        """Return the exit code of a case that must be refused, 0 if its message does not say why."""
+        """Return the exit code of a case that must be refused, 0 if its message does not give the reason."""
         words = [word for text in settings for word in ("--set", text)]
         path = SOURCE / "examples" / f"{case}.toml"
         outcome = subprocess.run(

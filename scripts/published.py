@@ -89,7 +89,7 @@ def toml(value: object) -> str:
 
 
 def starts() -> str:
-    """Return the start of each motion as its cases say."""
+    """Return the start of each motion as given in its cases."""
     texts = []
     for motion, text in MOTIONS.items():
         found = {str(case_of(f"trajectory_{law}_{motion}")["start"]) for law in LAWS}

@@ -77,8 +77,8 @@ def run_tests(build: Path) -> list[list[str]]:
         path = build / "bin" / "tests" / suite
         if not path.is_file():
             sys.exit(f"published: {path} has not been built")
-        told = subprocess.run([path], capture_output=True, text=True, cwd=build).stdout
-        for line in told.splitlines():
+        output = subprocess.run([path], capture_output=True, text=True, cwd=build).stdout
+        for line in output.splitlines():
             word, _, name = line.partition(" ")
             outcomes[suite, name.strip()] = word
     return [

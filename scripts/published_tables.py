@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tables of docs/published.md: what the paper prints beside what the result files hold.
 
-PAPER is the only place where a number of the paper stands. `files` are the result files by name.
+Only PAPER holds numbers of the paper. `files` are the result files by name.
 """
 
 import math
@@ -119,9 +119,9 @@ def settled_motion(path: Path, motion: str) -> dict[str, float]:
         here = result.sel(drive_ratio=float(motion.split("_")[0]), method="nearest")
         impacting = here["branch_impacts_per_period"].values > 0
         settled = decode_flags(here["branch_reason"]).values == "settled"
-        place = np.flatnonzero(settled & (impacting == (motion in PAPER["impacts_per_period"])))[0]
+        index = np.flatnonzero(settled & (impacting == (motion in PAPER["impacts_per_period"])))[0]
         names = [*QUANTITIES, "impacts_per_period"]
-        return {key: float(here[f"branch_{key}"].values[place]) for key in names}
+        return {key: float(here[f"branch_{key}"].values[index]) for key in names}
 
 
 def per_cent(ours: float, paper: float) -> float:
@@ -136,7 +136,7 @@ def steady_rows(files: dict[str, Path]) -> list[list[str]]:
         for law, paper in zip(LAWS, numbers, strict=True):
             ours = steady_values(files[f"trajectory_{law}_{motion}"])[quantity]
             cells = [MOTIONS[motion], QUANTITIES[quantity], LAWS[law], f"{paper:g}", f"{ours:.5g}"]
-            rows.append([*cells, *judged(per_cent(ours, paper), STEADY_BAR)])
+            rows.append([*cells, *assessed(per_cent(ours, paper), STEADY_BAR)])
     return rows
 
 
@@ -150,7 +150,7 @@ def limit_rows(files: dict[str, Path]) -> list[list[str]]:
             if name in PAPER["limits"]:
                 paper = PAPER["limits"][name][k]
                 cells += [f"{paper:g}", bracket, f"{per_cent(middle, paper):+.2f} %"]
-                rows.append([*cells, *judged(middle - paper, LIMIT_BAR, "+.4f", "")])
+                rows.append([*cells, *assessed(middle - paper, LIMIT_BAR, "+.4f", "")])
             else:
                 rows.append([*cells, "not printed", bracket, "", "", ""])
     return rows
@@ -163,7 +163,7 @@ def stribeck_rows(files: dict[str, Path]) -> list[list[str]]:
         plain = steady_values(files[f"trajectory_coulomb_{motion}"])[quantity]
         layer = steady_values(files[f"trajectory_stribeck_{motion}"])[quantity]
         cells = [MOTIONS[motion], QUANTITIES[quantity], f"{plain:.6g}", f"{layer:.6g}"]
-        rows.append([*cells, *judged(per_cent(layer, plain), STRIBECK_BAR, "+.4f")])
+        rows.append([*cells, *assessed(per_cent(layer, plain), STRIBECK_BAR, "+.4f")])
     return rows
 
 
@@ -243,7 +243,7 @@ def lever_values(files: dict[str, Path], motion: str) -> dict[str, float]:
     sys.exit(f"published: no start leads to {MOTIONS[motion]} with the lever geometry")
 
 
-def judged(difference: float, bar: float, digits: str = "+.2f", unit: str = " %") -> list[str]:
+def assessed(difference: float, bar: float, digits: str = "+.2f", unit: str = " %") -> list[str]:
     """Return a difference and whether it is within its bar."""
     return [f"{difference:{digits}}{unit}", "within" if abs(difference) <= bar else "NOT within"]
 

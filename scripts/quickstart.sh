@@ -26,7 +26,7 @@ scripts/bootstrap.sh
 source scripts/environment.sh
 
 echo "quickstart: 2/5 building the program and its library in build/"
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_LANES=native
 cmake --build build -j "$(env -u OMP_NUM_THREADS nproc)" --target separatrix separatrix_library
 
 mkdir -p out

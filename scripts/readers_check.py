@@ -38,7 +38,7 @@ class Reader:
     #: Whether it knows groups, and whether it lists the coordinate variables.
     groups: bool = True
     coordinates: bool = True
-    #: How a program says its version.
+    #: Option that prints the version of a program.
     version: str = "--version"
 
     @property
@@ -310,8 +310,8 @@ def version(reader: Reader, pythons: tuple[str, ...] = PYTHONS) -> tuple[str, st
     """What runs the reader and its version; None where it is not installed."""
     if reader.in_python:
         for python in pythons:
-            said = "getattr(m, '__version__', None) or m.vtkVersion().GetVTKVersion()"
-            code = f"import {reader.needs} as m; print({said})"
+            expression = "getattr(m, '__version__', None) or m.vtkVersion().GetVTKVersion()"
+            code = f"import {reader.needs} as m; print({expression})"
             ended = subprocess.run([python, "-c", code], capture_output=True, text=True)
             if ended.returncode == 0:
                 return python, ended.stdout.split()[-1]
@@ -323,10 +323,10 @@ def version(reader: Reader, pythons: tuple[str, ...] = PYTHONS) -> tuple[str, st
         and subprocess.run(["Rscript", "-e", "library(ncdf4)"], capture_output=True).returncode
     ):
         return None
-    said = subprocess.run(
+    ended = subprocess.run(
         [reader.needs, *([reader.version] if reader.version else [])], capture_output=True, text=True
     )
-    number = re.search(r"\d+\.\d+(\.\d+)?", said.stdout + said.stderr)
+    number = re.search(r"\d+\.\d+(\.\d+)?", ended.stdout + ended.stderr)
     return reader.needs, number[0] if number else "?"
 
 

@@ -83,7 +83,7 @@ def report(whole: Path, refined: Path, whole_seconds: float, refined_seconds: fl
     print(f"computed: {computed} points, {100 * computed / points:.3f} %")
     print(f"probes: {facts['probes_drawn']} drawn, {facts['probes_contradicted']} contradicted")
     limit, confidence = 100 * facts["wrong_share_upper_limit"], 100 * facts["confidence"]
-    print(f"wrong, as the file says with {confidence:.0f} % confidence: at most {limit:.3g} %")
+    print(f"wrong, as the file states with {confidence:.0f} % confidence: at most {limit:.3g} %")
     print(f"wrong, as found: {anywhere} points, {100 * anywhere / points:.3g} %")
     print("differing: " + ", ".join(f"{name} {count}" for name, count in differing.items()))
     print(f"seconds: {refined_seconds:.1f} refined, {whole_seconds:.1f} with every point computed")

@@ -53,7 +53,11 @@ run_suites() {
       exit 64
     fi
   done
-  scripts/bootstrap.sh
+  if ((${#files[@]} > 0)); then
+    scripts/bootstrap.sh --develop
+  else
+    scripts/bootstrap.sh
+  fi
   # shellcheck source=scripts/environment.sh
   source scripts/environment.sh
   cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release
@@ -74,7 +78,7 @@ if ((${#names[@]} > 0)); then
   run_suites "${names[@]}"
 fi
 
-scripts/bootstrap.sh --browser --docs
+scripts/bootstrap.sh --develop --browser --docs
 # shellcheck source=scripts/environment.sh
 source scripts/environment.sh
 # environment.sh asks for one thread a process, which nproc would count as the cores.
@@ -85,7 +89,8 @@ status=0
 serial_layers=(core csupport parallel io)
 
 echo "test: building with MPI in build/"
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=ON
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=ON -DSEPARATRIX_LANES=all \
+  -DSEPARATRIX_WERROR=ON
 cmake --build build -j "$jobs"
 
 echo "test: running the tests of the MPI build"

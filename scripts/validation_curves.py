@@ -31,9 +31,9 @@ def _fold_on_graze(
     with open_result(output) as result:
         fold = decode_flags(result["curve_label"]).values == "SN"
         graze = decode_flags(result["curve_second"]).values == "GR"
-        (place,) = result["curve_free"].values[fold & graze]
+        (crossing,) = result["curve_free"].values[fold & graze]
     how = f"`separatrix branches examples/validation/impact_coco.toml {' '.join(asked)}`"
-    return Row(f"{key}.branches", float(place), how)
+    return Row(f"{key}.branches", float(crossing), how)
 
 
 COMPUTED = (resonant_grazes,)

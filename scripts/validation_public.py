@@ -4,7 +4,7 @@
 """Public problems with their sources: theirs, ours, difference.
 
 The cases are in examples/validation/public/. Run by itself it prints the table or, with --write, puts it into
-docs/validation.md in the place of the one there; the exit code is 1 where a number differs.
+docs/validation.md in place of the one there; the exit code is 1 where a number differs.
 """
 
 import argparse

@@ -45,11 +45,11 @@ def ball_drag(program: Program) -> list[Number]:
     source = "PathSim, bouncing ball with friction, closed form"
     found = events(program, "ball_drag", "impact_lower", "contact.ground")
     terminal, rate = sqrt(9.81 / 0.2), sqrt(9.81 * 0.2)
-    place, speed, at, theirs = 1.0, 5.0, 0.0, []
+    position, speed, at, theirs = 1.0, 5.0, 0.0, []
     for _ in found:
-        height = place + log(1 + (speed / terminal) ** 2) / 0.4
+        height = position + log(1 + (speed / terminal) ** 2) / 0.4
         at += atan(speed / terminal) / rate + acosh(np.exp(0.2 * height)) / rate
-        place, speed = 0.0, 0.95 * terminal * sqrt(1 - np.exp(-0.4 * height))
+        position, speed = 0.0, 0.95 * terminal * sqrt(1 - np.exp(-0.4 * height))
         theirs.append(at)
     return [largest(source, "ball with the drag of air: times of impacts (s)", theirs, found[:, 0], 1e-9)]
 
@@ -186,10 +186,10 @@ def drill(program: Program) -> list[Number]:
 
 def mathieu(program: Program) -> list[Number]:
     """The first cosine of Mathieu, which is periodic."""
-    place, rate = ends(program, "mathieu", "x", "v")
+    position, rate = ends(program, "mathieu", "x", "v")
     source = "M. Abramowitz, I. A. Stegun, table 20.1, a_1(1) = 1.85910 807"
     return [
-        Number(source, "Mathieu's equation: position after one period, initially 1", 1.0, place, 1e-9),
+        Number(source, "Mathieu's equation: position after one period, initially 1", 1.0, position, 1e-9),
         Number(source, "the same: velocity", 0.0, rate, 1e-9),
     ]
 
@@ -217,7 +217,7 @@ def stacked(program: Program) -> list[Number]:
 
 
 def cradle(program: Program) -> list[Number]:
-    """Three pendulums that touch: the outer ones swing in turn."""
+    """Three pendulums that touch: the outer ones move in turn."""
     quarter = ellipk(sin(0.25) ** 2) / sqrt(9.81)
     kinds = {
         side: np.unique(events(program, "three_pendulums", "impact_lower", f"contact.{side}")[:, 0])

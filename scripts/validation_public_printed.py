@@ -99,7 +99,7 @@ def modelica_force(program: Program) -> list[Number]:
     """The driven mass with Stribeck friction."""
     source = "Modelica Standard Library 4.0, Translational.Examples.Friction, stop1"
     happened = [at for _, at in times(program, "stribeck_force")]
-    place, rate = ends(program, "stribeck_force", "x", "v")
+    position, rate = ends(program, "stribeck_force", "x", "v")
     return [
         *(
             modelica(source, f"driven mass with Stribeck friction: {what} (s)", theirs, ours)
@@ -110,7 +110,7 @@ def modelica_force(program: Program) -> list[Number]:
                 strict=True,
             )
         ),
-        modelica(source, "the same: position after 5 s (m)", 1.768462821, place),
+        modelica(source, "the same: position after 5 s (m)", 1.768462821, position),
         modelica(source, "the same: velocity after 5 s (m/s)", 6.864858590, rate),
     ]
 

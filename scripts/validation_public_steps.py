@@ -45,8 +45,8 @@ def moving_belt(program: Program) -> list[Number]:
     """A box on a belt that goes to and fro, in the frame of the belt."""
 
     def force(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        place, rate = -2 / TURN * cos(TURN * t), 2 * sin(TURN * t)
-        return -70 * (q + place) - 10 * (v + rate) - 20 * 2 * TURN * cos(TURN * t)
+        position, rate = -2 / TURN * cos(TURN * t), 2 * sin(TURN * t)
+        return -70 * (q + position) - 10 * (v + rate) - 20 * 2 * TURN * cos(TURN * t)
 
     machine = Structure([20], force, [Friction([1], lambda u: 294.3, 294.3)])
     machine.run([2 / TURN], [0], 100)
@@ -73,13 +73,13 @@ def modelica(program: Program) -> list[Number]:
 
     clutch = Structure([1, 0.05, 1], torque, [Friction([-1, 1, 0], lambda u: 80.0, 80.0)], longest_step=1e-3)
     last = clutch.run([0, 0, 0], [100, 90, 90], 0.5)
-    place, rate = ends(program, "stribeck_force", "x", "v")
+    position, rate = ends(program, "stribeck_force", "x", "v")
     angle, speed = ends(program, "clutch", "motor_x", "motor_v")
     own = f"{source}, by `tests/referee/structures.py`"
     rotational = "Modelica Standard Library, Rotational.Examples.Friction"
     return [
         by_steps(source, "driven mass", driven, program, "stribeck_force", 5),
-        Number(own, "the same: position after 5 s (m)", end[0], place, 1e-8),
+        Number(own, "the same: position after 5 s (m)", end[0], position, 1e-8),
         Number(own, "the same: velocity after 5 s (m/s)", end[1], rate, 1e-8),
         by_steps(rotational, "clutch", clutch, program, "clutch", 0.5),
         Number(

@@ -31,11 +31,11 @@ from structures import Friction, Structure  # noqa: E402
 CLOSED = "closed form"
 
 
-def crossing(function, places: list[float], level: float) -> float:
-    """Where a smooth function reaches a level, extrapolated from a few places by a polynomial."""
-    middle = float(np.mean(places))
-    values = [function(p) for p in places]
-    fit = np.polynomial.Polynomial.fit([p - middle for p in places], values, len(places) - 1)
+def crossing(function, points: list[float], level: float) -> float:
+    """Where a smooth function reaches a level, extrapolated from a few points by a polynomial."""
+    middle = float(np.mean(points))
+    values = [function(p) for p in points]
+    fit = np.polynomial.Polynomial.fit([p - middle for p in points], values, len(points) - 1)
     roots = (fit - level).convert().roots()
     return middle + float(min(roots[abs(roots.imag) < 1e-9].real, key=abs))
 
@@ -71,11 +71,13 @@ def two_masses(program: Program) -> list[Number]:
     edge = crossing(modulus, [0.911, 0.912, 0.913, 0.914, 0.915], 1.0)
     found.append(Number(CLOSED, "the same: Neimark-Sacker point (rad/s)", 0.909658534285, edge, 1e-6))
     coupled, ground = np.array([[2, -1], [-1, 1]]), np.array([1, 0])
-    _, phase, place, velocity = min(orbits(1.1, np.eye(2), 0.04 * coupled, coupled, ground, [0, 1], 1, 0.8))
+    _, phase, position, velocity = min(
+        orbits(1.1, np.eye(2), 0.04 * coupled, coupled, ground, [0, 1], 1, 0.8)
+    )
     settings = {
-        "start__x0": place[1],
+        "start__x0": position[1],
         "start__v0": velocity[1],
-        "body__first__x0": place[0],
+        "body__first__x0": position[0],
         "body__first__v0": velocity[0],
         "start__crank_angle": phase,
         "drive__force__frequency": 1.1,
@@ -103,21 +105,21 @@ def two_masses(program: Program) -> list[Number]:
 
 def fold(program: Program) -> list[Number]:
     """Where the impacting motion of two masses with a stop ends: 1 - multiplier is a root of the distance."""
-    places = np.array([1.143, 1.1434, 1.1438, 1.144])
+    frequencies = np.array([1.143, 1.1434, 1.1438, 1.144])
     left = [
-        1 - max(program.multipliers("two_masses", drive__force__frequency=place).real) for place in places
+        1 - max(program.multipliers("two_masses", drive__force__frequency=one).real) for one in frequencies
     ]
     powers = np.column_stack([np.power(left, k) for k in (0, 2, 3, 4)])
-    edge = np.linalg.solve(powers, places)[0]
+    edge = np.linalg.solve(powers, frequencies)[0]
     found = [Number(CLOSED, "two masses with a stop: saddle-node (rad/s)", 1.144117503720, edge, 2e-6)]
     labels = program.labels("two_masses", "drive.force.frequency", 0.9, 1.2)
-    for label, what, place in (
+    for label, what, frequency in (
         ("SN", "saddle-node", 1.144117503720),
         ("NS", "Neimark-Sacker point", 0.909658534285),
         ("GR-fold", "graze of the motion without impacts", 0.999206009038),
     ):
         name = f"two masses with a stop, `branches`: {what} (rad/s)"
-        found.append(Number(CLOSED, name, place, labels[label], 1e-9))
+        found.append(Number(CLOSED, name, frequency, labels[label], 1e-9))
     return found
 
 
@@ -153,7 +155,7 @@ def hitting(file: h5py.File) -> np.ndarray:
 def nonsmooth_modes(program: Program) -> list[Number]:
     """Motions of the undamped machine with one impact per period: a family."""
     found = []
-    for period, speed, place in (
+    for period, speed, position in (
         (6, 2.737928468197, 0.468831036677),
         (8, 1.705838730562, 4.025271182025),
         (9, 0.333752276861, 0.700255641992),
@@ -163,7 +165,7 @@ def nonsmooth_modes(program: Program) -> list[Number]:
             "impact_upper",
             "contact.stop",
             start__v0=-speed,
-            body__first__x0=place,
+            body__first__x0=position,
             run__duration=12,
             run__window=11,
         )[0]
@@ -210,8 +212,8 @@ def others(program: Program) -> list[Number]:
     hit = program.events("pounding", "impact_upper", "contact.gap")[-1]
     found.append(Number(CLOSED, "pounding of two buildings: impact speed", 3.744189605107, hit[2], 1e-9))
     # tip: 2 per unit of the mode, that is a mass of 1/4 on a spring of 1/4; this motion is not stable
-    _, phase, place, velocity = max(orbits(0.9, 1, 0.04, 1, [0.1], [2], 0.5, 0.8))
-    settings = {"start__x0": 2 * place[0], "start__v0": 2 * velocity[0], "start__crank_angle": phase}
+    _, phase, position, velocity = max(orbits(0.9, 1, 0.04, 1, [0.1], [2], 0.5, 0.8))
+    settings = {"start__x0": 2 * position[0], "start__v0": 2 * velocity[0], "start__crank_angle": phase}
     hit = program.events(
         "cantilever", "impact_upper", "contact.stop", run__duration=14, run__window=7, **settings
     )[0]

@@ -16,12 +16,12 @@ def bouncing(program: Program) -> list[Number]:
         points = program.branch_points(
             "table", "drive.force.amplitude", 0.97 * least, 1.02 * double, contact__table__restitution=loss
         )
-        for label, what, place in (("SN", "saddle-node", least), ("PD", "period doubling", double)):
+        for label, what, expected in (("SN", "saddle-node", least), ("PD", "period doubling", double)):
             near = [at for name, at, period, impacts in points if (name, period, impacts) == (label, k, 1)]
-            ours = min(near, key=lambda at, place=place: abs(at - place), default=np.nan)
+            ours = min(near, key=lambda at, expected=expected: abs(at - expected), default=np.nan)
             bounces = "one bounce per period" if k == 1 else f"one bounce in {k} periods"
             text = f"ball on a table, e = {loss}, {bounces}: {what} at Gamma"
-            found.append(Number(source, text, place, ours, 1e-9))
+            found.append(Number(source, text, expected, ours, 1e-9))
     return found
 
 

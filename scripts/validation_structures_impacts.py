@@ -29,7 +29,7 @@ def clamped_free(count: int) -> np.ndarray:
 
 
 def first_order(mass, damping, stiffness, load) -> np.ndarray:
-    """z' = A z of M q'' + C q' + K q = load, z being places, velocities and 1."""
+    """z' = A z of M q'' + C q' + K q = load, z being positions, velocities and 1."""
     n = len(mass)
     a = np.zeros((2 * n + 1, 2 * n + 1))
     a[:n, n : 2 * n] = np.eye(n)
@@ -63,7 +63,7 @@ def beam_case(case: Path, lists: dict[str, np.ndarray], x: float, v: float, angl
 
 
 def beam_bounces(frequency: np.ndarray, tip: np.ndarray) -> Bounces:
-    """The same with its stop; z is places, velocities, 1, cosine and sine of the drive."""
+    """The same with its stop; z is positions, velocities, 1, cosine and sine of the drive."""
     n = len(frequency)
     a = np.zeros((2 * n + 3, 2 * n + 3))
     damping, stiffness = np.diag(2 * RATIO * frequency), np.diag(frequency**2)
@@ -88,12 +88,12 @@ def cantilever(program: Program) -> list[Number]:
     ):
         frequency, tip = clamped_free(n), np.full(n, 2.0)
         damping, stiffness = np.diag(2 * RATIO * frequency), np.diag(frequency**2)
-        _, phase, place, velocity = max(
+        _, phase, position, velocity = max(
             orbits(DRIVE, np.eye(n), damping, stiffness, FORCE * tip, tip, GAP, LOSS)
         )
         case = program.folder / f"cantilever_{n}.toml"
-        lists = {"frequency": frequency, "point.tip": tip, "x0": place, "v0": velocity}
-        beam_case(case, lists, tip @ place, tip @ velocity, phase)
+        lists = {"frequency": frequency, "point.tip": tip, "x0": position, "v0": velocity}
+        beam_case(case, lists, tip @ position, tip @ velocity, phase)
         what = f"cantilever by {n} modes, one impact per period"
         ends = last(program.run("trajectory", case), "x", "v")
         found.append(Number(CLOSED, f"{what}, computed without the stop: speed", speed, ends[1], 5e-10))
@@ -101,7 +101,7 @@ def cantilever(program: Program) -> list[Number]:
         stop = '[contact.stop]\nbetween = ["beam.tip"]\nlaw = "newton"\n'
         case.write_text(f"{case.read_text()}{stop}restitution = {LOSS}\nupper = {GAP}\n")
         machine = beam_bounces(frequency, tip)
-        start = np.concatenate([place, velocity, [1, np.cos(phase), np.sin(phase)]])
+        start = np.concatenate([position, velocity, [1, np.cos(phase), np.sin(phase)]])
         machine.run(start, TURN, touched=0, most=5)
         theirs = np.array([time for time, *_ in machine.impacts])
         hits = program.events(case, "impact_upper", "contact.stop")
@@ -166,7 +166,7 @@ def lost(times: np.ndarray) -> float:
 
 
 def chatter(program: Program) -> list[Number]:
-    """One of three bodies bounces until it stays: every impact, and one plastic impact in their place."""
+    """One of three bodies bounces until it stays: every impact, and one plastic impact instead of them."""
     mass = np.diag([1.0, 2, 1])
     stiffness = np.array([[50.0, -50, 0], [-50, 70, -20], [0, -20, 20]])
     damping = 0.3 * np.array([[1.0, -1, 0], [-1, 1, 0], [0, 0, 0]])

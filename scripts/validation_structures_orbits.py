@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 
 def orbits(frequency, mass, damping, stiffness, force, row, gap, loss) -> list[tuple]:
-    """Motions with one impact a period: speed, phase, place and velocity just after it, by the quadratic.
+    """Motions with one impact a period: speed, phase, position and velocity just after it, by the quadratic.
 
     The machine is M q'' + C q' + K q = force cos(frequency t) with a stop at row q = gap.
     """

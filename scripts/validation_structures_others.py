@@ -28,7 +28,7 @@ def last(output: Path, *names: str) -> list[float]:
 
 
 def grazes(program: Program) -> list[Number]:
-    """Where the motion without impacts just reaches the stop: its largest place, the stop away."""
+    """Grazes of the motion without impacts: its largest position with the stop out of reach."""
     found = []
     coupled = np.array([[2, -1], [-1, 1]])
     for frequency in (0.999206009038, 1.424159514839, 1.721091812715):
@@ -59,25 +59,27 @@ def single_impacts(program: Program) -> list[Number]:
     what = "two masses with a stop, damping diag(0.5, 0), 0.6 rad/s: impact speed"
     found.append(Number(CLOSED, what, 1.418642594893, hit[2], 1e-9))
     chain = np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])
-    _, phase, place, velocity = max(orbits(0.5, np.eye(3), 0.05 * chain, chain, [1, 0, 0], [0, 0, 1], 1, 0.7))
-    start = {"start__crank_angle": phase, "start__x0": place[2], "start__v0": velocity[2]}
+    _, phase, position, velocity = max(
+        orbits(0.5, np.eye(3), 0.05 * chain, chain, [1, 0, 0], [0, 0, 1], 1, 0.7)
+    )
+    start = {"start__crank_angle": phase, "start__x0": position[2], "start__v0": velocity[2]}
     for k, body in enumerate(("first", "second")):
-        start |= {f"body__{body}__x0": place[k], f"body__{body}__v0": velocity[k]}
+        start |= {f"body__{body}__x0": position[k], f"body__{body}__v0": velocity[k]}
     hit = program.events("three_masses", "impact_upper", "contact.stop", run__duration=130, **start)[-1]
     what = "three masses with a stop, 0.5 rad/s: impact speed after ten periods"
     found.append(Number(CLOSED, what, 1.965215727977, hit[2], 1e-9))
     # Structure and particle just after the upper wall.
     speed, ratio, loss, clearance, frequency = -4.467709642531, 0.1, 0.8, 10, 1.1
     after = speed * (1 - loss + 2 * ratio) / (1 + loss) - 2 * ratio * speed
-    place = -(speed * pi / frequency + clearance) / 2
+    position = -(speed * pi / frequency + clearance) / 2
     start = {
         "contact__cavity__upper": clearance / 2,
         "contact__cavity__lower": -clearance / 2,
         "drive__shaker__frequency": frequency,
         "start__crank_angle": 4.653356496199,
-        "body__structure__x0": place,
+        "body__structure__x0": position,
         "body__structure__v0": after,
-        "start__x0": place + clearance / 2,
+        "start__x0": position + clearance / 2,
         "start__v0": speed,
     }
     hit = program.events("impact_damper", "impact_upper", "contact.cavity", **start)[-1]
@@ -90,14 +92,14 @@ def single_impacts(program: Program) -> list[Number]:
 def beads(program: Program) -> list[Number]:
     """A column that bounces as one body, two balls on a spring, and three in a row by both rules."""
     output = program.run("trajectory", "beads")
-    place, lowest, highest = last(output, "b1_x", "b1_v", "b10_v")
+    position, lowest, highest = last(output, "b1_x", "b1_v", "b10_v")
     source = "Siconos, BeadColumnED_NewtonLaw"
     found = [
         Number(
             source,
             "column of ten beads at 0.493 s: position of the lowest (m)",
             1.602081295401314e-2,
-            place,
+            position,
             1e-13,
         ),
         Number(source, "the same: velocity of the lowest", -0.8745122353873974, lowest, 1e-12),

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""words.py [--count] [PATH ...]: lists words of scripts/words.txt that are used in code, messages or documents.
+"""words.py [--count] [PATH ...]: lists words of scripts/words.txt in code, messages and documents.
 
 It ends with 1 if there are any. --count: numbers by folder. Without paths: all files of the checkout.
 """

@@ -42,7 +42,7 @@ class Accessor:
     def case(self) -> Case:
         """The resolved case that the result was computed from."""
         if "resolved_case" not in self._result.attrs:
-            raise SeparatrixError("this Dataset does not say of which case it is", USAGE)
+            raise SeparatrixError("this Dataset does not contain the case that it was computed from", USAGE)
         return Case.from_text(str(self._result.attrs["resolved_case"]))
 
     @property

@@ -30,7 +30,8 @@ def boundary(
 
     `.separatrix.plot(over=basins)` draws the curves over the map. Piece k has the points `first[k]` to
     `first[k] + points[k] - 1`, between the attractors `label_one[k]` and `label_two[k]`; 0 is not known.
-    `piece_name` says what it leads to, `piece_saddle` to which of the saddles in `table(result, "saddles")`.
+    `piece_name` is what motions on it lead to, `piece_saddle` the number of the saddle in
+    `table(result, "saddles")`, from 1.
 
     Parameters
     ----------
@@ -87,5 +88,5 @@ def file_of_map(
 
 
 def _run(command: list[str], ranks: int | None, progress: bool | Report | None) -> None:
-    with Progress(progress) as told:
-        run_at_once(command, told, ranks)
+    with Progress(progress) as report:
+        run_at_once(command, report, ranks)

@@ -49,7 +49,7 @@ class Case:
     def __init__(
         self, text: str, name: str | Path, settings: Iterable[str] = (), directory: Path | None = None
     ) -> None:
-        """Check a text with settings "key.path=value" on top; CaseError says all that is wrong.
+        """Check a text with settings "key.path=value" on top; CaseError lists all that is wrong.
 
         `name` stands for the file in messages. Files that the case names are looked for in `directory`, or
         in that of `name`, wherever the process goes afterwards.
@@ -92,7 +92,7 @@ class Case:
     def in_si(self, path: str, value: float | str) -> float:
         """Return a value of the key `path` in its SI unit.
 
-        A number is returned as it is, a text ("-3 mm") is read as in a case file; CaseError says what is
+        A number is returned as it is, a text ("-3 mm") is read as in a case file; CaseError names what is
         wrong.
         """
         if not isinstance(value, str):
@@ -153,14 +153,14 @@ class Case:
     def save(self, path: str | Path) -> Path:
         """Write the case as a file: as it was read, or resolved if values were put on top.
 
-        It is resolved, too, where the text would not say the same: it names files that are in another folder.
+        The resolved case is written, too, if the text names files that are in another folder.
         """
         path = Path(path)
         path.write_text(self._text if not self._settings and self._reads_at(path) else self.to_toml())
         return path
 
     def _reads_at(self, path: Path) -> bool:
-        """Whether the text says the same in another place."""
+        """Whether the text is the same case at another path."""
         try:
             return type(self)(self._text, path) == self
         except CaseError:
@@ -180,11 +180,11 @@ class Case:
         return [str(path)]
 
     def __eq__(self, other: object) -> bool:
-        """Compare what the cases say."""
+        """Compare the resolved cases."""
         return isinstance(other, Case) and self.to_toml() == other.to_toml()
 
     def __hash__(self) -> int:
-        """Hash what the case says."""
+        """Hash the resolved case."""
         return hash(self.to_toml())
 
     def __repr__(self) -> str:

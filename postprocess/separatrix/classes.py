@@ -69,8 +69,8 @@ def recoloured(entries: list[Class], colours: Sequence[str]) -> list[Class]:
 def class_index(image: np.ndarray, entries: list[Class]) -> np.ndarray:
     """Return the position in `entries` of the code at each pixel."""
     index = np.zeros(image.shape, dtype=np.int16)
-    for place, entry in enumerate(entries):
-        index[np.isin(image, entry.codes)] = place
+    for position, entry in enumerate(entries):
+        index[np.isin(image, entry.codes)] = position
     return index
 
 
@@ -178,7 +178,7 @@ def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
 
 
 def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
-    """Return what is known of entries without a period; older files do not tell."""
+    """Return what is known of entries without a period; older files have no kinds."""
     if "kind" not in catalogue:
         return "not periodic"
     names = flag_names(catalogue["kind"])

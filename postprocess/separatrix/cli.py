@@ -247,7 +247,7 @@ def _add_looks(parser: Parser) -> None:
         metavar="LIST",
         type=list_of(UNITS),
         default=[],
-        help=f"in the place of SI units: {', '.join(UNITS)}",
+        help=f"instead of SI units: {', '.join(UNITS)}",
     )
     looks.add_argument(
         "--shade", action="store_true", help="basin files: the settling time as lightness of the classes"

@@ -52,7 +52,7 @@ class GivenUpError(SeparatrixError):
 
 
 class SeparatrixWarning(UserWarning):
-    """Something in a run that should be known to judge its results."""
+    """Something in a run that affects how its results are to be assessed."""
 
 
 class Interrupted(KeyboardInterrupt):

@@ -22,14 +22,14 @@ def reason_of(result: xr.Dataset) -> str:
 
 
 def given_up_text(result: xr.Dataset) -> str:
-    """What a caption says of a motion that was given up."""
+    """Text of a caption for a motion that was given up."""
     time = result["time"].values
     after = f"{time[-1] if time.size else 0.0:.6g} {unit(result['time'])}"
     return f"given up after {after}: {reason_of(result).replace('_', ' ')}"
 
 
 def left_text(result: xr.Dataset, domain: float) -> str:
-    """What a caption says of a motion that left its domain, of so many units of the position; else ''."""
+    """Text of a caption for a motion that left the domain |x| <= `domain`; else ''."""
     if result.attrs.get("kind") != "trajectory" or result.attrs.get("reason") != "left_domain":
         return ""
     time = result["time"].values

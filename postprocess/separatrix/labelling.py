@@ -61,10 +61,10 @@ class Labelling:
     def __call__(self) -> xr.Dataset:
         """Compute what is left; Interrupted can go on. GivenUpError where every motion was given up."""
         stop = StopFlag()
-        with Progress(self.asked) as told:
+        with Progress(self.asked) as report:
             try:
                 self._search(stop)
-                self._label(stop, told)
+                self._label(stop, report)
             except (KeyboardInterrupt, StoppedError):
                 stop.set()
                 done = self.done / max(1, self._total())
@@ -91,8 +91,8 @@ class Labelling:
         )
 
     def _slices(self) -> list[Mapping[str, float]]:
-        places = itertools.product(*(self.axes[name] for name in self.parameters))
-        return [dict(zip(self.parameters, place, strict=True)) for place in places]
+        values = itertools.product(*(self.axes[name] for name in self.parameters))
+        return [dict(zip(self.parameters, row, strict=True)) for row in values]
 
     def _search(self, stop: StopFlag) -> None:
         if self.catalogues:
@@ -109,10 +109,10 @@ class Labelling:
                 raise
             self.catalogues = future.result()
 
-    def _label(self, stop: StopFlag, told: Progress) -> None:
+    def _label(self, stop: StopFlag, report: Progress) -> None:
         pieces = list(self.left)
         with ThreadPoolExecutor(self.threads) as helpers:
-            futures = {helpers.submit(self._piece, *place, stop): place for place in pieces}
+            futures = {helpers.submit(self._piece, *piece, stop): piece for piece in pieces}
             try:
                 waiting = set(futures)
                 while waiting:
@@ -120,7 +120,7 @@ class Labelling:
                     for future in finished:
                         self.done += future.result()
                         self.left.remove(futures[future])
-                    told("points", self.done, self._total())
+                    report("points", self.done, self._total())
             except BaseException:
                 stop.set()
                 helpers.shutdown(wait=True, cancel_futures=True)
@@ -187,14 +187,14 @@ def _cycles(found: list[Attractor]) -> dict[str, tuple]:
     if not found:
         return {}
     cycle = KINDS.index("cycle") + 1
-    cycles = [(place, one) for place, one in enumerate(found) if one.numbers["kind"] == cycle]
+    cycles = [(row, one) for row, one in enumerate(found) if one.numbers["kind"] == cycle]
     multipliers = np.full((len(found), max(one.multipliers.size for one in found)), np.nan, complex)
     multipliers.imag = np.nan
-    for place, one in cycles:
-        multipliers[place, : one.multipliers.size] = one.multipliers
+    for row, one in cycles:
+        multipliers[row, : one.multipliers.size] = one.multipliers
     data = {"multiplier_real": multipliers.real, "multiplier_imaginary": multipliers.imag}
     if cycles:
-        data["point_entry"] = np.concatenate([np.full(len(one.points), place) for place, one in cycles])
+        data["point_entry"] = np.concatenate([np.full(len(one.points), row) for row, one in cycles])
         data["point_entry"] = data["point_entry"].astype(np.int32)
         data["point"] = np.concatenate([one.points for _, one in cycles])
     return {

@@ -104,9 +104,9 @@ class Segments:
 class CoordinateSegments:
     """Samples of all segments of a structure, one after the other.
 
-    `motion` (samples, 2 n): places, then velocities of the n coordinates. `jacobian` (samples, 2 n, columns):
-    by the directions, then by places, velocities and crank angle of the start. The `side` of an impact is
-    that of `contact`, which is counted from 0. All else is as in `Segments`.
+    `motion` (samples, 2 n): positions, then velocities of the n coordinates. `jacobian` (samples, 2 n,
+    columns): by the directions, then by positions, velocities and crank angle of the start. The `side` of an
+    impact is that of `contact`, which is counted from 0. All else is as in `Segments`.
     """
 
     motion: np.ndarray
@@ -215,7 +215,7 @@ class Model:
         `velocity_jacobian` are None then, and `directions` is not looked at.
 
         `force` = (time of each segment's start since the first sample [s], interval [s], samples [N])
-        takes the place of the measured force of the case; the crank angles of `start` are not looked at.
+        replaces the measured force of the case; the crank angles of `start` are not used.
         """
         chosen = self._along(active, values)
         start, first, times = _many(start, 3, first, times)
@@ -289,7 +289,7 @@ class Model:
         tolerance: float = 1e-10,
         directions: np.ndarray | None = None,
     ) -> CoordinateSegments:
-        """Fly many segments of a structure; `start` (segments, 2 n + 1): places, velocities, crank angle.
+        """Fly many segments of a structure; `start` (segments, 2 n + 1): positions, velocities, crank angle.
 
         All else is as for `segments`.
         """
@@ -473,7 +473,7 @@ def _with_force(
     times: np.ndarray,
     force: tuple[np.ndarray, float, np.ndarray] | None,
 ) -> tuple[np.ndarray, float, np.ndarray]:
-    """Return starts whose crank angle is the place in the force, its interval and its samples."""
+    """Return starts whose crank angle is the phase of the force, its interval and its samples."""
     if force is None:
         return start, 0.0, np.empty(0)
     begins, interval, series = force

@@ -52,7 +52,7 @@ _RATIO = {"drive.ratio": "ratio", "drive_ratio": "ratio", "drive__ratio": "ratio
 
 @dataclass
 class _Work:
-    """One call: what to run, with how many, where to, and who is told."""
+    """One call: the command, its processes, its output, and who gets the progress."""
 
     command: str
     case: Case
@@ -68,13 +68,13 @@ class _Work:
     def __call__(self, folder: tempfile.TemporaryDirectory | None = None) -> xr.Dataset:
         """Run it; `folder` holds what an earlier, stopped run of it has done."""
         own = folder or tempfile.TemporaryDirectory(prefix="separatrix-")
-        place = Path(own.name)
-        target = (self.output or place / f"{self.command}.h5").absolute()
+        work_folder = Path(own.name)
+        target = (self.output or work_folder / f"{self.command}.h5").absolute()
         if self.output and target.exists() and not self.overwrite:
             raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", 73)
         try:
-            with Progress(self.progress) as told:
-                self._compute(place, target, told, resume=self.resume or folder is not None)
+            with Progress(self.progress) as report:
+                self._compute(work_folder, target, report, resume=self.resume or folder is not None)
         except SeparatrixError as error:
             if error.code != GIVEN_UP:
                 raise
@@ -93,19 +93,19 @@ class _Work:
         with open_result(target) as result:
             return kept_in_memory(result)
 
-    def _compute(self, place: Path, target: Path, told: Progress, resume: bool) -> None:
-        named = self.case.on_command_line(place)
+    def _compute(self, work_folder: Path, target: Path, report: Progress, resume: bool) -> None:
+        named = self.case.on_command_line(work_folder)
         rename = {named[0]: self.case.name, f"'{target}'": f"'{target.name}'"}
-        base = [self.command, *named, *self.extra(place), "--json"]
+        base = [self.command, *named, *self.extra(work_folder), "--json"]
         if self.workers == 1:
             how = ["--resume"] if resume else ["--force"] if self.overwrite else []
             command = [*base, *how, "-o", str(target)]
-            run([command], told, self.ranks, rename, time_limit=self.time_limit)
+            run([command], report, self.ranks, rename, time_limit=self.time_limit)
             return
-        self._in_shares(base, target, told, rename, resume)
+        self._in_shares(base, target, report, rename, resume)
 
     def _in_shares(
-        self, base: list[str], target: Path, told: Progress, rename: dict[str, str], resume: bool
+        self, base: list[str], target: Path, report: Progress, rename: dict[str, str], resume: bool
     ) -> None:
         """Serial processes, each with a share of the tiles; joined they have the bits of one run."""
         count = self.workers
@@ -119,16 +119,16 @@ class _Work:
         found = []
         if self.command == "basin":
             if not shares[0].exists():
-                run([[*first, "--search-only"]], told, None, rename, time_limit=self.time_limit)
+                run([[*first, "--search-only"]], report, None, rename, time_limit=self.time_limit)
             found = ["--catalogue", str(shares[0])]
         commands = [[*first, "--resume"]]
         for i in range(2, count + 1):
             commands.append([*base, "-o", str(target), "--shard", f"{i}/{count}", "--resume", *found])
-        run(commands, told, None, rename, unlocked, self.time_limit)
+        run(commands, report, None, rename, unlocked, self.time_limit)
         joined = ["merge", str(target), *map(str, shares), "--json"]
         given_up = None
         try:
-            run([[*joined, *(["--force"] if self.overwrite else [])]], told, None, rename)
+            run([[*joined, *(["--force"] if self.overwrite else [])]], report, None, rename)
         except SeparatrixError as error:
             given_up = error
             if error.code != GIVEN_UP:
@@ -202,7 +202,7 @@ def basin(
             workers = count
     work = _Work(
         "basin", case, _path(output), _workers(workers, ranks, number), ranks, progress, resume, overwrite,
-        time_limit, lambda place: [],
+        time_limit, lambda folder: [],
     )  # fmt: skip
     return work()
 
@@ -264,7 +264,7 @@ def sweep(
     table |= {key: value for key, value in given.items() if value is not None}
     case = case.with_({"sweep": table})
     work = _Work(
-        "sweep", case, _path(output), 1, ranks, progress, resume, overwrite, time_limit, lambda place: []
+        "sweep", case, _path(output), 1, ranks, progress, resume, overwrite, time_limit, lambda folder: []
     )
     return work()
 
@@ -290,8 +290,8 @@ def points(
     case = as_case(case)
     table = _starts(case, starts, columns)
 
-    def listed(place: Path) -> list[str]:
-        path = place / "starts.csv"
+    def listed(folder: Path) -> list[str]:
+        path = folder / "starts.csv"
         rows = [",".join(repr(float(value)) for value in row) for row in zip(*table.values(), strict=True)]
         path.write_text("\n".join([",".join(table), *rows, ""]))
         return ["--list", str(path)]

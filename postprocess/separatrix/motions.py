@@ -56,7 +56,7 @@ def trajectory(
     samples
         Samples per drive period, two or more; those of the case if not given.
     partial
-        Return a motion that was given up as far as it went; its attribute `reason` says why.
+        Return a motion that was given up as far as it went; its attribute `reason` is the cause.
     """
     case = as_case(case)
     if isinstance(duration, str):
@@ -95,9 +95,9 @@ def _cycle(case: Case, summary: dict[str, float]) -> dict[str, float] | None:
         return None
     if run["duration"] < summary["drive_period"]:
         return None
-    place = np.array([[start["x0"], start["v0"], start["crank_angle"]]])
-    catalogue = simulate.Catalogue(case.model).search(place)
-    label = catalogue.labels(place)
+    starts = np.array([[start["x0"], start["v0"], start["crank_angle"]]])
+    catalogue = simulate.Catalogue(case.model).search(starts)
+    label = catalogue.labels(starts)
     found = [one.numbers for one in catalogue.attractors if one.numbers["attractor"] == label["attractor"][0]]
     if not found or not label["settle_time"][0] <= run["duration"]:
         return None

@@ -49,7 +49,7 @@ class Stability:
     report: str = field(default="", repr=False)
 
     def __str__(self) -> str:
-        """Say it as the command does."""
+        """Return the report of the command."""
         return self.report
 
 
@@ -171,8 +171,8 @@ def stability_of_map(
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         command = ["stability", str(file_of_map(basins, Path(folder), "stability", None, progress)), "--json"]
         command += [] if periods is None else ["--periods", str(periods)]
-        with Progress(False) as told:
-            run_at_once(command, told, rename=_IN_PYTHON, take=events.append)
+        with Progress(False) as reporter:
+            run_at_once(command, reporter, rename=_IN_PYTHON, take=events.append)
     return {event["attractor"]: _entry(event) for event in events if event.get("event") == "entry"}
 
 
@@ -210,22 +210,22 @@ def _run(
 ) -> None:
     """Run a command that keeps nothing when it is stopped."""
     named = case.on_command_line(folder)
-    with Progress(progress) as told:
+    with Progress(progress) as reporter:
         rename = {named[0]: case.name, **_IN_PYTHON}
-        run_at_once([command, *named, *options, "--json"], told, rename=rename, take=take)
+        run_at_once([command, *named, *options, "--json"], reporter, rename=rename, take=take)
 
 
 def _stability(events: list[dict]) -> Stability:
-    """What the report of the program says, in numbers."""
+    """The report of the program in numbers."""
     kinds = ("exponent", "sum", "zero_one", "motion", "not_known")
-    said = [event for event in events if event.get("event") in kinds]
-    report = "\n".join(str(event["message"]) for event in said)
-    one = {event["event"]: event for event in said}
+    reported = [event for event in events if event.get("event") in kinds]
+    report = "\n".join(str(event["message"]) for event in reported)
+    one = {event["event"]: event for event in reported}
     if "motion" not in one:
         if "not_known" not in one:
-            raise SeparatrixError(f"stability: the program said nothing of the motion ({report})", INTERNAL)
+            raise SeparatrixError(f"stability: the program reported nothing on the motion ({report})", INTERNAL)
         return Stability(report=report)
-    exponents = [event for event in said if event["event"] == "exponent"]
+    exponents = [event for event in reported if event["event"] == "exponent"]
     return Stability(
         motion=str(one["motion"]["type"]),
         exponents=tuple(-math.inf if event["value"] is None else event["value"] for event in exponents),

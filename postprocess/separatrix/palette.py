@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colours of the figures and of the viewer; colour-blind readers can tell them apart."""
+"""The colours of the figures and of the viewer; colour-blind readers can distinguish them."""
 
 from collections.abc import Mapping
 
 # Colours of attractors in their order, mostly Paul Tol's. The first three differ by 20 and more in lightness,
-# so that they can be told apart in grey; all by 20 and more for colour-blind readers (CIE 76).
+# so that they differ in grey; all by 20 and more for colour-blind readers (CIE 76).
 ATTRACTORS = (
     "#004488", "#DDAA33", "#BB5566", "#99DDFF", "#000000", "#44AA99", "#661100", "#EEDD88",
 )  # fmt: skip

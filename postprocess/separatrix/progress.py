@@ -11,14 +11,14 @@ Report = Callable[[str, int, int], object]
 
 
 class Progress:
-    """A bar for each stretch of work. `asked`: True, False, None (where somebody looks), or a function.
+    """A bar for each part of the work. `asked`: True, False, None (where somebody looks), or a function.
 
     A function is called with what is counted ("points", "slices", "values"), how many are done and of how
     many.
     """
 
     def __init__(self, asked: bool | Report | None) -> None:
-        """Choose who is told."""
+        """Choose who gets the progress."""
         self._report = asked if callable(asked) else None
         self._shown = (_watched() if asked is None else bool(asked)) and self._report is None
         self._bar = None
@@ -27,11 +27,11 @@ class Progress:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody is told."""
+        """Whether anybody gets the progress."""
         return self._shown or self._report is not None
 
     def __call__(self, things: str, done: int, total: int) -> None:
-        """Tell how far the work is."""
+        """Report how far the work is."""
         self.done, self.total = done, total
         if self._report is not None:
             self._report(things, done, total)

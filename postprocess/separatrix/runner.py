@@ -40,7 +40,7 @@ _MPI_ENVIRONMENT = {
 
 
 class StoppedError(Exception):
-    """A run was stopped and can go on; `done` of it is done. `ended`: it was at its end before it heard."""
+    """A run was stopped at the share `done` and can go on. `ended`: it ended before the signal took effect."""
 
     def __init__(self, done: float, ended: bool = False) -> None:
         """Keep how far it went."""
@@ -51,13 +51,13 @@ class StoppedError(Exception):
 
 @dataclass
 class _Process:
-    """A running program and what it has said."""
+    """A running program and the last lines that it wrote."""
 
     process: subprocess.Popen
     things: str = ""
     done: int = 0
     total: int = 0
-    said: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
 
 
 def run(
@@ -108,7 +108,7 @@ def run_at_once(
     rename: Mapping[str, str] | None = None,
     take: Callable[[dict], object] | None = None,
 ) -> None:
-    """`run` of one command that cannot go on later: Ctrl-C is a KeyboardInterrupt that says what is kept."""
+    """`run` of one command that cannot be resumed: Ctrl-C is a KeyboardInterrupt that states what is kept."""
     try:
         run([command], progress, ranks, rename=rename, take=take)
     except StoppedError as stop:
@@ -129,7 +129,7 @@ def _start(
     environment: Mapping[str, str] | None,
 ) -> _Process:
     command = [*_launcher(ranks), str(program_path()), *arguments]
-    # These compute and say how far they are.
+    # These compute and report their progress.
     if arguments[0] in ("basin", "sweep", "points", "branches", "boundary") and progress.wanted:
         command += ["--progress", "0.2"]
     log.debug("run: %s", " ".join(command))
@@ -187,8 +187,8 @@ def _take_line(one: _Process, line: str, events: queue.Queue) -> None:
 
 
 def _take_words(one: _Process, line: str, events: queue.Queue) -> None:
-    one.said.append(line)
-    del one.said[:-200]
+    one.lines.append(line)
+    del one.lines[:-200]
 
 
 def _follow(
@@ -198,7 +198,7 @@ def _follow(
     time_limit: float | None,
     take: Callable[[dict], object] | None,
 ) -> None:
-    """Pass on what the programs say until all streams have ended; stop them when the time is over."""
+    """Pass on what the programs report until all streams have ended; stop them when the time is over."""
     open_streams = 2 * len(running)
     last = None if time_limit is None else time.monotonic() + time_limit
     while open_streams:
@@ -269,15 +269,15 @@ def _reap(running: list[_Process]) -> None:
 
 
 def _message(one: _Process, rename: Mapping[str, str]) -> str:
-    """What the program said of its end, without its own name."""
-    own = [line.removeprefix("separatrix: ") for line in one.said if line.startswith("separatrix: ")]
+    """The last messages of the program, without its own name."""
+    own = [line.removeprefix("separatrix: ") for line in one.lines if line.startswith("separatrix: ")]
     if own:
         # the lines after the first are further problems of the case
-        first = next(i for i, line in enumerate(one.said) if line.startswith("separatrix: "))
-        own = [line.removeprefix("separatrix: ") for line in one.said[first:]]
-    text = "\n".join(own or one.said[-5:]).strip()
+        first = next(i for i, line in enumerate(one.lines) if line.startswith("separatrix: "))
+        own = [line.removeprefix("separatrix: ") for line in one.lines[first:]]
+    text = "\n".join(own or one.lines[-5:]).strip()
     if not text:
-        text = f"the program ended with code {one.process.returncode} and said nothing"
+        text = f"the program ended with code {one.process.returncode} without a message"
     for path, name in rename.items():
         text = text.replace(path, name)
     return text.replace("--set ", "")

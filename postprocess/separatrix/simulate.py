@@ -43,7 +43,7 @@ SUMMARY = (
 ATTRACTOR = (
     "attractor", "regime", "period", "event_word", "x", "v", "driver_x", "driver_v", "multiplier",
     "capture_radius", "amplitude", "x_max", "x_min", "v_max", "impacts_per_period", "mean_impact_speed",
-    "grazing_margin", "rests", "any_place", "coordinates", "two_bodies", "kind", "cycle_time",
+    "grazing_margin", "rests", "any_position", "coordinates", "two_bodies", "kind", "cycle_time",
 )  # fmt: skip
 #: Variables of a label in the order of the library, with the types that a file has.
 LABEL_VARIABLES = {name: kind for name, (kind, *_) in MAP.items()}
@@ -159,7 +159,7 @@ def trajectory(
 
 
 def _call_or_given_up(name: str, *arguments: object) -> str:
-    """Call a function; what it says of a motion that was given up, '' of others."""
+    """Call a function; its message if a motion was given up, else ''."""
     try:
         _call(name, *arguments)
     except CaseError as error:
@@ -269,7 +269,7 @@ def search_slices(
 
 
 def _sections(catalogue: Catalogue) -> np.ndarray:
-    """Return starts on the attractors of one body: a start has no place for the driving body of two."""
+    """Return starts on the attractors of one body: a start has no state of the driving body of two."""
     found = [one for one in catalogue.attractors if not (one.numbers["rests"] or one.numbers["two_bodies"])]
     return np.array([(*one.points[0], 0.0) for one in found]).reshape(-1, 3)
 
@@ -278,8 +278,8 @@ def _neighbours(position: int, shape: tuple[int, ...]) -> list[int]:
     """Return the slices next to one along each axis, the last axis first."""
     found, stride = [], 1
     for length in reversed(shape):
-        place = position // stride % length
-        found += [position - stride] * (place > 0) + [position + stride] * (place < length - 1)
+        at = position // stride % length
+        found += [position - stride] * (at > 0) + [position + stride] * (at < length - 1)
         stride *= length
     return found
 

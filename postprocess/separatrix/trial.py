@@ -24,7 +24,7 @@ _LONGEST_WHOLE, _PER_BYTE = 20, 1e-5
 _WAITING = 20
 # memory of a reader beside what it has at its beginning [bytes]: at least, and over the size of the file
 _MOST_MEMORY, _MEMORY_OVER_FILE = 4 << 30, 40
-# characters of what a library says
+# characters of the message of a library
 _LONGEST_REASON = 200
 
 Result = TypeVar("Result")
@@ -110,8 +110,8 @@ def _answer(path: str | Path, kind: str, read: Callable[[], object], sink: int) 
         answer = SeparatrixError(f"{path}: not enough memory to read it")
     except Exception as error:
         # what a library raises in a damaged file may be anything
-        said = re.sub(r"[^ -~]+", " ", str(error))[:_LONGEST_REASON].strip()
-        why = f"{type(error).__name__}: {said}" if said else type(error).__name__
+        message = re.sub(r"[^ -~]+", " ", str(error))[:_LONGEST_REASON].strip()
+        why = f"{type(error).__name__}: {message}" if message else type(error).__name__
         answer = SeparatrixError(f"{path}: not a {kind} file that can be read: {why}")
     with os.fdopen(sink, "wb") as file:
         pickle.dump(answer, file, protocol=pickle.HIGHEST_PROTOCOL)
@@ -128,7 +128,7 @@ def _limit(what: int, soft: int, hard: int) -> None:
 
 
 def _used_memory() -> int:
-    """Address space of this process [bytes]; 0 where the system does not say."""
+    """Address space of this process [bytes]; 0 where the system does not report it."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     except (OSError, ValueError):

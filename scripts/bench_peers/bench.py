@@ -133,7 +133,7 @@ def contestants(program: Program, build_folder: Path, sizes: Sizes) -> dict[str,
     }
 
 
-def judge(everybody: dict, library: Path, program: Program, results: Results) -> None:
+def assess(everybody: dict, library: Path, program: Program, results: Results) -> None:
     """Accuracy of all who ran the Coulomb case."""
     sizes = results.sizes
     print(
@@ -174,7 +174,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path)
     options = parser.parse_args()
     if options.output and (options.limits or options.machines is not None):
-        parser.error("--output: found with --limits or --machines, whose pages have one place each")
+        parser.error("--output: found with --limits or --machines, whose pages have fixed paths")
     options.output = options.output or SOURCE / "docs" / "performance.md"
     began = time.perf_counter()
     results = Results(QUICK if options.quick else Sizes())
@@ -216,7 +216,7 @@ def run_published(program: Program, build_folder: Path, results: Results) -> Non
         # everybody follows everybody else in turn
         for name in names[number % len(names) :] + names[: number % len(names)]:
             results.timings[name].append(everybody[name].round())
-    judge(everybody, build_folder / "lib" / "libseparatrix_reference.so", program, results)
+    assess(everybody, build_folder / "lib" / "libseparatrix_reference.so", program, results)
 
 
 if __name__ == "__main__":

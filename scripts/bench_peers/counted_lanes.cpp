@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// The kernel of the lanes once more, with counts of what it does: linked in the place of the usual one into
+// The kernel of the lanes once more, with counts of what it does: linked in place of the usual one into
 // the program `separatrix_counted`, which adds them as a line to the file $LANE_COUNTS when it ends.
 #include <cstddef>
 #include <cstdio>

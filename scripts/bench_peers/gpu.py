@@ -107,7 +107,7 @@ class Runs:
 
 
 class GpuMemory:
-    """The most memory of a GPU that was in use at some moments [MiB], as nvidia-smi says; 0 = not known."""
+    """The most memory of a GPU that was in use at some moments [MiB], by nvidia-smi; 0 = not known."""
 
     def __enter__(self) -> "GpuMemory":
         self.most = 0
@@ -145,10 +145,10 @@ def same_content(one: Path, other: Path) -> bool:
     return contents(one) == contents(other)
 
 
-def measure(runs: Runs, size: Size, say: Callable[[str], None]) -> None:
+def measure(runs: Runs, size: Size, report: Callable[[str], None]) -> None:
     """The table of machines: rates on one core and on the GPU; does the same map have the same content?"""
-    say("| machine | flights | span | one core [1/s] | GPU [1/s] | ratio | content of the same map |")
-    say("|---|---|---|---|---|---|---|")
+    report("| machine | flights | span | one core [1/s] | GPU [1/s] | ratio | content of the same map |")
+    report("|---|---|---|---|---|---|---|")
     for key, flights in MACHINES.items():
         case = case_of(key, runs.folder)
         for span, words in SPANS.items():
@@ -157,14 +157,14 @@ def measure(runs: Runs, size: Size, say: Callable[[str], None]) -> None:
             by_core = runs.file(case, side, "cpu")
             by_gpu = runs.run(case, side, "gpu", size.ranks, *words)[1]
             same = f"the same, {side} x {side}" if same_content(by_core, by_gpu) else "**different**"
-            say(f"| {key} | {flights} | {span} | {core:,.0f} | {gpu:,.0f} | {gpu / core:.1f} | {same} |")
+            report(f"| {key} | {flights} | {span} | {core:,.0f} | {gpu:,.0f} | {gpu / core:.1f} | {same} |")
 
 
-def measure_ranks(runs: Runs, size: Size, say: Callable[[str], None]) -> None:
+def measure_ranks(runs: Runs, size: Size, report: Callable[[str], None]) -> None:
     """The table of ranks, for Coulomb friction."""
     case = case_of("coulomb", runs.folder)
-    say("| ranks | span | processor [1/s] | GPU [1/s] | GPU memory [MiB] |")
-    say("|---|---|---|---|---|")
+    report("| ranks | span | processor [1/s] | GPU [1/s] | GPU memory [MiB] |")
+    report("|---|---|---|---|---|")
     for span, words in SPANS.items():
         for number in RANKS:
             cores = "not run"
@@ -172,35 +172,35 @@ def measure_ranks(runs: Runs, size: Size, say: Callable[[str], None]) -> None:
                 cores = f"{runs.sided_rate(case, 'cpu', number, size, *words)[0]:,.0f}"
             with GpuMemory() as memory:
                 gpu = runs.sided_rate(case, "gpu", number, size, *words)[0]
-            say(f"| {number} | {span} | {cores} | {gpu:,.0f} | {memory.most or 'not known'} |")
+            report(f"| {number} | {span} | {cores} | {gpu:,.0f} | {memory.most or 'not known'} |")
 
 
-def measure_tiles(runs: Runs, size: Size, say: Callable[[str], None]) -> None:
+def measure_tiles(runs: Runs, size: Size, report: Callable[[str], None]) -> None:
     """The table of tiles, for Coulomb friction over the full time."""
     case, words = case_of("coulomb", runs.folder), SPANS["full"]
-    say("| tile | one rank [1/s] | " + f"{size.ranks} ranks [1/s] |")
-    say("|---|---|---|")
+    report("| tile | one rank [1/s] | " + f"{size.ranks} ranks [1/s] |")
+    report("|---|---|---|")
     for tile in TILES:
         shape = ["--set", f"grid.tile=[{tile}, {tile}]"]
         rates = [runs.sided_rate(case, "gpu", ranks, size, *words, *shape)[0] for ranks in (1, size.ranks)]
-        say(f"| {tile} x {tile} | {rates[0]:,.0f} | {rates[1]:,.0f} |")
+        report(f"| {tile} x {tile} | {rates[0]:,.0f} | {rates[1]:,.0f} |")
 
 
-def largest_map(runs: Runs, size: Size, say: Callable[[str], None]) -> None:
-    """A map of many starts, of which a sample is computed again by the processor, and what its run says."""
+def largest_map(runs: Runs, size: Size, report: Callable[[str], None]) -> None:
+    """A map of many starts, a sample of it computed again by the processor, and the output of its run."""
     seconds, path = runs.run(case_of("coulomb", runs.folder), size.largest, "gpu", size.ranks)
     log = [line.replace(str(runs.folder), "out") for line in runs.log.strip().splitlines()]
     verified = subprocess.run(
         [runs.program, "verify", path, "--sample", "10000"], capture_output=True, text=True
     )
     last = (verified.stdout.strip().splitlines() or [verified.stderr.strip()])[-1]
-    say(
+    report(
         f"Coulomb, settled, {size.largest} x {size.largest} starts: {seconds:,.1f} s, by {size.ranks} ranks. "
-        f"`separatrix verify --sample 10000`: {last}. The run said:"
+        f"`separatrix verify --sample 10000`: {last}. Output of the run:"
     )
-    say("")
+    report("")
     for line in log:
-        say(f"    {line}")
+        report(f"    {line}")
 
 
 def processor() -> str:
@@ -274,16 +274,16 @@ def write_page(runs: Runs, device: str, size: Size, parts: list[str], output: Pa
         *conditions(runs, device, size),
     ]
 
-    def say(line: str) -> None:
+    def report(line: str) -> None:
         lines.append(line)
         output.write_text("\n".join([*lines, ""]))
         print(line, flush=True)
 
     for part in parts:
-        say("")
-        say(f"## {TITLES[part]}")
-        say("")
-        PARTS[part](runs, size, say)
+        report("")
+        report(f"## {TITLES[part]}")
+        report("")
+        PARTS[part](runs, size, report)
 
 
 def main() -> None:

@@ -34,8 +34,8 @@ ARITHMETIC = re.compile(r"v?(add|sub|mul|div|sqrt|min|max|fn?m(?:add|sub)\d*)(pd
 PEAK = 16
 """Additions and multiplications of doubles in a cycle: two vectors of eight, none fused with another."""
 LEAST = 2
-"""Evaluations of the motion for an event that a better algorithm could do with: one that finds its place, one
-that takes the state there."""
+"""Evaluations of the motion per event that would suffice for a better algorithm: one for its time, one for
+the state there."""
 
 
 @dataclass
@@ -159,13 +159,13 @@ def measure(row: Row, program: Program, build: Path) -> Limits:
 
 
 def facts() -> dict[str, str]:
-    """What /proc/cpuinfo says of the first processor."""
+    """Entries of /proc/cpuinfo for the first processor."""
     lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
     return {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
 
 
 def megahertz() -> float:
-    """Of the processor, as the system tells."""
+    """Clock of the processor [MHz], as the system reports it."""
     return float(facts()["cpu MHz"])
 
 
@@ -197,8 +197,8 @@ def shares_table(program: Program, build: Path) -> str:
         if found is None:
             rows.append([row.title, "no lanes", "", "100 %"])
         else:
-            told = [f"{found.events:.1f}", f"{found.evaluations:.2f}", f"{100 * found.left:.3f} %"]
-            rows.append([row.title, *told])
+            cells = [f"{found.events:.1f}", f"{found.evaluations:.2f}", f"{100 * found.left:.3f} %"]
+            rows.append([row.title, *cells])
     return table(
         ["machine", "events per trajectory", "evaluations per event", "left to the event loop"], rows
     )

@@ -6,8 +6,8 @@
 
 int dimension(const machine_t *machine) { return machine->dahl > 0 ? 3 : 2; }
 
-/* Stretch of the spring [m]. */
-static double stretch_at(const machine_t *machine, double time, double x) {
+/* Extension of the spring [m]. */
+static double extension_at(const machine_t *machine, double time, double x) {
   const double *a = machine->cosine, *b = machine->sine;
   const double phi = machine->frequency * time;
   const double tau = phi + machine->angle + (machine->ripple != 0 ? machine->ripple * sin(phi) : 0);
@@ -21,11 +21,11 @@ static double stretch_at(const machine_t *machine, double time, double x) {
 
 /* Acceleration by everything but dry friction and a soft barrier, at a velocity of the sign `direction`. */
 static double smooth_acceleration(const machine_t *machine, double time, double x, double v, int direction) {
-  const double stretch = stretch_at(machine, time, x);
-  double a = machine->stiffness * stretch;
+  const double extension = extension_at(machine, time, x);
+  double a = machine->stiffness * extension;
   if (machine->further == 0)
     return a;
-  return a + machine->cubic * stretch * stretch * stretch -
+  return a + machine->cubic * extension * extension * extension -
          (machine->viscous + direction * (machine->asymmetric_viscous + machine->quadratic * v)) * v;
 }
 

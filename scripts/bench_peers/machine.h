@@ -24,10 +24,10 @@ typedef struct {
   double angle;                              /* [rad] */
   double cosine[HARMONICS], sine[HARMONICS]; /* [m] */
   double duration, window;                   /* [s] */
-  /* From here on 0 on the published machine; `further` says whether any is not. */
+  /* From here on 0 on the published machine; `further` is 1 if any is not. */
   double further;
   double ripple;                         /* crank angle phi + ripple sin(phi) [rad] */
-  double cubic, quadratic, viscous;      /* of the stretch and of the speed */
+  double cubic, quadratic, viscous;      /* of the extension and of the speed */
   double asymmetric, asymmetric_viscous; /* friction upwards above the mean of both directions */
   double slope;                          /* dry friction times 1 + slope x [1/m] */
   double excess, velocity;               /* friction at rest above that in motion, E exp(-(v/v_s)^2) */

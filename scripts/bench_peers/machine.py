@@ -166,8 +166,8 @@ def set_barrier(machine: Machine, contact: dict, effects: dict, mass: float) -> 
 def check(machine: Machine) -> None:
     """The drivers of the peers do not know a body that rests at a rigid barrier."""
     reach = sum(abs(a) + abs(b) for a, b in zip(machine.cosine, machine.sine, strict=True))
-    stretch = machine.barrier - machine.rest - reach
-    push = machine.stiffness * stretch
+    extension = machine.barrier - machine.rest - reach
+    push = machine.stiffness * extension
     hold = (machine.friction + machine.excess + abs(machine.asymmetric)) * (
         1 + machine.slope * machine.barrier
     )

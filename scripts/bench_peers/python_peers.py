@@ -39,9 +39,9 @@ class AtRest:
     def direction_of(self, foot: float, x: float, z: float) -> int:
         """Sign of the sliding that begins, 0 if friction holds the body; z: Dahl's friction."""
         machine = self.machine
-        stretch = machine.rest + foot - x
-        a = machine.stiffness * stretch
-        a += machine.cubic * stretch**3
+        extension = machine.rest + foot - x
+        a = machine.stiffness * extension
+        a += machine.cubic * extension**3
         if machine.barrier_law and x > machine.barrier:
             a -= machine.barrier_stiffness * (x - machine.barrier)
         if machine.dahl:
@@ -134,10 +134,10 @@ class Heyoka:
         machine, h, d, pressed = self.machine, *(heyoka.par[i] for i in range(3))
         x, v, z = heyoka.make_vars("x", "v", "z")
         foot, oscillators = self.oscillating_foot() if self.oscillators else (self.rippled_foot(), [])
-        stretch, p = machine.rest + foot - x, x - machine.barrier
-        a = machine.stiffness * stretch
+        extension, p = machine.rest + foot - x, x - machine.barrier
+        a = machine.stiffness * extension
         if machine.cubic:
-            a += machine.cubic * stretch**3
+            a += machine.cubic * extension**3
         if machine.viscous:
             a -= machine.viscous * v
         if machine.asymmetric_viscous or machine.quadratic:

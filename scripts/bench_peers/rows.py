@@ -53,7 +53,7 @@ class Row:
     """Two maps of so many starts along either axis; their difference is timed."""
     sizes: Checks | None = None
     bodies: int = 0
-    """Not 0: a chain of so many, see `chain`, in the place of the example."""
+    """Number of bodies of a chain (see `chain`) in place of the example; 0: the example."""
 
     def checks(self, quick: bool) -> Checks:
         """What is checked on how much."""

@@ -122,15 +122,15 @@ class RowBench:
     def verify(self, path: Path, size: int, seed: int) -> Accuracy:
         """One sample."""
         command = [self.program.program, "verify", path, "--sample", str(size), "--seed", str(seed)]
-        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        flips, counts, x, v = re.search(VERIFIED, said).groups()
+        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        flips, counts, x, v = re.search(VERIFIED, output).groups()
         with h5py.File(path) as file:
             far = max(float(np.nanmax(np.abs(file[name][()]))) for name in ("x_max", "x_min"))
             fast = float(np.nanmax(file["v_max"][()]))
         deviation = max(float(x) / far, float(v) / fast)
         return Accuracy(size, deviation, int(counts), int(flips))
 
-    def judge(self) -> None:
+    def assess(self) -> None:
         """Quadruple precision, single flights, labels of settle-and-stop."""
         sizes, found = self.row.checks(self.quick), self.result.agreements
         if self.row.bodies:
@@ -158,7 +158,7 @@ def measure(row: Row, program: Program, build_folder: Path, rounds: int, quick: 
     bench = RowBench(row, program, build_folder, quick)
     for _ in range(rounds):
         bench.round()
-    bench.judge()
+    bench.assess()
     return bench.result
 
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps what a campaign found in one file, from which the campaign goes on and the page can be written again.
+"""Keeps the results of a campaign in one file, from which it can be continued and its page written again.
 
 A line of JSON for each case, compressed by LZMA: its number, its seal, the text of its truth, its result,
 and the result with the record that its verdict asked for. Records are not kept: the seed draws them again.
-Messages name files by their places among the cases.
+Messages name files by their paths among the cases.
 """
 
 import json
@@ -40,9 +40,9 @@ def pack(archive: Path, folders: object, numbers: Sequence[int]) -> int:
             continue
         sealed = folders.sealed / f"{number:04}.json"
         truth = sealed.read_text() if sealed.is_file() else None
-        kept = {"number": number, "truth": truth, "result": folders.told(folders.result(number))}
+        kept = {"number": number, "truth": truth, "result": folders.portable(folders.result(number))}
         if folders.follow_up(number).is_file():
-            kept["follow_up"] = folders.told(folders.follow_up(number))
+            kept["follow_up"] = folders.portable(folders.follow_up(number))
         lines.append(json.dumps(kept) + "\n")
     draft = archive.with_name(archive.name + ".new")
     draft.parent.mkdir(parents=True, exist_ok=True)

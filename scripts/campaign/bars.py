@@ -44,11 +44,11 @@ def bars(found: list[Score], with_asked: list[bool]) -> list[list[str]]:
         at_least("outside the catalogue, recognised", 0.80, [o.right for o in outside]),
         at_most("outside the catalogue, wrongly named", 0.10, [o.wrong_name for o in outside]),
     ]
-    told = [one.depends_rightly is True for one in outside]
+    dependence = [one.depends_rightly is True for one in outside]
     closes = [one.character_closes for one in outside if one.depends_rightly]
     share = statistics.median(closes) if closes else math.nan
     rows += [
-        at_least("outside the catalogue, dependence right", 0.60, told),
+        at_least("outside the catalogue, dependence right", 0.60, dependence),
         [
             "held-out gap that these forces would close",
             ">= 80 %",
@@ -113,7 +113,7 @@ def at_most(name: str, bar: float, flags: list[bool]) -> list[str]:
 
 
 def met(found: Rate, lowest: float, highest: float) -> str:
-    """As the table says whether a rate lies between bars."""
+    """Entry of the table: whether a rate lies between bars."""
     return side(*found.interval, lowest, highest)
 
 

@@ -68,15 +68,15 @@ def _terms_of(base: dict, header: dict, columns: dict) -> tuple:
     pairs = list(zip(drive["cosine"], drive["sine"], waves, strict=True))
     foot = sum(c * wave.real + s * wave.imag for c, s, wave in pairs)
     rate = sum(n * (s * wave.real - c * wave.imag) for n, (c, s, wave) in enumerate(pairs, 1))
-    stretch = base["restoring"]["free_length"] + drive["mean"] + foot - x
+    extension = base["restoring"]["free_length"] + drive["mean"] + foot - x
     sign, size = np.sign(v), np.abs(v)
-    bases = [stretch, foot, rate]
+    bases = [extension, foot, rate]
     found = {
         "quadratic_drag": [v * size],
         "stribeck": [sign * np.exp(-((v / STRIBECK_VELOCITY) ** 2))],
         "asymmetric_friction": [size],
         "position_dependent_friction": [x * sign],
-        "cubic_spring": [stretch**3],
+        "cubic_spring": [extension**3],
         "offset_force": [np.ones_like(x)],
         "drive_ripple": [rate * np.sin(phi), rate * np.cos(phi)],
     }

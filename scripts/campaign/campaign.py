@@ -78,7 +78,7 @@ class Folders:
         """The result of a case with the record that its verdict asked for."""
         return self.follow_ups / f"{number:04}.json"
 
-    def told(self, path: Path) -> dict:
+    def portable(self, path: Path) -> dict:
         """A result without the folders of the machine that its messages name."""
         return json.loads(path.read_text().replace(f"{self.cases}/", ""))
 
@@ -151,12 +151,12 @@ def run_case(folders: Folders, seed: int, number: int, limit: float, with_baseli
     result = {"number": number, "commit": commit(), "library": library(), "seal": found, "verdict": verdict}
     result |= {"baselines": named, "seconds": seconds}
     write_whole(folders.result(number), json.dumps(result, default=plain) + "\n")
-    told = " ".join(verdict.get("effects", [])) or "; ".join(verdict.get("reasons", []))
-    print(f"case {number}: {verdict['outcome']} {told} ({seconds:.0f} s)", flush=True)
+    text = " ".join(verdict.get("effects", [])) or "; ".join(verdict.get("reasons", []))
+    print(f"case {number}: {verdict['outcome']} {text} ({seconds:.0f} s)", flush=True)
 
 
 def asks_for_more(folders: Folders, number: int) -> bool:
-    """Whether the verdict leaves effects that differ in what they do, and says what would tell them apart."""
+    """Whether the verdict leaves effects with different motions and proposes how to separate them."""
     verdict = json.loads(folders.result(number).read_text()).get("verdict", {})
     one_answer = verdict.get("equivalent") or verdict.get("in_families")
     return verdict.get("outcome") == "ambiguous" and not one_answer and bool(verdict.get("experiments"))
@@ -164,15 +164,15 @@ def asks_for_more(folders: Folders, number: int) -> bool:
 
 def follow_up(folders: Folders, seed: int, number: int, limit: float) -> None:
     """Make the first record that the verdict of a case asks for and that can be made, and ask again."""
-    told, case = folders.told(folders.result(number)), folders.cases / f"{number:04}"
+    result, case = folders.portable(folders.result(number)), folders.cases / f"{number:04}"
     drawn = draw(seed, number)
     again = folders.follow_ups / f"{number:04}.truth"
     kept = records.write_case(case, again, drawn)
     again.unlink()
-    if kept != told["seal"]:
+    if kept != result["seal"]:
         raise SystemExit(f"discovery_campaign: case {number} is not drawn as it was")
     found = {"number": number, "commit": commit(), "library": library(), "asked": None}
-    for one in told["verdict"]["experiments"]:
+    for one in result["verdict"]["experiments"]:
         try:
             records.write_asked(case / records.ASKED, drawn, one["drive_ratio"], one["scale"])
         except SimulationError:

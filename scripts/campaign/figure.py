@@ -24,8 +24,8 @@ def confusion_counts(found: list[Score], rows: list[str]) -> tuple[np.ndarray, l
     columns = ["right", *ENDS, *wrong]
     counts = np.zeros((len(rows), len(columns)), dtype=int)
     for one in found:
-        place = "right" if one.right else one.column
-        counts[rows.index(one.truth), columns.index(place)] += 1
+        name = "right" if one.right else one.column
+        counts[rows.index(one.truth), columns.index(name)] += 1
     return counts, columns
 
 

@@ -160,7 +160,7 @@ def undecided(folders: object, found: list[Score]) -> list[list[str]]:
     for one in found:
         if not one.strong or one.decided:
             continue
-        verdict = folders.told(folders.result(one.number))["verdict"]
+        verdict = folders.portable(folders.result(one.number))["verdict"]
         for text in verdict.get("reasons") or [NOTHING]:
             key = (one.column, text)
             reasons[key] = reasons.get(key, 0) + 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Holds a verdict against the truth."""
+"""Compares a verdict with the truth."""
 
 import math
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ SEPARABLE = 3.0
 """d' that has to be left beside any one other effect for a name to be possible."""
 PRECISE = 10.0
 UNNAMED = ("not-in-catalogue", "characterised")
-"""A gap that no effect closes; where the force is known to depend on something, that is told."""
+"""A gap that no effect closes; if the dependence of the force is known, it is reported."""
 ANSWERS = ("named", "ambiguous", "none", *UNNAMED)
 DEPENDS_ON = {
     "parametric_stiffness": {"oscillating time", "position"},
@@ -37,7 +37,7 @@ DEPENDS_ON = {
 """On what an effect outside of the catalogue depends."""
 
 
-SPEED, REVERSAL, PLACE = "velocity", "low speed", "position"
+SPEED, REVERSAL, POSITION = "velocity", "low speed", "position"
 PLANE, PHASE, IMPACT = "position and velocity", "drive phase", "time since the last impact"
 IMPACT_SPEED = "impact speed"
 FAMILIES = {
@@ -58,8 +58,8 @@ FAMILIES = {
 }
 """Closed forms and the function of a family. A function names the family of any of its laws."""
 TRENDS = ({"viscous", "quadratic_drag", "cubic_damping"}, {"stribeck"}, {"coulomb"})
-"""Closed forms over speed that rise, fall, and stay. Where the law that was hidden has another shape than
-that of the catalogue, a form of its trend names it too."""
+"""Closed forms over speed that rise, fall, and stay. If the hidden law has another shape than that of the
+catalogue, a form of its trend names it too."""
 REGIONS = {
     "viscous": {SPEED, PLANE},
     "coulomb": {SPEED, REVERSAL, PLANE},
@@ -68,13 +68,13 @@ REGIONS = {
     "static_excess": {REVERSAL},
     "dahl": {REVERSAL, PLANE},
     "position_dependent_friction": {PLANE},
-    "cubic_spring": {PLACE, PLANE},
+    "cubic_spring": {POSITION, PLANE},
     "restitution_slope": {IMPACT, IMPACT_SPEED},
     "compliant_contact": {IMPACT, IMPACT_SPEED},
-    "second_barrier": {PLACE, PLANE},
+    "second_barrier": {POSITION, PLANE},
     "drive_ripple": {PHASE},
 }
-"""Maps that an effect shows in; what acts in the whole motion or in the sensor has none."""
+"""Maps in which an effect appears; effects on the whole motion or on the sensor have none."""
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,9 @@ class Score:
     region: bool | None
     """The clearest region is one where the effect acts; None without region or rule."""
     depends_rightly: bool | None
-    """What a force without a name is said to depend on is right; None where nothing is said."""
+    """The reported dependence of an unnamed force is right; None without one."""
     character_closes: float
-    """Share of the held-out gap that it would close; NaN where nothing is said."""
+    """Share of the held-out gap that it would close; NaN without one."""
     shaped: bool
     """The law that was hidden has another shape than that of the catalogue."""
     by_family: bool
@@ -125,7 +125,7 @@ class Score:
     whole: int
     """Samples of all records together."""
     leaves: str
-    """What the machine of the verdict leaves, where it was held to be adequate."""
+    """Remainder of the machine of the verdict, if it is adequate."""
     seconds: float
     baselines: dict[str, str]
     baselines_right: dict[str, bool]
@@ -137,7 +137,7 @@ class Score:
 
     @property
     def alarm(self) -> bool:
-        """Whether anything was said to be missing."""
+        """Whether the verdict reports anything missing."""
         return self.answer in ("named", "ambiguous", *UNNAMED)
 
     @property
@@ -165,19 +165,19 @@ def reported(verdict: dict) -> set[frozenset[str]]:
 
 
 def as_hidden(names: frozenset[str], truth: dict) -> frozenset[str]:
-    """A set of effects with what names the family of a hidden one in the place of its name."""
+    """A set of effects in which the name of the family of a hidden one is replaced by its own name."""
     found = set(names)
     for hidden in truth["names"]:
         members = next((one for one in FAMILIES.values() if hidden in one), {hidden})
         alike = next((one for one in TRENDS if hidden in one and hidden in truth.get("shapes", {})), set())
-        said = {name for name in members if name in alike or name.endswith(FUNCTIONS)}
-        if hidden not in found and len(found & said) == 1:
-            found = (found - said) | {hidden}
+        equal = {name for name in members if name in alike or name.endswith(FUNCTIONS)}
+        if hidden not in found and len(found & equal) == 1:
+            found = (found - equal) | {hidden}
     return frozenset(found)
 
 
 def only_equivalent(sets: set[frozenset[str]]) -> bool:
-    """Whether sets of effects differ by effects only that nothing can tell apart here."""
+    """Whether sets of effects differ only by effects that are indistinguishable here."""
     common = frozenset.intersection(*sets)
     rest = [one - common for one in sets]
     return len(sets) > 1 and all(len(one) == 1 and one <= EQUIVALENT for one in rest)
@@ -198,7 +198,7 @@ def one_family(sets: set[frozenset[str]]) -> bool:
 
 
 def score(truth: dict, result: dict) -> Score:
-    """Judge one case."""
+    """Score one case."""
     verdict, names = result["verdict"], frozenset(truth["names"])
     sets = {as_hidden(one, truth) for one in reported(verdict)}
     answer = verdict["outcome"] if verdict["outcome"] in ANSWERS else "failed"
@@ -238,7 +238,7 @@ def score(truth: dict, result: dict) -> Score:
         errors=errors,
         covered=covered,
         removed=removed(held_out) if one_answer else math.nan,
-        # of verdicts before version 2: "decoys"
+        # verdicts before version 2 have the second key
         negative_control=bool(verdict.get("negative_controls", verdict.get("decoys", {})).get("accepted")),
         region=region(truth["names"], verdict.get("where", [])) if one_answer and right else None,
         depends_rightly=depends_rightly(truth, verdict),
@@ -262,7 +262,7 @@ def score(truth: dict, result: dict) -> Score:
 
 
 def depends_rightly(truth: dict, verdict: dict) -> bool | None:
-    """Whether the likeliest of what a missing force is said to depend on is right."""
+    """Whether the likeliest reported dependence of a missing force is right."""
     if not verdict.get("character"):
         return None
     wanted = [DEPENDS_ON[name] for name in truth["names"] if name in DEPENDS_ON]
@@ -270,7 +270,7 @@ def depends_rightly(truth: dict, verdict: dict) -> bool | None:
 
 
 def region(names: list[str], where: list[dict]) -> bool | None:
-    """Whether the clearest flagged region lies in a map where one of the effects shows."""
+    """Whether the clearest flagged region lies in a map in which one of the effects appears."""
     if not where or not any(name in REGIONS for name in names):
         return None
     clearest = max(where, key=lambda one: abs(one["force"] / one["error"]))

@@ -38,7 +38,7 @@ def developed_on() -> str:
 
 
 def of_page(seed: int) -> str:
-    """What has to be said of a page of this seed."""
+    """The remark on the seed of a page."""
     if seed in BLIND_UP_TO:
         last = BLIND_UP_TO[seed]
         return f"Verdicts on {seed} up to commit {last} preceded any look at the truths, later ones did not."

@@ -16,11 +16,11 @@ sys.path[:0] = [str(SOURCE / "tests" / "generator")]
 import records  # noqa: E402
 from design import draw  # noqa: E402
 
-TOLD = ("outcome", "effects", "alternatives")
+REPORTED = ("outcome", "effects", "alternatives")
 
 
 def ask(folder: Path, seed: int, number: int) -> dict:
-    """Verdict and processor seconds of a case, whose truth is told beside them."""
+    """Verdict and processor seconds of a case, with its truth."""
     from separatrix.discovery import Options, discover
 
     case, truth = folder / "case", folder / "truth.json"
@@ -32,11 +32,11 @@ def ask(folder: Path, seed: int, number: int) -> dict:
     depends = [one["depends_on"] for one in verdict["character"]]
     hidden = json.loads(truth.read_text())["names"]
     return {"number": number, "hidden": hidden, "seconds": seconds, "depends_on": depends} | {
-        key: verdict[key] for key in TOLD
+        key: verdict[key] for key in REPORTED
     }
 
 
-def told(one: dict) -> str:
+def in_words(one: dict) -> str:
     """The verdict in few words."""
     names = [*one["effects"], *(f"or {_joined(other)}" for other in one["alternatives"])]
     if one["outcome"] == "characterised" and one["depends_on"]:
@@ -45,7 +45,7 @@ def told(one: dict) -> str:
 
 
 def _joined(names: str | list[str]) -> str:
-    """Several effects in one word; those of a verdict are that already."""
+    """Several effects in one word; those of a verdict are joined already."""
     return names if isinstance(names, str) else "+".join(names)
 
 
@@ -55,7 +55,7 @@ def same(one: dict, other: dict) -> bool:
         one[key] == other[key]
         if key != "alternatives"
         else sorted(map(_joined, one[key])) == sorted(map(_joined, other[key]))
-        for key in TOLD
+        for key in REPORTED
     )
 
 
@@ -81,9 +81,9 @@ def main() -> int:
         one, old = kept[number], before.get(number)
         was = f"  before {old['seconds']:6.1f} s" if old else ""
         if old and not same(one, old):
-            was += f": {told(old)}"
+            was += f": {in_words(old)}"
         hidden = "+".join(one["hidden"]) or "nothing"
-        print(f"{number:4} {one['seconds']:6.1f} s{was}  {hidden}: {told(one)}", flush=True)
+        print(f"{number:4} {one['seconds']:6.1f} s{was}  {hidden}: {in_words(one)}", flush=True)
     return _summary([kept[number] for number in numbers], before)
 
 

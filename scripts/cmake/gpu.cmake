@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
 # The kernel of the lanes for GPUs: an object made by nvcc, of an installed CUDA toolkit or of the wheels of
-# requirements-gpu.txt in .venv. Not by CMake's own CUDA, which wants a whole toolkit.
+# requirements-gpu.txt in .venv. Not by CMake's own CUDA, which needs a whole toolkit.
 set(SEPARATRIX_GPU_ARCHITECTURES "80;90" CACHE STRING "Compute capabilities that the kernel for GPUs is made for")
 
 file(GLOB wheels "${PROJECT_SOURCE_DIR}/.venv/lib/python3*/site-packages/nvidia/cu13")

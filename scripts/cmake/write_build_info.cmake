@@ -6,7 +6,7 @@ cmake_minimum_required(VERSION 3.25)
 execute_process(
   COMMAND git -C "${SOURCE_DIR}" describe --always --dirty --abbrev=12
   RESULT_VARIABLE status OUTPUT_VARIABLE COMMIT ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
-# Outside a repository the archive says what it was made from, where git has filled it in.
+# Outside a repository the archive names its commit, where git has filled it in.
 if(NOT status EQUAL 0 OR COMMIT STREQUAL "")
   set(COMMIT "unknown")
   if(EXISTS "${SOURCE_DIR}/.git_archival.txt")

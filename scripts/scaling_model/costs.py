@@ -20,7 +20,7 @@ def with_spread(costs: np.ndarray, spread: float) -> np.ndarray:
 
 
 def stretched(costs: np.ndarray, count: int) -> np.ndarray:
-    """A map of `count` tiles with the measured costs in their places: what is dear together stays so."""
+    """Costs of a map of `count` tiles in the order of the measured ones: costly tiles stay neighbours."""
     return costs[(np.arange(count) * len(costs)) // count]
 
 

@@ -12,7 +12,7 @@ from runs import SOURCE, Program
 CASE = SOURCE / "examples" / "basin_coulomb.toml"
 RANKS = 2
 BYTES_PER_POINT = 46
-"""Of the working file, as docs/file-format.md says."""
+"""Of the working file, see docs/file-format.md."""
 WORK_SECONDS = 2.0
 USUAL_TILE = 32
 COLUMNS = 4096

@@ -81,7 +81,7 @@ def read(text: str, points: int) -> Finish:
     packed = re.search(r"^checked and packed in (.*), (.*) of it by rank 0 alone$", text, re.MULTILINE)
     whole = re.search(r"^wrote .* in ([^/]*)$", text, re.MULTILINE)
     if packed is None or whole is None:
-        raise RuntimeError(f"the map did not say how long it took: {text}")
+        raise RuntimeError(f"the map did not report its durations: {text}")
     return Finish(points, seconds_of(whole[1]), seconds_of(packed[1]), seconds_of(packed[2]))
 
 

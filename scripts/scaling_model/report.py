@@ -202,9 +202,9 @@ def bar_table(results: Results) -> str:
     met = {True: "met", False: "**not met**"}
     simulated, found = results.simulated, results.memory
     two = gain(results, 2, lambda run: run.wall)
-    place = simulation.RANKS.index(simulation.MANY_RANKS)
+    index = simulation.RANKS.index(simulation.MANY_RANKS)
     finish = results.packing.middle(-1, "share")
-    many = simulated.by_ranks[simulation.BAR_SPREAD][place]
+    many = simulated.by_ranks[simulation.BAR_SPREAD][index]
     groups = [
         f"{min(p.bytes for p in peaks) / MIB:.1f} to {max(p.bytes for p in peaks) / MIB:.1f} MiB ({how})"
         for how, peaks in (("whole runs", found.whole), ("stopped early", found.started))
@@ -232,7 +232,7 @@ def bar_table(results: Results) -> str:
             f"the final file, of a run on {packing.RANKS} ranks",
             f"<= {100 * BAR_FINISH:.0f} %",
             f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points; "
-            f"simulated {number(simulation.MANY_RANKS)} ranks with it: {percent(simulated.with_file[place])}",
+            f"simulated {number(simulation.MANY_RANKS)} ranks with it: {percent(simulated.with_file[index])}",
             met[finish <= BAR_FINISH] if finish <= BAR_FINISH or not busy(results) else "machine busy",
         ],
         [

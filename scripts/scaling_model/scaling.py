@@ -82,7 +82,7 @@ class Results:
         return sorted(self.strong[1], key=lambda run: run.tile_phase)[(len(self.strong[1]) - 1) // 2]
 
 
-def say(text: str) -> None:
+def progress(text: str) -> None:
     """One line of progress."""
     print(f"scaling: {text}", flush=True)
 
@@ -108,7 +108,7 @@ def measure_here(program: Program, results: Results) -> None:
         if number > 0 and (time.perf_counter() - began) * (number + 1) / number > MOST_SECONDS:
             break
         for ranks in results.ranks:
-            say(f"repetition {number + 1} of {sizes.repetitions}, {ranks} ranks")
+            progress(f"repetition {number + 1} of {sizes.repetitions}, {ranks} ranks")
             strong = program.uneven(ranks, sizes.ratios, results.v0_count)
             results.strong.setdefault(ranks, []).append(strong)
             # the map on two ranks is already there
@@ -118,7 +118,7 @@ def measure_here(program: Program, results: Results) -> None:
 
 
 def predict(model: Model, ranks: int, per_node: int, costs: np.ndarray, polls: int) -> Replay:
-    """What the model says about these tiles on this machine."""
+    """Prediction of the model for these tiles on this machine."""
     found = model.run(setting(ranks, per_node, polls_per_tile=polls), costs)
     return Replay(found.tiles, found.questions, found.makespan, 1 - found.efficiency)
 
@@ -128,12 +128,12 @@ def check_model(program: Program, model: Model, results: Results) -> None:
     costs = stretched(results.base.costs, 4 * 84)
     costs *= results.sizes.replay_seconds / costs.sum()
     for ranks, per_node in ((2, 1), (4, 1), (4, 2), (8, 2), (8, 4), (16, 4)):
-        say(f"the scheduler on {ranks} sleeping ranks, {per_node} to a node")
+        progress(f"the scheduler on {ranks} sleeping ranks, {per_node} to a node")
         found = program.replay(ranks, per_node, costs, REPLAY_POLLS)
         expected = predict(model, ranks, per_node, costs, REPLAY_POLLS)
         results.checks.append(Check("scheduler", ranks, per_node, found, expected))
     for ranks, per_node in ((2, 1), (4, 2), (8, 4)):
-        say(f"the program on {ranks} ranks, {per_node} to a node")
+        progress(f"the program on {ranks} ranks, {per_node} to a node")
         run = program.uneven(ranks, results.sizes.ratios, 2 * TILE, "--ranks-per-node", per_node)
         found = Replay(run.tiles, np.zeros(0, int), run.tile_phase, run.idle)
         expected = predict(model, ranks, per_node, run.costs, POINTS_PER_TILE)
@@ -159,13 +159,13 @@ def main() -> None:
         measure_here(program, results)
         model = Model(folder)
         check_model(program, model, results)
-        say("the final file")
+        progress("the final file")
         results.packing = time_files(program, results.sizes.packed, results.sizes.repetitions)
-        say("simulating up to 100 000 ranks")
+        progress("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
         results.simulated = Simulation(model, base.costs, mean, results.packing).everything(BAR)
-        say("memory")
+        progress("memory")
         sizes = results.sizes
         results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)
         results.load = before, os.getloadavg()[0]
@@ -174,7 +174,7 @@ def main() -> None:
     text = report.page(results, options.quick)
     options.output.write_text(text)
     print(text)
-    say(f"wrote {options.output}")
+    progress(f"wrote {options.output}")
 
 
 if __name__ == "__main__":

@@ -141,7 +141,7 @@ static void ask(struct model *m, double time, int rank) {
   push(m, time + m->setting->latency, ARRIVE, m->node_of[rank]);
 }
 
-/* A rank wants its next tile. */
+/* A rank asks for its next tile. */
 static void rank_free(struct model *m, double time, int rank) {
   int number = m->node_of[rank];
   struct node *node = &m->nodes[number];

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the model says about ranks that this machine lacks."""
+"""Predictions of the model for more ranks than this machine has."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ TILES_PER_RANK = (3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200)
 MANY_RANKS = 10_000
 BAR_SPREAD = 100
 USUAL = 100
-"""Tiles per rank where nothing else is said."""
+"""Tiles per rank by default."""
 CANDIDATES = (200, 150, 100, 80, 70, 60, 50, 45, 40, 35, 30, 25, 20, 15, 10, 5)
 TRAJECTORIES_PER_TILE = 1024
 TILE_SECONDS = (0.01, 0.1, 1.0, 10.0)

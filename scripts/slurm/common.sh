@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
 #
-# What the batch scripts of this folder share; docs/batch.md tells how to use them.
+# What the batch scripts of this folder share; docs/batch.md describes their use.
 
 separatrix=${SEPARATRIX:-$SEPARATRIX_ROOT/build/bin/separatrix}
 

@@ -32,7 +32,7 @@ module branch
   integer, parameter :: many_steps = 6
   !> Smallest step, as a share of the largest.
   real(wp), parameter :: smallest_step = 1e-7_wp
-  !> After so many tries of a step it is taken as near as rounding lets it: equations that tell little are no end.
+  !> After so many tries a step is accepted to within rounding: ill-conditioned equations do not end a branch.
   integer, parameter :: few_tries = 3
   !> The parameter has not turned back by less than this share of its size.
   real(wp), parameter :: no_turn = 1e-11_wp
@@ -46,8 +46,8 @@ module branch
 
 contains
 
-  !> Follows the orbits through `seed`, which is corrected, both ways. Points come in order from one end to the other. `watch` is
-  !> told of every point.
+  !> Follows the orbits through `seed`, which is corrected, both ways. Points come in order from one end to the other. Every point
+  !> is reported to `watch`.
   subroutine trace_branch(family, plan, seed, found, watch)
     type(family_t), intent(in) :: family
     type(plan_t), intent(in) :: plan
@@ -67,8 +67,8 @@ contains
     call mark_turns(family%parameter_size, found%points)
   end subroutine trace_branch
 
-  !> Where the parameter turns something is, even if it could not be located: such a point is labelled so. Two steps each way
-  !> tell a turn from rounding.
+  !> Where the parameter turns there is a bifurcation, even if it could not be located; such a point is labelled accordingly. Two
+  !> steps each way distinguish a turn from rounding.
   pure subroutine mark_turns(parameter_size, points)
     real(wp), intent(in) :: parameter_size
     type(point_t), intent(inout) :: points(:)
@@ -165,7 +165,7 @@ contains
     end if
     call rotate_to_section(next%machines, next%now%orbit, turned)
     if (.not. is_admissible(next%machines, next%now%orbit)) then
-      ! A turn of events that no margin foretells, or one that is nearer than the look along the flights.
+      ! A change of the events that no margin predicts, or one that is nearer than the samples along the flights.
       trace%step = length/4
       ! What was located on a step that is taken anew is found once more.
       points = points(:known)
@@ -214,7 +214,7 @@ contains
     end associate
   end function halves_differ
 
-  !> Whether the halves of an orbit may have changed positions: in between it was one of half the period.
+  !> Whether the halves of an orbit may have been exchanged: in between it was one of half the period.
   pure logical function swaps_halves(trace, next)
     type(trace_t), intent(in) :: trace, next
     swaps_halves = modulo(trace%now%orbit%periods, 2) == 0

@@ -53,7 +53,7 @@ contains
 
   !> The doubling (`times` 2) or branch point (1) that an orbit ended in, of those of half its period, or of the same, nearby, with
   !> that section point in front that is nearest to the orbit's: twins of a symmetric machine double at one value of the parameter.
-  !> `doubles`: it is known that it is a doubling; else a multiplier +1 must tell.
+  !> `doubles`: it is known to be a doubling; else a multiplier +1 must decide.
   pure subroutine nearest_located(family, branches, ended, times, doubles, located, found)
     type(family_t), intent(in) :: family
     type(branch_t), intent(in) :: branches(:)

@@ -73,7 +73,7 @@ contains
     end do
   end subroutine first_passed
 
-  !> The margin that falls below zero first, as far as a straight line tells.
+  !> The margin that falls below zero first, by linear interpolation.
   pure subroutine most_negative(before, after, candidate)
     type(margins_t), intent(in) :: before, after
     type(margin_t), intent(out) :: candidate
@@ -215,7 +215,7 @@ contains
 
   end subroutine note_bifurcations
 
-  !> Whether a multiplier is where the label says; near a graze its rounding is large.
+  !> Whether a multiplier is where the label requires it; near a graze its rounding is large.
   pure logical function is_genuine(label, orbit) result(genuine)
     integer, intent(in) :: label
     type(orbit_t), intent(in) :: orbit
@@ -231,7 +231,7 @@ contains
     end select
   end function is_genuine
 
-  !> Label of the crossed_event where a margin is zero.
+  !> Label of the event at which a margin is zero.
   pure integer function label_of_margin(margin) result(label)
     type(margin_t), intent(in) :: margin
     select case (margin%kind)
@@ -320,7 +320,7 @@ contains
     end if
     ok = any(abs(along) > 0)
     if (.not. ok) return
-    ! What goes with the third power of the length of a slip is resolved by its equations where that is not too short.
+    ! What grows with the cube of the length of a slip is resolved by its equations if the slip is not too short.
     if (has_slip_in_stick(beyond%now%orbit)) along = slip_room*along
     call enter_apart(family, at, along, no_passage, beyond, ok)
     if (ok) beyond%step = 0.1_wp*step
@@ -360,12 +360,12 @@ contains
         beyond_step = max(look, 0.1_wp*step)
         found = .true.
         resolved = .not. all(fits)
-        ! So near the point both sides may be on it within rounding: a longer look tells them apart.
+        ! So near the point both sides may be on it within rounding: a longer step distinguishes them.
         if (.not. all(fits) .and. all(there%margins%list%value > no_passage)) exit
       end if
       look = 10*look
     end do
-    ! Where both sides seem to be on it at every look nothing tells which the branch goes on to.
+    ! Where both sides seem to be on it at every step, nothing determines to which of them the branch goes on.
     ok = resolved
     if (.not. ok) return
     beyond = there

@@ -2,8 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The branches of periodic orbits over a range of a parameter: orbits are searched at several values, each that lies on no branch
-!> yet is followed, and so is what bifurcates where a period doubles. What is found depends on the seeds; nothing says that it is
-!> all.
+!> yet is followed, and so is what bifurcates where a period doubles. The result depends on the seeds and need not be complete.
 module branch_search
   use body_family, only: family_t
   use branch, only: trace_branch
@@ -57,7 +56,7 @@ module branch_search
     !> Rows that give position and speed of what is watched from a section point; whether the section is a time of the drive.
     real(wp), allocatable :: watch(:, :)
     logical :: has_clock = .true.
-    !> Who is told how far the search is, if any.
+    !> Receives the progress of the search, if any.
     class(search_watch_t), pointer :: watcher => null()
   end type search_t
 
@@ -193,7 +192,7 @@ contains
       return
     end if
     search%branches = [search%branches, found]
-    ! Where none of the seeds does what the parameter says, an orbit further on may.
+    ! Where none of the seeds depends on the parameter, an orbit further on may.
     search%depends = search%depends .or. any(found%points%label == label_gr .or. found%points%label == label_gr_fold .or. &
                                              found%points%label == label_pd .or. found%points%label == label_sn)
     call note_passages(search, found)

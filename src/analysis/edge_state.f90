@@ -307,7 +307,7 @@ contains
     end if
   end subroutine advance_one
 
-  !> Of two events at the same position of two sequences the one that tells them apart: chatter, then sticking, then an impact.
+  !> Of two events at the same index of two sequences the one that distinguishes them: chatter, then sticking, then an impact.
   pure integer function rarer(one, other) result(event)
     integer, intent(in) :: one, other
     event = merge(one, other, rank_of(one) >= rank_of(other))

@@ -44,8 +44,8 @@ module exponents
     real(wp), allocatable :: exponents(:), errors(:)
     !> Power of the time with which the error of the largest falls: 1/2 for chance, up to 1 where the directions turn to and fro.
     real(wp) :: decay = 0.5_wp
-    !> Sum of the exponents, and what it must be from damping, impacts and turning points alone; `has_sum` tells whether the
-    !> machine has such a formula.
+    !> Sum of the exponents, and its value from damping, impacts and turning points alone; `has_sum`: whether the machine has such
+    !> a formula.
     real(wp) :: sum_found = 0, sum_exact = 0
     logical :: has_sum = .false.
     !> The motion comes back to its section points, over and over.
@@ -61,7 +61,7 @@ module exponents
     real(wp) :: memory = 0
     integer(int64) :: impacts = 0
     !> Sections that were used, and the time between two [s]; `known` is false if the motion was given up or met an event
-    !> tangentially, as `reason` says (module `status`).
+    !> tangentially, for the `reason` (module `status`).
     integer :: periods = 0, reason = 0
     real(wp) :: mean_period = 0
     logical :: known = .false.
@@ -308,9 +308,9 @@ contains
     period = 0
   end function period_of_section
 
-  !> What a motion is, by the cycle that it is on, or else by its largest exponent and the 0-1 test `k`, at three standard errors;
-  !> not known where they do not agree, nor where it comes to rest. A neutral one must be so within the errors alone, and they must
-  !> tell it from a cycle all of whose directions contract alike.
+  !> The type of a motion by the cycle that it is on, or else by its largest exponent and the 0-1 test `k`, at three standard
+  !> errors; not known where they disagree, or where it comes to rest. A neutral one must be so within the errors alone, and they
+  !> must distinguish it from a cycle all of whose directions contract alike.
   pure integer function type_of_motion(spectrum, k) result(motion)
     type(spectrum_t), intent(in) :: spectrum
     real(wp), intent(in) :: k

@@ -58,7 +58,7 @@ contains
     if (gathers_in_lanes) gathers_in_lanes = carries_tangents(flow_of(body))
   end function gathers_in_lanes
 
-  !> Lanes for a machine, whatever the case says of lanes: the numbers are the same for any width.
+  !> Lanes for a machine, whatever lanes the case requests: the numbers are the same for any width.
   pure function flow_of(body) result(flow)
     type(one_body_t), intent(in) :: body
     type(lane_flow_t) :: flow

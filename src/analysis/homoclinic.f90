@@ -23,7 +23,7 @@ module homoclinic
   !> Starts at a value where the contact is looked for, and so many times more where none is to arrive.
   integer, parameter :: sure_starts = 32, many = 4
   integer, parameter, public :: starts_that_stay = many*sure_starts
-  !> Near the contact arrivals are rare: further halving would tell where they are too rare to be seen.
+  !> Near the contact arrivals are rare: further halving would show where they are too rare to be seen.
   integer, parameter :: halvings = 10
   !> Where a chaotic transient is to end, it may take so many times longer than what settles at once.
   integer, parameter :: long_wait = 20
@@ -263,7 +263,7 @@ contains
     end do
   end function index_before
 
-  !> The saddle on a branch at a value between its points, as far as straight lines tell.
+  !> The saddle on a branch at a value between its points, by linear interpolation.
   pure function guess_at(line, value) result(y)
     type(point_t), intent(in) :: line(:)
     real(wp), intent(in) :: value

@@ -192,7 +192,7 @@ contains
     end do
   end subroutine next_level
 
-  !> Of two neighbours the one that is missing, looked for beside the other. `found` tells whether it is there now.
+  !> Of two neighbours the one that is missing, looked for beside the other. `found`: whether it is there now.
   subroutine retry(machines, body, growth, levels, k, i, found)
     type(neighbourhood_t), intent(in) :: machines
     type(one_body_t), intent(in) :: body

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Of margins that pass zero together the one that says what happens: an impact that is lost, events that change positions,
-!> a stick that is over.
+!> Of margins that pass zero together the one that is the cause: an impact that is lost, events that change their order, a stick
+!> that is over.
 module margin_cause
   use kinds, only: wp
   use motion_state, only: event_release, event_stick
@@ -41,8 +41,8 @@ contains
     number = 0
   end function lost_impact
 
-  !> The number of the order of two events of different joints that change positions, where what the first has just done to
-  !> its own guard seems to be undone after the second: that margin passes zero with it; 0 without.
+  !> The number of the order of two events of different joints that are exchanged, where what the first has just done to its own
+  !> guard seems to be undone after the second: that margin passes zero with it; 0 without.
   pure integer function changed_order(orbit, margins, candidate) result(number)
     type(orbit_t), intent(in) :: orbit
     type(margins_t), intent(in) :: margins

@@ -23,7 +23,7 @@ module margin_passage
   !> With so many impacts in a row no more are put in: they are the beginning of a chatter.
   integer, parameter :: long_run = 10
   !> And with so many, each slower than the one before, the last of this speed in natural sizes: the next would rise no higher than
-  !> rounding lets tell.
+  !> rounding resolves.
   integer, parameter :: least_run = 4
   real(wp), parameter :: hardly_an_impact = 1e-5_wp
   !> Touches up to which a fold is looked for that was not seen before a graze, in natural times.
@@ -76,7 +76,7 @@ contains
       if (ending == no_label) return
     end if
     if (.not. goes_on) then
-      ! Two events that change positions are none, if the motion goes on.
+      ! Two events that change their order are no bifurcation, if the motion goes on.
       if (here(1)%label == no_label) here%label = label_not_known
       ending = here(1)%label
     else if (is_touch(at%now%orbit, passed)) then
@@ -164,11 +164,12 @@ contains
       here = [graze%now]
       call begin_touching(family, graze, gap_beside(graze, touch), longest_touch, beginning)
     end if
-    ! The tangents of the last points say less: they may be beyond the graze by rounding, where touches end before they begin.
+    ! The tangents of the last points are less reliable: they may be beyond the graze by rounding, where touches end before they
+    ! begin.
     before = nint(sign(1.0_wp, here(1)%orbit%parameter - last))
     here%label = label_between(-beginning%at_graze, after, before == after)
     if (beginning%at_graze == 0 .or. -beginning%at_graze == before) return
-    ! The fold that tells one direction from the other.
+    ! The fold that distinguishes one direction from the other.
     if (size(beginning%folds) > 0 .and. beginning%all_found) then
       here = [beginning%folds(1), here]
     else

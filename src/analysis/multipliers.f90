@@ -16,8 +16,8 @@ module multipliers
   !> Rounding of the entries of a map's derivative, as a share of its norm; what an eigenvalue must be known to, absolutely or as a
   !> share.
   real(wp), parameter :: rounding = 100*epsilon(1.0_wp), known_to = 1e-6_wp
-  !> A multiplier this near to +1 cannot be told from it: where it is 1, as on a family of orbits and in a fold, Newton's method
-  !> leaves the root of rounding in the orbit, and the curvature of the map times that in the multiplier.
+  !> A multiplier this near to +1 is indistinguishable from it: where it is 1, as on a family of orbits and in a fold, Newton's
+  !> method leaves the root of rounding in the orbit, and the curvature of the map times that in the multiplier.
   real(wp), parameter, public :: nearly_neutral = 1e-6_wp
 
 contains
@@ -124,8 +124,8 @@ contains
     call leave_out_hidden(turned(2:, 2:), scatter, 1, values(2:))
   end function multipliers_beside_graze
 
-  !> Whether one of the multipliers cannot be told from +1: the orbit is not isolated, or only just. Those that are not known
-  !> tell nothing.
+  !> Whether one of the multipliers is indistinguishable from +1: the orbit is not isolated, or only just. Unknown multipliers do
+  !> not count.
   pure logical function is_neutral(values)
     complex(wp), intent(in) :: values(:)
     is_neutral = any(abs(values - 1) < nearly_neutral)

@@ -213,7 +213,7 @@ contains
     last_a = slope(2)
     early = 0
     if (k > 0) then
-      ! A body that is let go of gathers speed from nothing, whatever rounding says.
+      ! A released body gathers speed from zero, whatever the rounding of its acceleration.
       if (orbit%events(k)%kind == event_release) last_a = 0
       ! One that hardly rebounds may be back before the first look.
       if (is_impact(orbit%events(k)%kind) .and. abs(start(2)) < slow_rebound*machine%size_of(2)) early = early_looks

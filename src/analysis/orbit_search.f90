@@ -43,8 +43,8 @@ module orbit_search
 
 contains
 
-  !> Adds to `found` the orbits that starts (columns x [m], v [m/s]) lead to: of `longest` drive periods at most where the
-  !> motion settles, of up to two elsewhere. `watch` is told of every start, twice.
+  !> Adds to `found` the orbits that starts (columns x [m], v [m/s]) lead to: of `longest` drive periods at most where the motion
+  !> settles, of up to two elsewhere. Every start is reported to `watch` twice.
   subroutine find_orbits(family, machines, value, starts, longest, found, watch)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(inout) :: machines

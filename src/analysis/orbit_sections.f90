@@ -15,8 +15,8 @@ module orbit_sections
 
 contains
 
-  !> Where an instant has passed the section, the orbit is begun anew so that all instants lie within its period. `turned` tells
-  !> whether it was.
+  !> Where an instant has passed the section, the orbit is begun anew so that all instants lie within its period. `turned`: whether
+  !> it was.
   pure subroutine rotate_to_section(machines, orbit, turned)
     type(neighbourhood_t), intent(in) :: machines
     type(orbit_t), intent(inout) :: orbit

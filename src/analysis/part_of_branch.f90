@@ -14,7 +14,7 @@ module part_of_branch
 
   !> How far a branch is from the chord of a step, as a share of it: more than the turn of a step allows; and at least.
   real(wp), parameter :: off_chord = 0.05_wp, rounding = 1e-7_wp
-  !> What tells orbits of a parameter apart.
+  !> Number of features that distinguish the orbits at one value of the parameter.
   integer, parameter :: features = 5
 
 contains
@@ -60,7 +60,7 @@ contains
   end subroutine find_chord
 
   !> The parameter, the extremes, and sums of the states before the events: none depends on where the orbit begins, and in a graze
-  !> none jumps but that of the positions. In natural sizes.
+  !> only that of the positions jumps. In natural sizes.
   pure function features_of(point, family, mirror) result(position)
     type(point_t), intent(in) :: point
     type(family_t), intent(in) :: family
@@ -81,8 +81,8 @@ contains
     end associate
   end function features_of
 
-  !> Sum of the states but the first before the events, in natural sizes: a number that tells orbits apart, does not depend on where
-  !> they begin, and changes its sign for the mirror image of a body's orbit.
+  !> Sum of the states but the first before the events, in natural sizes: a number that distinguishes orbits, does not depend on
+  !> where they begin, and changes its sign for the mirror image of a body's orbit.
   pure real(wp) function event_speeds(orbit, sizes) result(total)
     type(orbit_t), intent(in) :: orbit
     real(wp), intent(in) :: sizes(2)

@@ -26,7 +26,7 @@ module periodic_orbit
   integer, parameter :: most_newton = 12
   !> Newton's method has converged when a step, in natural sizes, is below this.
   real(wp), parameter :: converged_step = 1e-11_wp
-  !> Where the equations hold to this, steps up to the other length are of rounding alone, as the equations tell no more.
+  !> Where the equations hold to this, steps up to the other length are of rounding alone, as the equations resolve no more.
   real(wp), parameter :: rounding_of_equations = 5e-14_wp, settled_by_rounding = 1e-9_wp
   !> Newton's steps with the same derivatives by the parameter.
   integer, parameter :: newton_between = 4

@@ -21,7 +21,7 @@ module saddle_search
   integer, parameter :: most_newton = 30
   !> Of natural sizes: Newton's method is not to go further at once, has converged.
   real(wp), parameter :: longest_step = 0.3_wp, converged = 1e-12_wp
-  !> A multiplier nearer to the unit circle than this does not tell a saddle.
+  !> A multiplier nearer to the unit circle than this does not identify a saddle.
   real(wp), parameter :: neutral = 1e-6_wp
   !> Rate of change in natural sizes below which nothing moves.
   real(wp), parameter :: all_but_at_rest = 1e-5_wp
@@ -196,7 +196,7 @@ contains
     if (moves) moves = norm2(machine%slope(mode, 0.0_wp, point)/machine%size_of)*machine%size_of_time() > all_but_at_rest
   end function moves
 
-  !> Adds an orbit unless it is among `saddles`; `number` is its position there.
+  !> Adds an orbit unless it is among `saddles`; `number` is its index there.
   pure subroutine add_saddle(machine, saddle, saddles, number)
     class(hybrid_t), intent(in) :: machine
     type(saddle_t), intent(in) :: saddle

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Who is told how far a search for branches is.
+!> Receives the progress of a search for branches.
 module search_watch
   implicit none
   private

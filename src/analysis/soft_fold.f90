@@ -2,8 +2,8 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Folds close behind grazes of soft contacts. A touch changes what comes after it by a power 3/2 of its depth where the force
-!> begins at nothing, so that the branch goes on as it came, but may turn as little as 1e-8 of the parameter behind the graze; it
-!> turns in the graze itself only where the force begins with a jump. Orbits that touch for ever shorter times tell which it is.
+!> begins at zero, so that the branch goes on as it came, but may turn as little as 1e-8 of the parameter behind the graze; it
+!> turns in the graze itself only where the force begins with a jump. Orbits with ever shorter touches show which it is.
 module soft_fold
   use body_family, only: family_t
   use branch_passage, only: change_all
@@ -21,8 +21,8 @@ module soft_fold
   !> Touches that are looked at, in natural times: each a tenth of the one before.
   real(wp), parameter :: shortest = 1e-6_wp
   integer, parameter :: most_looks = 6
-  !> What the rise is at the graze itself is known where the straight line through the last two looks says no less than this share
-  !> of the last.
+  !> The rise at the graze itself is known where the straight line through the last two looks gives no less than this share of the
+  !> last.
   real(wp), parameter :: least_share = 0.2_wp
   integer, parameter :: most_secants = 40
   !> Nearness of a multiplier to 1 in a fold.

@@ -35,8 +35,8 @@ module structure_exponents
 
 contains
 
-  !> Exponents of the motion of a machine, of whatever kind, that starts as `start` says (see `start_section`): those of module
-  !> `exponents` for one body.
+  !> Exponents of the motion of a machine, of whatever kind, from `start` (see `start_section`): those of module `exponents` for
+  !> one body.
   subroutine exponents_of_machine(machines, start, transient, sections, spectrum, series)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: start(:)
@@ -146,8 +146,8 @@ contains
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
 
-  !> Whether a motion comes to rest: the paces at its sections fall from one half of them to the other as the largest exponent says,
-  !> by `decay` as a logarithm, while those of a motion that comes to a cycle stay.
+  !> Whether a motion comes to rest: the paces at its sections fall from one half of them to the other as the largest exponent
+  !> predicts, by `decay` as a logarithm, while those of a motion that comes to a cycle stay.
   pure logical function fades_away(pace, decay)
     real(wp), intent(in) :: pace(:), decay
     real(wp) :: fall
@@ -155,7 +155,7 @@ contains
     half = size(pace)/2
     fall = mean_log(pace(:half)) - mean_log(pace(half + 1:))
     fades_away = fall > decay/2 .or. (fall > 1 .and. pace(size(pace)) < still)
-    ! A direction that is lost says nothing of the pace.
+    ! A direction that is lost does not bound the pace.
     fades_away = fades_away .and. decay > 0 .and. decay < sqrt(huge(1.0_wp))
   end function fades_away
 
@@ -289,7 +289,7 @@ contains
         end do
         if (unit == 0) growth(k) = norm2(frame(:, k))
         if (norm2(frame(:, k)) > 1e-12_wp*rest) exit
-        ! A direction that is lost: any other goes on in its position.
+        ! A direction that is lost: any other replaces it.
         unit = unit + 1
         frame(:, k) = 0
         frame(min(unit, size(growth)), k) = 1

@@ -195,7 +195,7 @@ contains
           if (k > 0 .and. rate >= 0) then
             if (orbit%events(k)%joint /= probe%joint) call note(machine, probe, k, t, value, margins)
           end if
-          ! A joint that is let go of gathers speed from nothing, whatever rounding says.
+          ! A released joint gathers speed from zero, whatever the rounding of its acceleration.
           if (k > 0 .and. probe%guard == slide_ends) then
             if (orbit%events(k)%joint == probe%joint .and. orbit%events(k)%kind == event_release) rate = 0
           end if

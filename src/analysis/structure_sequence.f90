@@ -170,8 +170,8 @@ contains
     end associate
   end function contact
 
-  !> Puts an impact or a touch in after the event `at`. Where friction between the same bodies turns round at that instant an impact
-  !> comes in its position: it turns the slide round itself.
+  !> Puts an impact or a touch in after the event `at`. Where friction between the same bodies turns round at that instant an
+  !> impact replaces it: it turns the slide round itself.
   pure subroutine put_contact_in(machine, margin, at, chain)
     type(structure_t), intent(in) :: machine
     type(margin_t), intent(in) :: margin
@@ -216,7 +216,7 @@ contains
     if (machine%frame%moving%machine%joints(j)%kind == joint_contact) then
       i = findloc(chain(k)%phase /= as_it_is, .true., 1)
       if (i > 0) then
-        ! What else the impact has set free stays; friction between the same bodies turns round in its position.
+        ! What else the impact has set free stays; friction between the same bodies turns round instead of it.
         known = known .and. count(chain(k)%phase /= as_it_is) == 1 .and. abs(chain(k)%phase(i)) == 1 .and. &
                 machine%frame%moving%machine%joints(i)%kind == joint_friction .and. are_parallel(machine, i, j)
         chain(k)%event = event_t(kind=event_turning_point, side=-chain(k)%phase(i), joint=i, time=chain(k)%event%time, &

@@ -27,7 +27,7 @@ module aperiodic
   integer, parameter :: box_periods = 512, batches = 16
   !> Drive periods after which a transient is no longer expected to end, on closed forms and where flights are marched.
   integer, parameter :: lasting_exact = 16384, lasting = 4096
-  !> Distance of the neighbour, in units of the motion's size, and the smallest that is told from rounding.
+  !> Distance of the neighbour, in units of the motion's size, and the smallest that is distinguished from rounding.
   real(wp), parameter :: neighbour = 1e-8_wp, rounding = 1e-15_wp
   !> The mean drift counts as positive if it is so many of its standard errors.
   real(wp), parameter :: errors_apart = 3
@@ -40,8 +40,8 @@ module aperiodic
 
 contains
 
-  !> Watches a motion of half range `amplitude` [m] over many drive periods. `known` if it was converged by the catalogue
-  !> meanwhile, `ok` unless it had to be given up; else `found` describes it, and `returns` tells of its returns.
+  !> Watches a motion of the given `amplitude` [m] over many drive periods. `known` if it converged to an attractor of the
+  !> catalogue meanwhile, `ok` unless it had to be given up; else `found` describes it, and `returns` its returns.
   pure subroutine watch_long(moving, catalogue, amplitude, section, found, returns, known, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -81,10 +81,10 @@ contains
     end do
     found%features = features_over(moving, tally, real(box_periods, wp))
     found%features%word = 0
-    call judge_drift(drift, found)
+    call assess_drift(drift, found)
   end subroutine watch_long
 
-  !> Whether a motion of half range `amplitude` [m] that `watch_long` did not know, now at `section`, is one of a family of cycles
+  !> Whether a motion of the given `amplitude` [m] that `watch_long` did not know, now at `section`, is one of a family of cycles
   !> of at most `max_period` drive periods: it comes back to rounding, and has a multiplier +1. Beside a fold of cycles it does not
   !> come back so well.
   pure subroutine find_family(moving, section, amplitude, max_period, found)
@@ -117,10 +117,10 @@ contains
     found%duration = period*moving%machine%period
   end subroutine find_family
 
-  !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the catalogue
-  !> captures the motion, `ok` unless it had to be given up; it ends early where it comes back exactly, as `returns` tells.
-  !> `forgets` if it came to a completed chatter that leaves one motion alone, whatever came before: then nothing drifts apart for
-  !> good.
+  !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the motion converges
+  !> to an attractor of the catalogue, `ok` unless it had to be given up; it ends early where it comes back exactly, as `returns`
+  !> records. `forgets` if it came to a completed chatter, after which there is one motion whatever came before: then nothing
+  !> drifts apart for good.
   pure subroutine outlast(moving, catalogue, section, returns, known, forgets, ok)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -183,7 +183,7 @@ contains
     reached = point_near(reached, now, moving%machine%turn)
     direction(:n) = (reached(:n) - now(:n))/scale(:n)
     distance = norm2(direction(:n))
-    ! A neighbour that had to be given up tells nothing.
+    ! A neighbour that had to be given up gives no information.
     if (reason /= 0 .or. .not. distance <= huge(distance)) then
       direction = 0
       drift = 0
@@ -198,7 +198,7 @@ contains
   end subroutine follow_neighbour
 
   !> Chaotic if the mean drift is surely positive.
-  pure subroutine judge_drift(drift, found)
+  pure subroutine assess_drift(drift, found)
     real(wp), intent(in) :: drift(:)
     type(attractor_t), intent(inout) :: found
     real(wp) :: means(batches), mean, error
@@ -209,7 +209,7 @@ contains
     error = sqrt(sum((means - mean)**2)/(batches*(batches - 1)))
     found%multiplier = exponential(mean)
     found%kind = merge(kind_chaotic, kind_not_known, mean > max(errors_apart*error, slowest_drift))
-  end subroutine judge_drift
+  end subroutine assess_drift
 
   !> Adds what `watch_long` found to a catalogue. One of the same regime whose box meets it is widened instead; cycles of a family
   !> are one entry.

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What an attractor is here, and whether a state on the stroboscopic section has been converged by one.
+!> What an attractor is here, and whether a state on the stroboscopic section has converged to one.
 module attractors
   use circle, only: nearest_turn, point_near
   use kinds, only: int64, wp
@@ -140,8 +140,8 @@ contains
   end subroutine wrap_range
 
   !> Index of the attractor whose verified neighbourhood holds a point on the section; 0 if none.
-  !> `slipped` tells whether the body moved during the last whole period. With `by_event` the point is on the section of a
-  !> machine without a clock, and only cycles known there are looked at; else only the others.
+  !> `slipped`: whether the body moved during the last whole period. With `by_event` the point is on the section of a machine
+  !> without a clock, and only cycles known there are looked at; else only the others.
   pure integer function find_capture(catalogue, point, slipped, by_event) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
@@ -191,9 +191,8 @@ contains
     end do
   end function squared_distance
 
-  !> Index of the motion that is not periodic whose box of section points holds `point` and in which the events of `regime`
-  !> occur, first those of the same regime, or of two bodies that go on moving as one, or that has been reached at any position;
-  !> 0 if none.
+  !> Index of the motion that is not periodic whose box of section points holds `point` and in which the events of `regime` occur,
+  !> first those of the same regime, or of two bodies that go on moving as one, or that exists at any position; 0 if none.
   pure integer function find_box(catalogue, point, regime) result(found)
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
@@ -232,7 +231,7 @@ contains
     in_box = all(near(:n) >= attractor%points(:n, 1) - margin(:n) .and. near(:n) <= attractor%points(:n, 2) + margin(:n))
   end function in_box
 
-  !> Whether a stretch of a motion of regime `whole` may be of regime `part`: without some of its events.
+  !> Whether a segment of a motion of regime `whole` may be of regime `part`: without some of its events.
   pure logical function occurs_in(part, whole)
     integer, intent(in) :: part, whole
     select case (whole)
@@ -254,7 +253,7 @@ contains
     if (allocated(attractor%points)) packed_length = packed_length + packed_per_point*size(attractor%points, 2)
   end function packed_length
 
-  !> An attractor as plain numbers, to be sent between ranks; the first tells how many.
+  !> An attractor as plain numbers, to be sent between ranks; the first is their count.
   pure function pack_attractor(attractor) result(packed)
     type(attractor_t), intent(in) :: attractor
     real(wp) :: packed(packed_length(attractor))

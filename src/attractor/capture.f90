@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Whether a motion under way has been converged by an attractor of a catalogue.
+!> Whether a motion under way has converged to an attractor of a catalogue.
 module capture
   use attractors, only: attractor_t, find_capture, most_coordinates, squared_distance
   use kinds, only: wp
@@ -17,7 +17,7 @@ module capture
 
 contains
 
-  !> Index of the attractor that has converged the motion at the end of a drive period, 0 if none. `slipped` tells whether the body
+  !> Index of the attractor to which the motion has converged at the end of a drive period, 0 if none. `slipped`: whether the body
   !> moved during the last whole period. For the cycles of a machine without a clock a copy goes on to the section.
   pure integer function attractor_reached(moving, catalogue, section, slipped) result(found)
     type(motion_t), intent(in) :: moving

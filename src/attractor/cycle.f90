@@ -100,7 +100,7 @@ contains
       attractor%metric(:, i) = contracting_metric(jacobian)
     end do
     call map_point(moving, attractor%points(:n, 1), attractor%period, image, tally, found, .true., attractor%duration)
-    ! Rounding may put the point and its image on different sides of the matching_point.
+    ! Rounding may put the point and its image on different sides of the matching point.
     if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
     if (moving%by_event) then
       attractor%features = features_over(moving, tally, attractor%duration/moving%machine%period)

@@ -31,7 +31,7 @@ module discover
   !> Relative distance at which a section point counts as a return to an earlier one.
   real(wp), parameter :: return_tolerance = 0.05_wp
 
-  !> What a segment of a motion showed: its regime and half range [m], whether it was converged, given up, or came back exactly.
+  !> What a segment of a motion showed: its regime and amplitude [m], whether it converged, was given up, or came back exactly.
   type :: segment_t
     integer :: regime = 0
     real(wp) :: amplitude = 0
@@ -43,8 +43,8 @@ contains
 
   !> Adds to `catalogue` what `starts` (rows x [m], v [m/s], crank angle [rad]) lead to and it does not yet hold.
   !> Cycles up to `max_period` drive periods are looked for after one, two, four ... durations, those that come back to the bit
-  !> whatever their period. `within_span`: a motion that has come to nothing by the end of the extension is left out; it is not
-  !> watched over the thousands of periods that tell chaos from a long transient.
+  !> whatever their period. `within_span`: a motion that has converged to nothing by the end of the extension is left out; it is
+  !> not watched over the thousands of periods that distinguish chaos from a long transient.
   pure subroutine discover_attractors(moving, span, starts, max_period, catalogue, within_span)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
@@ -237,7 +237,7 @@ contains
     if (ok) ok = found%features%amplitude > 1e-9_wp*max(abs(found%features%x_max), abs(found%features%x_min))
   end subroutine recognise_by_event
 
-  !> Whether a catalogue has an attractor already, found again from a start that was not converged in time.
+  !> Whether a catalogue has an attractor already, found again from a start that did not converge in time.
   pure logical function holds(moving, catalogue, found)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:), found
@@ -250,7 +250,7 @@ contains
     end if
   end function holds
 
-  !> Runs for `patience` [s] unless converged before, or back at a state from which a completed chatter has led to it again.
+  !> Runs for `patience` [s] unless it converges before, or is back at a state from which a completed chatter has led to it again.
   pure subroutine settle(moving, catalogue, patience, section, segment)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)

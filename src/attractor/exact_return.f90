@@ -22,9 +22,9 @@ module exact_return
   !> Distance, in units of the motion's size, at which states of an exact cycle count as the same: rounding may carry it
   !> through neighbouring numbers, several rounds of which come back exactly.
   real(wp), parameter :: same_state = 1e-9_wp
-  !> Largest neighbourhood that is tried. The smallest, after the halvings, is 2e-15, several roundings: where starts so near
-  !> do not stay with the cycle, the motion between two chatters magnifies rounding until another one could follow, and the
-  !> return tells nothing.
+  !> Largest neighbourhood that is tried. The smallest, after the halvings, is 2e-15, several roundings: where starts so near do
+  !> not stay with the cycle, the motion between two chatters magnifies rounding until another one could follow, and the return
+  !> proves nothing.
   real(wp), parameter :: largest_radius = 0.02_wp
   integer, parameter :: most_halvings = 43
   !> A start has merged with the cycle when only this share of its distance is left, or rounding, and a chatter has been completed

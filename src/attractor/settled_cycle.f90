@@ -15,16 +15,15 @@ module settled_cycle
 
   public :: describe_cycle
 
-  !> A stretch of the search may take so many times more than its extension what the motion took, and so many events and steps.
+  !> The search may take, beside the extension, so many times the events and steps of the motion, and so many more of each.
   integer, parameter :: more_times = 2, more_events = 10000, more_steps = 20000
 
 contains
 
-  !> The cycle that the motion of `outcome` has come to by its end, period 0 if none; then the steady values are those of
-  !> the cycle. Not where they are asked for over the window as it is. A cycle that the motion comes to later, or that is longer
-  !> than the motion, is none of its own, so that chaos is not searched for long; nor is one sought over a stretch that takes far
-  !> more events or steps than the motion and its extension. `patience`: span of the case, with its extension; `start`: x [m],
-  !> v [m/s], crank angle [rad].
+  !> The cycle that the motion of `outcome` has come to by its end, period 0 if none; then the steady values are those of the
+  !> cycle. Not where they are asked for over the window as it is. A cycle that the motion comes to later, or that is longer than
+  !> the motion, does not count, so that chaos is not searched for long; nor is one sought with far more events or steps than those
+  !> of the motion and its extension. `patience`: span of the case, with its extension; `start`: x [m], v [m/s], crank angle [rad].
   pure subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: patience, span

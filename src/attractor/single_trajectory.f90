@@ -23,9 +23,9 @@ module single_trajectory
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].
     real(wp) :: duration = 50, window = 12.5_wp
-    !> An uncaptured trajectory goes on up to this multiple of the duration.
+    !> A trajectory that has not converged goes on up to this multiple of the duration.
     real(wp) :: extension = 4
-    !> End at capture, described by the attractor; otherwise run the whole duration.
+    !> End at convergence, described by the attractor; otherwise run the whole duration.
     logical :: stop_when_converged = .true.
     !> The window is to be a whole number of drive periods; see `fit_window`.
     logical :: whole_periods = .false.
@@ -40,7 +40,7 @@ module single_trajectory
     type(features_t) :: features
     !> Of the window at the end of the duration; empty if the trajectory ended before.
     type(features_t) :: window
-    !> From the start to capture [s]; negative if not converged.
+    !> From the start to convergence [s]; negative if not converged.
     real(wp) :: settle_time = -1
     !> State at the end of the duration, or where the trajectory ended.
     real(wp) :: x = 0, v = 0
@@ -103,7 +103,7 @@ contains
     call continue_trajectory(moving, catalogue, span, trajectory, outcome)
   end subroutine run_from_section
 
-  !> Runs a trajectory that has been set off to its end.
+  !> Runs a started trajectory to its end.
   pure subroutine continue_trajectory(moving, catalogue, span, trajectory, outcome, log)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -160,7 +160,7 @@ contains
     call record_end(moving, trajectory, log%sample_interval > 0 .and. trajectory%elapsed >= span%duration, log)
   end subroutine end_record
 
-  !> A body set off from a `start` as `start_section` has it.
+  !> The trajectory of a body from `start` (see `start_section`).
   pure subroutine begin_trajectory(moving, span, start, trajectory)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
@@ -180,7 +180,7 @@ contains
     call set_stop(moving, span, trajectory)
   end subroutine set_off
 
-  !> Moves to the next stop. `slipped` tells whether the body moved on the way.
+  !> Moves to the next stop. `slipped`: whether the body moved on the way.
   pure subroutine go_to_stop(moving, trajectory, slipped, log)
     type(motion_t), intent(in) :: moving
     type(trajectory_state_t), intent(inout) :: trajectory
@@ -204,7 +204,7 @@ contains
     call advance_past_event(moving, trajectory, speed, trajectory%until, trajectory%tally, trajectory%reason)
   end subroutine go_past_event
 
-  !> Sections to come where nothing is due but the question whether the motion has been converged.
+  !> Sections to come where only convergence has to be checked.
   pure integer function sections_ahead(moving, span, trajectory)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span
@@ -223,15 +223,15 @@ contains
     span%window = min(max(1.0_wp, anint(span%window/period)), aint(span%duration/period))*period
   end subroutine fit_window
 
-  !> Whether a trajectory is over as soon as it is converged.
+  !> Whether a trajectory ends as soon as it has converged.
   pure logical function ends_converged(span, trajectory)
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(in) :: trajectory
     ends_converged = span%stop_when_converged .or. trajectory%phase == phase_extension
   end function ends_converged
 
-  !> What is due at a stop, the state being there: has the motion been converged, is a phase over, where to stop next.
-  !> `slipped` tells whether the body moved since the last stop.
+  !> What is due at a stop, the state being there: has the motion converged, is a phase over, where to stop next. `slipped`:
+  !> whether the body moved since the last stop.
   pure subroutine pass_stop(moving, catalogue, span, slipped, trajectory, outcome)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -300,7 +300,7 @@ contains
     end if
   end subroutine note_section
 
-  !> The phase is over, or with `ended` the trajectory is. An uncaptured motion goes on if there is anything to be converged by.
+  !> The phase is over, or with `ended` the trajectory is. A motion that has not converged goes on if there are attractors.
   pure subroutine end_phase(moving, span, can_converge, ended, trajectory, outcome)
     type(motion_t), intent(in) :: moving
     type(span_t), intent(in) :: span

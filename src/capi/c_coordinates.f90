@@ -158,12 +158,12 @@ contains
     if (rows /= 2*machine%n) then
       call fail(error, exit_usage, 'coordinate_count: found '//to_text(rows/2)//', the structure has '//to_text(machine%n))
     else if (runs_on(machine)) then
-      call fail(error, exit_bad_case, 'drive: found a stop that runs on, which no start of a segment says')
+      call fail(error, exit_bad_case, 'drive: found a stop that runs on, which no start of a segment states')
     else if (acts_on_time(machine)) then
       call fail(error, exit_bad_case, 'drive: found impulses, or samples of a controller, at times of their own: segments '// &
                 'have other starts')
     else if (integral_of(machine) > 0) then
-      call fail(error, exit_bad_case, 'drive: found a controller that adds up what it sees, which no start of a segment says')
+      call fail(error, exit_bad_case, 'drive: found a controller that adds up what it sees, which no start of a segment states')
     end if
   end subroutine check_machine
 

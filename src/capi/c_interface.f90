@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The functions of include/separatrix.h, which says what they do, but for those of the other modules of this folder. Nothing
-!> is kept between calls but what a handle holds.
+!> The functions of include/separatrix.h, which documents them, but for those of the other modules of this folder. Between calls
+!> only the contents of handles are kept.
 module c_interface
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
   use build_motion, only: machine_of

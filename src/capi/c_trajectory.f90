@@ -76,8 +76,8 @@ contains
     code = answer(error, message, message_size)
   end function separatrix_trajectory
 
-  !> The machine, flown for `duration` [s] (0: as the case says) with as many samples as asked for (0: as the case says,
-  !> negative: none), and an empty log.
+  !> The machine, flown for `duration` [s] (0: that of the case) with as many samples as asked for (0: those of the case, negative:
+  !> none), and an empty log.
   subroutine prepare(self, chosen, values, start, duration, samples_per_period, prepared, log, error)
     type(model_t), intent(in) :: self
     integer, intent(in) :: chosen(:), samples_per_period
@@ -188,7 +188,7 @@ contains
     if (has_driver(moving)) event(6:7, :kept) = log%event_driver(:, :kept)
   end subroutine put_events
 
-  !> The steady values, the machine and the balance of energy.
+  !> The steady values, the machine and the energy balance.
   subroutine summarise(moving, log, outcome, summary)
     type(motion_t), intent(in) :: moving
     type(log_t), intent(in) :: log

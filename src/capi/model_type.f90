@@ -96,7 +96,7 @@ contains
   end subroutine check_values
 
   !> The laws of the case with another measured force, `force` [N] every `interval` [s]; none of them leaves it as it is.
-  !> Code 64 if the case has no place for it.
+  !> Code 64 if the case has no measured force.
   subroutine laws_with_force(model, interval, force, laws, error)
     type(model_t), intent(in) :: model
     real(wp), intent(in) :: interval, force(:)
@@ -186,7 +186,7 @@ contains
     if (.not. allocated(error)) extended%parameters = list_parameters(extended%the_case%laws)
   end subroutine model_with_effect
 
-  !> Name of a parameter without the place in its list: 'change' of 'change[2]'. Items are given in their order.
+  !> Name of a parameter without its index in a list: 'change' of 'change[2]'. Items are given in their order.
   pure elemental function name_of(key) result(name)
     character(len=*), intent(in) :: key
     character(len=len(key)) :: name

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What a case leaves to a default that changes the physics: such defaults are said, the others are the absence of something.
+!> Defaults of a case that change the physics: they are reported, the others are the absence of something.
 module assumptions
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, find

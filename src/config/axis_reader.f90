@@ -65,7 +65,7 @@ contains
       call enter_table(source, path, found)
       call take_name(source, the_case%laws, path//'.name', .true., new, bounds, found)
       if (.not. found) then
-        ! Without its unit nothing else of the axis can be judged.
+        ! Without its unit nothing else of the axis can be checked.
         call know_all_below(source, path)
         return
       end if

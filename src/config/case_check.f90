@@ -38,8 +38,8 @@ module case_check
 
 contains
 
-  !> Notes every violated condition between values that are good themselves: whatever can be judged, so that all problems of a
-  !> case are told at once.
+  !> Notes every violated condition between values that are good themselves: whatever can be checked, so that all problems of a
+  !> case are reported at once.
   subroutine check_case(source, the_case)
     type(case_source_t), intent(inout) :: source
     type(case_t), intent(in) :: the_case
@@ -234,7 +234,7 @@ contains
     end do
   end subroutine check_bodies_at_start
 
-  !> The axes, with the ranges of the starts that are drawn in the place of the axis that counts them.
+  !> The axes, with the ranges of the starts that are drawn in place of the axis that counts them.
   pure function with_ranges(the_case) result(axes)
     type(case_t), intent(in) :: the_case
     type(axis_t), allocatable :: axes(:)
@@ -296,7 +296,7 @@ contains
     integer :: i
     problem = ''
     if (barriers_are_soft(the_case%laws)) return
-    ! Stops on a driving body: its least and its largest place.
+    ! Stops on a driving body: its least and its largest position.
     driver = 0
     from_driver = ''
     if (the_case%laws(1)%name == 'backlash_pair') then

@@ -20,8 +20,8 @@ module case_overrides
 
 contains
 
-  !> Puts `override`, 'key.path=value' with a value in TOML, on top of the entries. An element of a list goes by its
-  !> place, axis[1].count, or by its name, axis.x0.count.
+  !> Puts `override`, 'key.path=value' with a value in TOML, on top of the entries. An element of a list goes by its index,
+  !> axis[1].count, or by its name, axis.x0.count.
   subroutine apply_override(entries, override, error)
     type(source_entry_t), allocatable, intent(inout) :: entries(:)
     character(len=*), intent(in) :: override
@@ -49,7 +49,7 @@ contains
     call put(entries, key, added, override)
   end subroutine apply_override
 
-  !> The key with the place of an element in the stead of its name.
+  !> The key with the index of an element instead of its name.
   pure function placed(entries, key)
     type(source_entry_t), intent(in) :: entries(:)
     character(len=*), intent(in) :: key
@@ -64,14 +64,14 @@ contains
     end do
   end function placed
 
-  !> Where the place of an element ends in the path of its name, axis[1].name; 0 for every other entry.
+  !> Where the index of an element ends in the path of its name, axis[1].name; 0 for every other entry.
   pure integer function name_end(entry)
     type(toml_entry_t), intent(in) :: entry
     name_end = index(entry%path, '].name', back=.true.)
     if (name_end + 5 /= len(entry%path) .or. .not. allocated(entry%string)) name_end = 0
   end function name_end
 
-  !> The list that a path with a place belongs to.
+  !> The list that a path with an index belongs to.
   pure function list_of(entry)
     type(toml_entry_t), intent(in) :: entry
     character(len=:), allocatable :: list_of
@@ -130,7 +130,7 @@ contains
     end do
   end function elements
 
-  !> Puts the entries of a value 'v' in the place of `key` and of everything below it.
+  !> Puts the entries of a value 'v' in place of `key` and of everything below it.
   subroutine put(entries, key, values, override)
     type(source_entry_t), allocatable, intent(inout) :: entries(:)
     character(len=*), intent(in) :: key, override

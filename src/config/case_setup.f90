@@ -97,8 +97,8 @@ contains
     path = path//'.'//command//'.h5'
   end function output_path
 
-  !> Points of a tile where nobody says how many: about a thousand; where every rank has a GPU, up to a million, as a
-  !> tile is all that a GPU can do at once, but some tiles for every rank.
+  !> Points of a tile where none are given: about a thousand; where every rank has a GPU, up to a million, as a tile is all that a
+  !> GPU can do at once, but some tiles for every rank.
   pure integer function points_of_tile(points, ranks, gpus)
     integer(int64), intent(in) :: points
     integer, intent(in) :: ranks, gpus

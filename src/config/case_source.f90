@@ -36,7 +36,7 @@ module case_source
     !> Paths of the keys that may occur.
     character(len=path_length), allocatable :: known(:)
     type(problem_t), allocatable :: problems(:)
-    !> What its readers decided that it does not say, parted by semicolons.
+    !> What its readers decided that it does not state, separated by semicolons.
     character(len=:), allocatable :: assumed
     !> Reads HDF5 files of structures, where the program can.
     procedure(structure_file_reader), pointer, nopass :: structure_file => null()
@@ -68,7 +68,7 @@ contains
     end do
   end subroutine open_source
 
-  !> Gives keys of older case files their names of today. A key that is there under both is an error.
+  !> Gives keys of older case files their current names. A key that is there under both is an error.
   subroutine rename_old_keys(source)
     type(case_source_t), intent(inout) :: source
     character(len=:), allocatable :: current
@@ -77,7 +77,7 @@ contains
       current = current_key(source%entries(i)%entry%path)
       if (current == source%entries(i)%entry%path) cycle
       if (find(source, current) > 0) then
-        call report(source, source%entries(i)%entry%path, 'found beside '''//current//''', the name of today; allowed one of them')
+        call report(source, source%entries(i)%entry%path, 'found beside '''//current//''', its current name; allowed one of them')
       else
         source%entries(i)%entry%path = current
       end if
@@ -127,7 +127,7 @@ contains
     call move_alloc(longer, list)
   end subroutine append
 
-  !> Accepts every key of a table whose contents cannot be judged.
+  !> Accepts every key of a table whose contents cannot be checked.
   pure subroutine know_all_below(source, path)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path
@@ -137,7 +137,7 @@ contains
     end do
   end subroutine know_all_below
 
-  !> Notes what is assumed where the source says nothing.
+  !> Notes what is assumed where the source has no value.
   pure subroutine assume(source, what)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: what
@@ -216,7 +216,7 @@ contains
     call location_of_key(source, path, location, line)
   end function origin_of
 
-  !> Takes back what is missing below a table; `lacks` tells whether anything was.
+  !> Takes back what is missing below a table; `lacks`: whether anything was.
   subroutine forgive_missing(source, table, lacks)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: table

@@ -26,7 +26,7 @@ module case_type
     real(wp) :: duration = 50, window = 12.5_wp
     !> 'captured' or 'duration'.
     character(len=8) :: stop = 'captured'
-    !> An uncaptured trajectory goes on up to extension*duration.
+    !> A trajectory that has not converged goes on up to extension*duration.
     real(wp) :: extension = 4
     !> Largest |x| (m).
     real(wp) :: domain = 1e6_wp

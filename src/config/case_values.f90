@@ -136,8 +136,8 @@ contains
     if (len(problem) > 0) call report(source, path, problem)
   end subroutine take_real
 
-  !> A list of at least one number; problems are noted under their element. Without default and key, or with something else in
-  !> the place of the list, `values` is empty.
+  !> A list of at least one number; problems are noted under their element. Without default and key, or with something else instead
+  !> of the list, `values` is empty.
   subroutine take_reals(source, path, bounds, values, required)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A measured force on a body of several: record = "FILE.csv" of a [drive.NAME], in the place of its frequency and series. The
-!> record is one period, by the rule of one body: a last sample that is the first once more begins the next.
+!> A measured force on a body of several: record = "FILE.csv" of a [drive.NAME], instead of its frequency and series. The record is
+!> one period, by the rule of one body: a last sample that is the first once more begins the next.
 module drive_record
   use case_source, only: assume, case_source_t, find, know, report
   use case_values, only: take_integer, take_text
@@ -18,7 +18,7 @@ module drive_record
 
   public :: read_record, series_of
 
-  !> Harmonics of a record that says nothing of them; more than this share of the record left is refused then.
+  !> Harmonics of a record for which none are given; more than this share of the record left is refused then.
   integer, parameter :: usual_harmonics = 32, most_harmonics = 256
   real(wp), parameter :: most_left = 0.05_wp
 
@@ -68,7 +68,7 @@ contains
                                           to_text(100*left, 2)//' %)')
     if (left > most_left .and. .not. harmonics_text) then
       call report(source, path//'.record', 'found a record of which '//to_text(usual_harmonics)//' harmonics leave '// &
-                  to_text(nint(100*left))//' %, allowed with the number of harmonics said: '//path//'.harmonics, 1 to '// &
+                  to_text(nint(100*left))//' %, allowed with the number of harmonics given: '//path//'.harmonics, 1 to '// &
                   to_text(most_harmonics))
     end if
     call set_value(choice, 'frequency', [two_pi/(interval*size(force))])

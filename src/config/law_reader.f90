@@ -121,7 +121,7 @@ contains
     end if
   end subroutine read_law
 
-  !> Whether a body has a place for a law of another family.
+  !> Whether a body can have a law of another family.
   pure logical function goes_with(family, law, body)
     character(len=*), intent(in) :: family, law, body
     logical :: of_two
@@ -139,7 +139,7 @@ contains
     end if
   end function goes_with
 
-  !> The laws of a family that a body has a place for, for messages.
+  !> The laws of a family that a body can have, for messages.
   pure function laws_beside(family, body) result(names)
     character(len=*), intent(in) :: family, body
     character(len=:), allocatable :: names
@@ -147,7 +147,7 @@ contains
     names = join(pack(laws%name, [(laws(i)%family == family .and. goes_with(family, laws(i)%name, body), i=1, size(laws))]), ', ')
   end function laws_beside
 
-  !> What a law is missing that the body has no place for, for messages.
+  !> What is missing for a law that the body cannot have, for messages.
   pure function whose(body) result(text)
     character(len=*), intent(in) :: body
     character(len=:), allocatable :: text
@@ -183,14 +183,14 @@ contains
     end if
   end subroutine read_parameters
 
-  !> A drive of the foot has a ratio: a frequency is refused in its place, and the ratio is then not missing.
+  !> A drive of the foot has a ratio: a frequency is refused in its stead, and the ratio is then not missing.
   subroutine refuse_frequency(source, law, rows)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: law
     type(parameter_row_t), intent(inout) :: rows(:)
     if (find(source, 'drive.frequency') == 0) return
     call know(source, 'drive.frequency')
-    call report(source, 'drive.frequency', 'found with drive.law = "'//trim(law)//'", allowed drive.ratio in its place: the '// &
+    call report(source, 'drive.frequency', 'found with drive.law = "'//trim(law)//'", allowed drive.ratio instead: the '// &
                 'angular frequency over sqrt(restoring.stiffness/body.mass)')
     where (rows%name == 'ratio') rows%optional = .true.
   end subroutine refuse_frequency

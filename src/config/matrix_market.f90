@@ -23,7 +23,7 @@ module matrix_market
     integer :: number = 0
   end type cursor_t
 
-  !> What the first line says.
+  !> Contents of the first line.
   type :: header_t
     !> Entries come with row and column; they are whole numbers.
     logical :: coordinate, whole
@@ -224,7 +224,7 @@ contains
     type(header_t), intent(in) :: header
     character(len=:), allocatable :: rule
     rule = ' (finite, with a decimal point: 2.75, 2.5e3, 2.5D+03)'
-    if (header%whole) rule = ' (whole, as the header says integer)'
+    if (header%whole) rule = ' (whole, as the header states integer)'
   end function number_rule
 
   pure subroutine put(matrix, row, column, symmetry, value)

@@ -23,7 +23,7 @@ module old_keys
 
 contains
 
-  !> The name of today of a key, or of one below it.
+  !> The current name of a key, or of one below it.
   pure function current_key(key) result(current)
     character(len=*), intent(in) :: key
     character(len=:), allocatable :: current

@@ -56,7 +56,7 @@ contains
     end if
   end function is_table
 
-  !> Names that can be told apart in paths and messages.
+  !> Names that are distinct in paths and messages.
   subroutine check_names(source, kind, names)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: kind

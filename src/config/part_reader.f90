@@ -94,7 +94,7 @@ contains
     call read_reference_points(source, choices)
   end subroutine read_parts
 
-  !> Positions and velocities of the parts, once all joints tell which of them are angles.
+  !> Positions and velocities of the parts, once all joints determine which of them are angles.
   subroutine read_reference_points(source, choices)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(inout) :: choices(:)
@@ -245,7 +245,7 @@ contains
     end if
   end subroutine set_flexibility
 
-  !> The watched body starts where [start] says.
+  !> The watched body starts at the values of [start].
   subroutine refuse_start(source, path)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path

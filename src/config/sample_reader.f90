@@ -106,7 +106,7 @@ contains
     end associate
   end subroutine read_sample
 
-  !> Values that depend on the seed, the number of the point and the place in the list alone (Box and Muller's normal ones).
+  !> Values that depend on the seed, the number of the point and the index in the list alone (Box and Muller's normal ones).
   pure subroutine draw(sample)
     type(sample_t), intent(inout) :: sample
     real(real64) :: words(2*size(sample%names))

@@ -121,7 +121,7 @@ contains
       call take_reals(source, path//'.frequency', at_least(0.0_wp, 'rad/s'), values)
       content%frequency = real(values, real64)
       if (find(source, path//'.damping_ratios') > 0) then
-        values = [(0.0_wp, i=1, 0)]
+        values = [real(wp) ::]
         call take_reals(source, path//'.damping_ratios', at_least(0.0_wp, '1'), values)
         content%damping_ratio = real(values, real64)
       end if
@@ -248,7 +248,7 @@ contains
       if (scan(name, '.[') > 0) cycle
       call know(source, key)
       associate (entry => source%entries(i)%entry)
-        row = [(0.0_wp, named=1, 0)]
+        row = [real(wp) ::]
         select case (entry%kind)
         case (toml_integer)
           if (entry%integer < 1 .or. entry%integer > n) then
@@ -286,7 +286,7 @@ contains
     call check_points(source, path, content)
   end subroutine read_points
 
-  !> Names that can be told apart, of points that move.
+  !> Points need distinct names, and a coordinate that moves them.
   subroutine check_points(source, path, content)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: path

@@ -26,7 +26,7 @@ contains
     end if
   end function coordinates_of
 
-  !> The lowest modes of a structure in the place of its coordinates; `problem` is allocated if they cannot be kept.
+  !> The lowest modes of a structure in place of its coordinates; `problem` is allocated if they cannot be kept.
   pure subroutine keep_modes(modes, content, problem)
     integer, intent(in) :: modes
     type(structure_data_t), intent(inout) :: content

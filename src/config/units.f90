@@ -68,7 +68,7 @@ module units
 contains
 
   !> The value in the SI unit `unit` of a text such as "12.5 mm". If the text is not a number with a
-  !> unit of this quantity, `problem` is allocated and says what is allowed.
+  !> unit of this quantity, `problem` is allocated and states what is allowed.
   pure subroutine read_quantity(string, unit, value, problem)
     character(len=*), intent(in) :: string, unit
     real(wp), intent(out) :: value

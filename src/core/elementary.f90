@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Sine, cosine, exponential and logarithm in plain IEEE arithmetic: the C library's own give
-!> other bits on other processors, and labels of basin maps change with them. Errors stay within one
-!> unit in the last place for arguments up to 1e5. Method and coefficients: fdlibm (Sun, 1993).
+!> Sine, cosine, exponential and logarithm in plain IEEE arithmetic: the C library's own give other bits on other processors, and
+!> labels of basin maps change with them. Errors stay within one ulp for arguments up to 1e5. Method and coefficients: fdlibm (Sun,
+!> 1993).
 module elementary
   use kinds, only: int64, real64
   implicit none

@@ -26,7 +26,7 @@ module structure_data
     real(real64), allocatable :: left_out(:, :)
   end type structure_data_t
 
-  !> Reads the file `path`; `problem` is allocated if it cannot be used, and `missing` tells that it cannot be opened.
+  !> Reads the file `path`; `problem` is allocated if it cannot be used, `missing`: it cannot be opened.
   abstract interface
     subroutine structure_file_reader(path, content, problem, missing)
       import :: structure_data_t

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Bytes at positions of a file that exists. Errors have code 74.
+!> Bytes at offsets of a file that exists. Errors have code 74.
 module byte_file
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char
   use bindings, only: c_close_bytes, c_open_bytes, c_read_bytes, c_write_bytes
@@ -37,7 +37,7 @@ contains
     call test_status(number, exit_io, 'cannot open', path, error)
   end subroutine open_bytes
 
-  !> Reads what lies at a offset (from 0).
+  !> Reads what lies at an offset (from 0).
   subroutine read_bytes(self, bytes, offset, error)
     class(byte_file_t), intent(in) :: self
     integer(int8), intent(out), contiguous, target :: bytes(:)
@@ -48,7 +48,7 @@ contains
     call test_status(number, exit_io, 'cannot read', self%path, error)
   end subroutine read_bytes
 
-  !> Writes at a offset (from 0).
+  !> Writes at an offset (from 0).
   subroutine write_bytes(self, bytes, offset, error)
     class(byte_file_t), intent(in) :: self
     integer(int8), intent(in), contiguous, target :: bytes(:)

@@ -178,13 +178,13 @@ int separatrix_append(int descriptor, const char *text, int64_t length) {
   return 0;
 }
 
-/* Opens a file that exists, to read, or to write at positions in it. */
+/* Opens a file that exists, to read, or to write at given offsets. */
 int separatrix_open_bytes(const char *path, int writable, int *descriptor) {
   *descriptor = open(path, (writable ? O_RDWR : O_RDONLY) | O_CLOEXEC);
   return *descriptor < 0 ? errno : 0;
 }
 
-/* Reads `size` bytes from the offset `offset`; EIO if the file ends before. */
+/* Reads `size` bytes from `offset`; EIO if the file ends before. */
 int separatrix_read_bytes(int descriptor, void *bytes, int64_t size, int64_t offset) {
   char *next = bytes;
   while (size > 0) {

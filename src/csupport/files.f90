@@ -55,7 +55,7 @@ contains
     call test_status(c_folder_status(path//c_null_char), exit_cannot_create, 'cannot create', path, error)
   end subroutine check_folder
 
-  !> Bytes free to this user where `path` lies; -1 if the system does not tell.
+  !> Bytes free to this user where `path` lies; -1 if the system does not report them.
   integer(int64) function free_bytes(path)
     character(len=*), intent(in) :: path
     free_bytes = c_free_bytes(path//c_null_char)
@@ -127,7 +127,7 @@ contains
     call test_status(number, exit_io, 'cannot write', name, error)
   end subroutine append_line
 
-  !> An error with the system's reason unless its `number` is 0: `action` and `path` tell what could not be done.
+  !> An error with the system's reason unless its `number` is 0: `action` and `path` state what could not be done.
   subroutine test_status(number, code, action, path, error)
     integer(c_int), intent(in) :: number
     integer, intent(in) :: code

@@ -45,8 +45,8 @@ static void speak_again(void) {
   messages = -1;
 }
 
-/* From here to separatrix_guard_end the program ends with `code`, and says `text`, when a library crashes or
-   uses more than `seconds` of the processor (0 = no limit). Not to be nested. */
+/* From here to separatrix_guard_end the program ends with `code`, and prints `text`, when a library crashes
+   or uses more than `seconds` of the processor (0 = no limit). Not to be nested. */
 void separatrix_guard_begin(const char *text, int seconds, int code) {
   const struct itimerval limit = {{0, 0}, {seconds, 0}};
   struct sigaction action = {0};

@@ -23,8 +23,8 @@ module guard
 
 contains
 
-  !> Until `end_guard` this process ends with `code`, and says `message`, if it crashes or uses more than `seconds` of
-  !> the processor.
+  !> Until `end_guard` this process ends with `code`, and prints `message`, if it crashes or uses more than `seconds` of the
+  !> processor.
   subroutine begin_guard(message, seconds, code)
     character(len=*), intent(in) :: message
     integer, intent(in) :: seconds, code

@@ -32,7 +32,7 @@ int separatrix_utc_now(char *text, int size) {
   return strftime(text, (size_t)size, "%Y-%m-%dT%H:%M:%SZ", &parts) > 0 ? 0 : -1;
 }
 
-/* Resident memory in bytes, -1 where /proc does not tell. */
+/* Resident memory in bytes, -1 where /proc does not report it. */
 int64_t separatrix_resident_bytes(void) {
   long long total, resident;
   FILE *file = fopen("/proc/self/statm", "r");
@@ -49,7 +49,7 @@ int separatrix_host_name(char *text, int size) {
   return status;
 }
 
-/* The cores that this process may run on as "0-3,8"; returns their number, -1 if the system does not tell. */
+/* The cores that this process may run on as "0-3,8"; returns their number, -1 if the system reports none. */
 int separatrix_core_list(char *text, int size) {
   cpu_set_t set;
   size_t used = 0;
@@ -109,7 +109,7 @@ int separatrix_cpu_name(char *text, int size) {
 void separatrix_environment(char *text, int size) {
   static const char *const wanted[] = {"FI_",   "HDF5_", "OMPI_MCA_",     "OMP_",         "PRTE_MCA_",
                                        "ROMIO", "UCX_",  "SLURM_JOB_ID=", "SLURM_ARRAY_", "TMPDIR="};
-  /* What mpirun tells its processes. */
+  /* Variables that mpirun sets for its processes. */
   static const char *const internal[] = {"OMPI_MCA_orte_", "OMPI_MCA_ess", "OMPI_MCA_initial_wdir",
                                          "OMPI_MCA_pmix", "OMPI_MCA_shmem_RUNTIME"};
   size_t used = 0;

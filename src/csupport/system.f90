@@ -22,7 +22,7 @@ contains
     monotonic_seconds = c_monotonic_seconds()
   end function monotonic_seconds
 
-  !> The time now as 2026-01-31T12:34:56Z; 'unknown' if the system does not tell.
+  !> The time now as 2026-01-31T12:34:56Z; 'unknown' if the system has no clock.
   function utc_now() result(text)
     character(len=:), allocatable :: text
     character(kind=c_char) :: buffer(32)
@@ -33,12 +33,12 @@ contains
     end if
   end function utc_now
 
-  !> Resident memory of this process in bytes; -1 if the system does not tell.
+  !> Resident memory of this process in bytes; -1 if the system does not report it.
   integer(int64) function resident_bytes()
     resident_bytes = c_resident_bytes()
   end function resident_bytes
 
-  !> The name of this host; 'unknown' if the system does not tell.
+  !> The name of this host; 'unknown' if the system does not report it.
   function host_name() result(text)
     character(len=:), allocatable :: text
     character(kind=c_char) :: buffer(256)
@@ -49,7 +49,7 @@ contains
     end if
   end function host_name
 
-  !> The cores that this process may run on, as '0-3,8'; 'unknown' if the system does not tell.
+  !> The cores that this process may run on, as '0-3,8'; 'unknown' if the system does not report them.
   function core_list() result(text)
     character(len=:), allocatable :: text
     character(kind=c_char) :: buffer(128)
@@ -68,7 +68,7 @@ contains
     online_cores = int(c_online_cores())
   end function online_cores
 
-  !> The name of the processor; 'unknown' if the system does not tell.
+  !> The name of the processor; 'unknown' if the system does not report it.
   function cpu_name() result(text)
     character(len=:), allocatable :: text
     character(kind=c_char) :: buffer(256)
@@ -121,7 +121,7 @@ contains
     call c_exit_now(int(code, c_int))
   end subroutine exit_at_once
 
-  !> A copy of this process that says nothing, for a trial that may crash: 0 in the copy, its number in this one, -1 if
+  !> A copy of this process that prints nothing, for a trial that may crash: 0 in the copy, its number in this one, -1 if
   !> there can be none.
   integer function fork_process()
     fork_process = c_fork()

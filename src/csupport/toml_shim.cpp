@@ -47,7 +47,7 @@ struct Document {
   }
 };
 
-// A offset that toml11's report underlines.
+// A position that toml11's report underlines.
 struct Mark {
   int line = 0;
   int column = 0;

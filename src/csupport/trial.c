@@ -6,7 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* 0 in the copy, which says nothing, its number in this process, -1 if there can be none. */
+/* 0 in the copy, which prints nothing, its number in this process, -1 if there can be none. */
 int separatrix_fork(void) {
   const int process = (int)fork();
   if (process != 0)

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> As `segments`, of a structure: stretches of a motion of all its coordinates, each from a start of its own, with the derivatives
+!> As `segments`, of a structure: segments of a motion of all its coordinates, each from a start of its own, with the derivatives
 !> of the samples along directions in the space of the parameters and by the start.
 module coordinate_segments
   use multibody, only: is_stop, joint_elastic

@@ -19,7 +19,7 @@ module natural_scale
 
 contains
 
-  !> The stretch that the springs and the drive of a machine can bring about, the time of a radian of its section, its mass.
+  !> The extension that the springs and the drive of a machine can cause, the time of a radian of its section, its mass.
   pure function scales_of(machine) result(scales)
     type(oscillator_t), intent(in) :: machine
     type(scales_t) :: scales

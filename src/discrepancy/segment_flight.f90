@@ -20,7 +20,7 @@ module segment_flight
     !> Rows of `impact` in `report_t`.
     real(wp), allocatable :: impact(:, :)
     real(wp), allocatable :: x(:), v(:)
-    !> Smallest distance to a barrier at a turning point that missed it [m]; bounds of the place [m].
+    !> Smallest distance to a barrier at a turning point that missed it [m]; bounds of the position [m].
     real(wp) :: grazing_margin = huge(1.0_wp), x_max = -huge(1.0_wp), x_min = huge(1.0_wp)
   end type flight_t
 

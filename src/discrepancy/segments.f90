@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Many short stretches of a motion, each from a start of its own, sampled at given times, with the derivatives of the samples
-!> along directions in the space of the machine's parameters and by the start. This is what a record is compared with, stretch
-!> by stretch, so that a small error of the model does not grow into another motion.
+!> Many short segments of a motion, each from a start of its own, sampled at given times, with the derivatives of the samples along
+!> directions in the space of the machine's parameters and by the start. A record is compared with them segment by segment, so that
+!> a small error of the model does not grow into another motion.
 module segments
   use effect_law, only: observed
   use kinds, only: wp

@@ -168,7 +168,7 @@ contains
     moving%transit%available = .false.
   end subroutine build
 
-  !> The neighbours along direction `which`. If the first cannot be built, the other takes its at.
+  !> The neighbours along direction `which`. If the first cannot be built, the other replaces it.
   pure subroutine build_neighbours(plan, which, exact, further, back, error)
     type(plan_t), intent(in) :: plan
     integer, intent(in) :: which

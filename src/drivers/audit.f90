@@ -18,7 +18,7 @@ module audit
     integer :: inferred = 0, inferred_differing = 0
     !> Points whose label changes: flips, and what was inferred wrongly.
     integer :: changes = 0
-    !> Points of a boundary whose labels are right a little further from them than the file says.
+    !> Points of a boundary whose labels are right a little further from them than the file states.
     integer :: wider = 0
     !> Every point was run again.
     logical :: whole = .false.

@@ -15,7 +15,7 @@ module balance
 
 contains
 
-  !> Says which share of the `elapsed` seconds the ranks computed (least, mean, most), which of it those of `gpus` waited for
+  !> Reports which share of the `elapsed` seconds the ranks computed (least, mean, most), which of it those of `gpus` waited for
   !> them, the largest memory of a rank and the bytes of results written. In plain text only for several ranks, or where a
   !> GPU computes. Collective.
   subroutine report_balance(team, journal, busy, waited, elapsed, gpus)

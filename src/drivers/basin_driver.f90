@@ -11,7 +11,7 @@ module basin_driver
   use catalogue_report, only: list_attractors, missed_text, not_known_text, report_found
   use catalogue_search, only: check_slices, pack_catalogues, search_catalogues, unpack_catalogues
   use command_line, only: command_t
-  use endings, only: judge_reasons, report_reasons
+  use endings, only: assess_reasons, report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
   use point_columns, only: marks_of_attractor, point_values
@@ -164,7 +164,7 @@ contains
     call finish_tiles(session, file, complete, extra)
     call report_shares(session, work)
     if (work%refine%active) call report_refinement(session, work, work%grid%shape, work%origins)
-    call judge_reasons(session%journal, work%reasons, session%command%partial, error)
+    call assess_reasons(session%journal, work%reasons, session%command%partial, error)
     call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine end_basin
@@ -180,7 +180,7 @@ contains
                                                                                                    work%refined_axes))
   end subroutine prepare_refinement
 
-  !> Says what a dry run would do, with a rate from a few points, and ends the program.
+  !> Reports what a dry run would do, with a rate from a few points, and ends the program.
   subroutine report_plan(session, work, tile)
     type(session_t), intent(inout) :: session
     type(basin_work_t), intent(inout) :: work

@@ -129,7 +129,7 @@ contains
     end associate
   end subroutine note_basin_point
 
-  !> A point that was captured stays as it is when attractors are added, and so does one that was given up.
+  !> A point that converged stays as it is when attractors are added, and so does one that was given up.
   logical function basin_point_stands(self, values)
     class(basin_work_t), intent(in) :: self
     real(wp), intent(in) :: values(:)

@@ -16,7 +16,7 @@ module binding
 
 contains
 
-  !> Asks every rank, and tells on rank 0; in plain text only for several ranks. Collective.
+  !> Queries every rank, and reports on rank 0; in plain text only for several ranks. Collective.
   subroutine report_binding(team, journal)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal

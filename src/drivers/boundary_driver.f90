@@ -17,7 +17,7 @@ module boundary_driver
   use checksum, only: crc32
   use command_line, only: command_t
   use edge_state, only: edge_names, edge_texts
-  use endings, only: judge_file
+  use endings, only: assess_file
   use errors, only: error_t, fail
   use event_words, only: word_text
   use grid, only: grid_t, point_slice, two_axes
@@ -63,7 +63,7 @@ contains
                                 ' edges between points of different labels')
       call session%end_with(exit_done)
     end if
-    call judge_file(session%journal, reader, command%partial, error)
+    call assess_file(session%journal, reader, command%partial, error)
     call session%stop_if(error)
     call session%begin(path, tiled=.true.)
     call restore_catalogues(reader, session%team, session%journal, grid, session%the_case, catalogues, error)

@@ -192,7 +192,7 @@ contains
     if (n == 2) return
     call schema%add_dimension('coordinate', int(n, int64))
     call schema%add_variable('section', type_float64, [along, [character(len=name_length) :: 'coordinate']], units='SI', &
-      long_name='coordinates on the section in SI units: places [m], then speeds [m/s] of all bodies', group=group, &
+      long_name='coordinates on the section in SI units: positions [m], then speeds [m/s] of all bodies', group=group, &
       data=[((saddles(k)%points(:, i), i=1, saddles(k)%periods), k=1, size(saddles))])
   end subroutine add_saddles
 

@@ -65,7 +65,7 @@ contains
 
   contains
 
-    !> Point at a position of the line; 0 beyond an end.
+    !> Point at an index of the line; 0 beyond an end.
     pure integer function position_of(position)
       integer, intent(in) :: position
       position_of = 0

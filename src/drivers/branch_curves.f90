@@ -89,7 +89,8 @@ contains
     do b = 1, size(search%branches)
       do i = 1, size(search%branches(b)%points)
         associate (point => search%branches(b)%points(i))
-          if (.not. can_be_followed(point%label) .or. is_known(search, curves, point)) cycle
+          if (.not. can_be_followed(point%label)) cycle
+          if (is_known(search, curves, point)) cycle
           call trace_curve(search%family, curves%plan, point, curves%value, curve)
           if (size(curve%points) > 1) curves%list = [curves%list, curve]
         end associate

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The equilibria of `separatrix branches`: what is said of them, and what the file has.
+!> The equilibria of `separatrix branches`: what is reported of them, and what the file has.
 module branch_equilibria
   use branch_point, only: label_closed, label_names, last_label, no_label
   use branch_search, only: search_t

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Where dry friction holds joints at rest: what `separatrix branches` says of it, and what the file has.
+!> Where dry friction holds joints at rest: what `separatrix branches` reports of it, and what the file has.
 module branch_rest
   use branch_search, only: search_t
   use journal, only: json_number, json_text
@@ -49,7 +49,7 @@ contains
       associate (rest => found(i)%family)
         shown = path//' = '//to_text(found(i)%parameter)
         if (unit /= '1') shown = shown//' '//unit
-        shown = 'at '//shown//' dry friction holds '//rest%joints//': places of rest are a family, not followed'
+        shown = 'at '//shown//' dry friction holds '//rest%joints//': positions of rest are a family, not followed'
         data = '"parameter": '//json_number(found(i)%parameter)//', "joints": '//json_text(rest%joints)
         if (rest%known) then
           shown = shown//'; x from '//to_text(rest%low, 10)//' to '//to_text(rest%high, 10)//' as far as no stop is in the way'
@@ -65,7 +65,7 @@ contains
     type(rest_at_t), intent(in) :: found(:)
     character(len=*), intent(in) :: path, unit
     type(schema_t), intent(inout) :: schema
-    character(len=*), parameter :: where_rest = ' place at which it may rest, as far as no stop is in the way'
+    character(len=*), parameter :: where_rest = ' position at which it may rest, as far as no stop is in the way'
     character(len=:), allocatable :: joints
     real(wp) :: ends(2, size(found))
     integer :: i

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Tells the log how far a search for branches is.
+!> Reports the progress of a search for branches to the log.
 module branch_watch
   use branch_search, only: search_t
   use journal, only: journal_t, json_number

@@ -127,7 +127,7 @@ contains
     watched(:, starts + near_starts + 1) = [the_case%start%x0, the_case%start%v0]
     search%starts = starts_of_section(machine, watched(:, :last), spread(:last))
     if (last == starts) return
-    ! By itself, so that the other coordinates are as the machine says.
+    ! By itself, so that the other coordinates are those of the machine.
     search%starts(:, last:) = starts_of_section(machine, watched(:, last:))
     if (.not. (machine%has_clock .and. modulo(the_case%start%crank_angle, two_pi) > 0)) return
     allocate (own(machine%n))

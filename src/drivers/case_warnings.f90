@@ -59,7 +59,7 @@ contains
     if (stops%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
-  !> Says if an impulse falls after the end.
+  !> Warns if an impulse comes after the end.
   subroutine warn_about_impulse(the_case, journal)
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
@@ -68,10 +68,10 @@ contains
     time = parameter_value(the_case%laws, 'body.impulse_time', 0.0_wp)
     if (time <= the_case%run%duration) return
     call journal%line('warning', 'warning: body.impulse_time = '//to_text(time)//' s is after the end, run.duration = '// &
-      to_text(the_case%run%duration)//' s: no impulse falls')
+      to_text(the_case%run%duration)//' s: no impulse acts')
   end subroutine warn_about_impulse
 
-  !> Says which impulses of a structure fall after the end.
+  !> Warns of impulses of a structure that come after the end.
   subroutine warn_about_impulses(the_case, journal)
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
@@ -88,7 +88,7 @@ contains
     end do
   end subroutine warn_about_impulses
 
-  !> Says that bodies which touch in a row at the start are struck at once, where the order of impacts would matter.
+  !> Reports that bodies which touch in a row at the start are struck at once, where the order of impacts would matter.
   subroutine note_row(grid, moving, journal)
     type(grid_t), intent(in) :: grid
     type(motion_t), intent(in) :: moving
@@ -100,7 +100,7 @@ contains
       "If they are to come one after the other, as in Newton's cradle, set in_sequence = 1 in [body]")
   end subroutine note_row
 
-  !> Says where a restitution is one of a flexible structure: it then depends on the number of modes.
+  !> Warns where a restitution is one of a flexible structure: it then depends on the number of modes.
   subroutine warn_about_modes(the_case, journal)
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
@@ -132,7 +132,7 @@ contains
     share = sum(part((machine%n + 1)/2 + 1:))/sum(part)
   end function upper_share
 
-  !> Says if a record of a force jumps where it begins again.
+  !> Warns if a record of a force jumps where it begins again.
   subroutine warn_about_force(command, the_case, moving, journal)
     character(len=*), intent(in) :: command
     type(case_t), intent(in) :: the_case
@@ -146,11 +146,11 @@ contains
       call journal%line('warning', 'warning: drive.force begins with '//to_text(force(1), 6)//' N and ends with '// &
         to_text(force(last), 6)//' N: repeated every '//to_text(period, 6)//' s, from its first sample to its last, it jumps. '// &
         'If its '//to_text(last)//' samples are one period, of '//to_text(last*moving%machine%drive%interval, 6)// &
-        ' s, say so: drive.periodic = 1')
+        ' s, set drive.periodic = 1')
     end associate
   end subroutine warn_about_force
 
-  !> Says if a body that leans on a soft barrier would use up the steps of a trajectory.
+  !> Warns if a body that leans on a soft barrier would use up the steps of a trajectory.
   subroutine warn_about_steps(the_case, moving, journal)
     type(case_t), intent(in) :: the_case
     type(motion_t), intent(in) :: moving

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What is said of the attractors of a map.
+!> What is reported of the attractors of a map.
 module catalogue_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_family, kind_not_known, regime_names
@@ -80,7 +80,7 @@ contains
     end do
   end subroutine list_attractors
 
-  !> The last of the entries from `first` on that one line tells: motions that nobody knows to be periodic, alike but for their
+  !> The last of the entries from `first` on that share one line: motions that are not known to be periodic, alike but for their
   !> amplitude.
   pure integer function alike_until(attractors, first) result(last)
     type(attractor_t), intent(in) :: attractors(:)
@@ -166,7 +166,7 @@ contains
     if (entries == 0) return
     line = 'warning: '//to_text(entries)//' entries of the catalogue, in '//to_text(slices)//' of '//to_text(size(catalogues))// &
       ' slices, are not known to be periodic, nor that neighbouring motions drift apart for good: perhaps long transients. A '// &
-      'longer run.duration or run.extension (now '//to_text(extension, 3)//') tells'
+      'longer run.duration or run.extension (now '//to_text(extension, 3)//') decides'
   end function not_known_text
 
   !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where

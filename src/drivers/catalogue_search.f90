@@ -123,7 +123,7 @@ contains
       'was written yet, the same command starts again')
   end subroutine search_round
 
-  !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is heard between them.
+  !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is noticed between them.
   subroutine search_slice(journal, slices, grid, span, slice, starts, max_period, time_limit, catalogue, error)
     type(journal_t), intent(in) :: journal
     class(scheduler_t), intent(inout) :: slices

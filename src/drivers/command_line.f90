@@ -93,7 +93,7 @@ contains
       else if (len(command%name) == 0) then
         command%name = argument
         if (.not. any(commands == argument)) call fail(error, exit_usage, "unknown command '"//argument// &
-          "'; the commands are "//join(commands, ', ')//'; separatrix --help tells more')
+          "'; the commands are "//join(commands, ', ')//'; see separatrix --help')
       else if (len(command%path) == 0) then
         command%path = argument
       else if (command%name == 'merge') then

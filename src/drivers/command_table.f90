@@ -16,7 +16,7 @@ module command_table
     !> What stands behind the name, and what it does, in a line.
     character(len=9) :: reads
     character(len=110) :: summary
-    !> What `--help` tells of it before its options.
+    !> Its description in `--help`, before its options.
     character(len=900) :: help
   end type command_row_t
 
@@ -30,7 +30,7 @@ module command_table
       'amplitude-frequency and bifurcation diagram, run up, run down and from many starts', &
       'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
       '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
-      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case says how.'//nl), &
+      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case defines them.'//nl), &
     command_row_t('branches', 'CASE', &
       'periodic orbits over a parameter, stable and unstable, with their bifurcations', &
       'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
@@ -97,7 +97,7 @@ module command_table
     logical :: takes_value
     !> The commands that it belongs to; none are named of one that belongs to all.
     character(len=80) :: commands
-    !> Its lines in the list of options; '' where its command tells of it.
+    !> Its lines in the list of options; '' where its command describes it.
     character(len=130) :: help
   end type option_row_t
 
@@ -111,7 +111,7 @@ module command_table
     option_row_t('--draw', '', .true., 'basin sweep branches stability trajectory points', &
       '  --draw FILE.svg    draws the machine as it was understood and stops'), &
     option_row_t('--dry-run', '', .false., 'basin sweep branches boundary stability trajectory points', &
-      '  --dry-run          says what would be done: points, tiles, bytes, estimated time'), &
+      '  --dry-run          reports what would be done: points, tiles, bytes, estimated time'), &
     option_row_t('--force', '', .false., 'basin sweep branches boundary stability trajectory points merge', &
       '  --force            replaces an existing output'), &
     option_row_t('--resume', '', .false., 'basin sweep boundary points', &
@@ -214,7 +214,7 @@ contains
         called = trim(rows(k)%name)//' '//rows(k)%reads
         lines = lines//'  '//called//' '//trim(rows(k)%summary)//nl
       end do
-      lines = lines//nl//'separatrix COMMAND --help tells more. CASE is a TOML file, see docs/case-file.md.'//nl
+      lines = lines//nl//'See separatrix COMMAND --help. CASE is a TOML file, see docs/case-file.md.'//nl
     end if
     lines = lines//nl//'Options:'//nl
     do k = 1, size(options)

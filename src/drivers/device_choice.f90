@@ -26,7 +26,7 @@ module device_choice
   public :: choose_device, device_text
 
   !> Starts that are to fly at once for `auto` to choose a GPU: it has room for a hundred times as many, and one thread of it is
-  !> slow. The results are the same. For tests the environment may say another number.
+  !> slow. The results are the same. For tests the environment may set another number.
   integer, parameter :: fewest_starts = 1024
   character(len=*), parameter :: fewest_variable = 'SEPARATRIX_GPU_STARTS', threads_variable = 'SEPARATRIX_GPU_THREADS'
 
@@ -48,7 +48,9 @@ contains
     call find_local_rank(team, local_rank, neighbours)
     if (asked == 'cpu') return
     starts = starts_at_once(command, the_case, team%size())
-    if (asked == 'auto' .and. starts < fewest()) return
+    if (asked == 'auto') then
+      if (starts < fewest()) return
+    end if
     count = 0
     if (starts == 0) then
       call fail(error, exit_usage, '--device gpu: found a '//trim(command%name)//' that has no starts to fly together; '// &
@@ -87,8 +89,8 @@ contains
     if (status == 0) number = max(1, asked)
   end function asked_number
 
-  !> About so many starts of one machine fly together, if every rank has a GPU: those of a tile. 0 where all are flown one by
-  !> one; many where the case lacks what the command needs, which is said later.
+  !> About so many starts of one machine fly together, if every rank has a GPU: those of a tile. 0 where all are flown one by one;
+  !> many where the case lacks what the command needs, which is reported later.
   integer(int64) function starts_at_once(command, the_case, ranks) result(starts)
     type(command_t), intent(in) :: command
     type(case_t), intent(in) :: the_case
@@ -121,7 +123,7 @@ contains
     end select
   end function starts_at_once
 
-  !> Lines of a file, counted up to `most`, which is also said where it cannot be read.
+  !> Lines of a file, counted up to `most`, which is also returned where it cannot be read.
   integer(int64) function lines_of(path, most) result(lines)
     character(len=*), intent(in) :: path
     integer(int64), intent(in) :: most
@@ -136,8 +138,7 @@ contains
     close (unit)
   end function lines_of
 
-  !> Threads that service to the bodies of a rank that has so many `neighbours` on its host, itself included: one for each of its
-  !> cores.
+  !> Threads that serve the bodies of a rank that has so many `neighbours` on its host, itself included: one for each of its cores.
   integer function threads_of(neighbours) result(threads)
     integer, intent(in) :: neighbours
     integer :: cores, i

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> How trajectories ended, as every command that runs many says it, and whether that is an error.
+!> How trajectories ended, as reported by every command that runs many, and whether that is an error.
 module endings
   use errors, only: error_t, fail
   use journal, only: journal_t, json_text
@@ -12,7 +12,7 @@ module endings
   implicit none
   private
 
-  public :: report_reasons, judge_reasons, judge_given_up, judge_file, judge_motion
+  public :: report_reasons, assess_reasons, assess_given_up, assess_file, assess_motion
 
 contains
 
@@ -27,18 +27,18 @@ contains
     end do
   end subroutine report_reasons
 
-  !> As `judge_given_up`, of points that ended for these reasons.
-  subroutine judge_reasons(journal, reasons, partial, error)
+  !> As `assess_given_up`, of points that ended for these reasons.
+  subroutine assess_reasons(journal, reasons, partial, error)
     type(journal_t), intent(inout) :: journal
     integer(int64), intent(in) :: reasons(0:last_reason)
     logical, intent(in) :: partial
     type(error_t), allocatable, intent(out) :: error
     integer :: i
-    call judge_given_up(journal, sum(pack(reasons, is_given_up([(i, i=0, last_reason)]))), sum(reasons), 'points', partial, error)
-  end subroutine judge_reasons
+    call assess_given_up(journal, sum(pack(reasons, is_given_up([(i, i=0, last_reason)]))), sum(reasons), 'points', partial, error)
+  end subroutine assess_reasons
 
   !> A line where some of the motions were given up; code 78 where all of them were, unless `partial` results are asked for.
-  subroutine judge_given_up(journal, given_up, motions, things, partial, error)
+  subroutine assess_given_up(journal, given_up, motions, things, partial, error)
     type(journal_t), intent(inout) :: journal
     integer(int64), intent(in) :: given_up, motions
     character(len=*), intent(in) :: things
@@ -52,10 +52,10 @@ contains
       call journal%line('given_up', '  given up: '//to_text(given_up)//' of '//to_text(motions)//' '//things, &
                         '"given_up": '//to_text(given_up)//', "of": '//to_text(motions))
     end if
-  end subroutine judge_given_up
+  end subroutine assess_given_up
 
-  !> As `judge_reasons`, of the points of a file.
-  subroutine judge_file(journal, reader, partial, error)
+  !> As `assess_reasons`, of the points of a file.
+  subroutine assess_file(journal, reader, partial, error)
     type(journal_t), intent(inout) :: journal
     type(reader_t), intent(in) :: reader
     logical, intent(in) :: partial
@@ -72,17 +72,17 @@ contains
     end do
     ! A sweep that runs one way has no holds of the other.
     reasons(reason_not_run) = 0
-    call judge_reasons(journal, reasons, partial, error)
-  end subroutine judge_file
+    call assess_reasons(journal, reasons, partial, error)
+  end subroutine assess_file
 
-  !> Code 78 where the one motion that was asked for was given up, as `words` say, unless `partial` results are asked for.
-  pure subroutine judge_motion(reason, words, partial, error)
+  !> Code 78 where the one motion that was asked for was given up, as `words` state, unless `partial` results are asked for.
+  pure subroutine assess_motion(reason, words, partial, error)
     integer, intent(in) :: reason
     character(len=*), intent(in) :: words
     logical, intent(in) :: partial
     type(error_t), allocatable, intent(out) :: error
     if (is_given_up(reason) .and. .not. partial) call fail(error, exit_given_up, 'the motion was given up: '//words// &
                                                            ' (--partial: no error)')
-  end subroutine judge_motion
+  end subroutine assess_motion
 
 end module endings

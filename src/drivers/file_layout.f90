@@ -24,7 +24,7 @@ module file_layout
 
 contains
 
-  !> Name of a parameter or place in a file: drive_sine_2 for drive.sine[2].
+  !> Name of a parameter or start in a file: drive_sine_2 for drive.sine[2].
   pure function axis_dimension(name) result(dimension)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: dimension

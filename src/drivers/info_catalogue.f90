@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The catalogue of a file as `separatrix info` tells it.
+!> The catalogue of a file as shown by `separatrix info`.
 module info_catalogue
   use attractors, only: kind_chaotic, kind_family, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t
@@ -63,7 +63,7 @@ contains
     if (size(values) /= length) deallocate (values)
   end subroutine read_if_there
 
-  !> What every file tells of an attractor: its values in the order of `columns`.
+  !> What every file has of an attractor: its values in the order of `columns`.
   function marks_text(values, json) result(line)
     real(wp), intent(in) :: values(:)
     logical, intent(in) :: json
@@ -97,7 +97,7 @@ contains
 
   end function marks_text
 
-  !> The name of a regime, or what stands in its place in a file that is not sound.
+  !> The name of a regime, or 'unknown' in a file that is not sound.
   function regime_text(code) result(name)
     real(wp), intent(in) :: code
     character(len=:), allocatable :: name

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What a run says while it works: lines on stdout (plain or JSON, rank 0 only) and progress with rate and
+!> What a run reports while it works: lines on stdout (plain or JSON, rank 0 only) and progress with rate and
 !> ETA on stderr: one line that is rewritten on a terminal, sparse lines in a log. All of it also goes to a file as JSON
 !> lines if one is asked for. A log that cannot be written does not end the work, but makes it end with code 74.
 module journal
@@ -36,7 +36,7 @@ module journal
     logical :: lost = .false.
     !> Bytes of results that this rank has written.
     integer(int64) :: written = 0
-    !> The stretch of work under way.
+    !> The task under way.
     character(len=:), allocatable :: things
     integer(int64) :: total = 0, before = 0
     real(wp) :: interval_started = 0
@@ -117,7 +117,7 @@ contains
     call put(self, self%copy, json_line(self, event, message, more))
   end subroutine write_copy
 
-  !> One line. After the first that cannot be written, which is said on stderr, the sink is given up.
+  !> One line. After the first that cannot be written, which is reported on stderr, the sink is given up.
   subroutine put(self, sink, text)
     class(journal_t), intent(inout) :: self
     type(sink_t), intent(inout) :: sink
@@ -141,7 +141,7 @@ contains
            to_text(monotonic_seconds() - self%started, 6)//', "message": '//json_text(message)//more//'}'
   end function json_line
 
-  !> Begins a stretch of work: `total` things named `things`, of which `before` were done earlier.
+  !> Begins a task: `total` things named `things`, of which `before` were done earlier.
   subroutine begin(self, things, total, before)
     class(journal_t), intent(inout) :: self
     character(len=*), intent(in) :: things
@@ -152,7 +152,7 @@ contains
     self%interval_started = monotonic_seconds()
   end subroutine begin
 
-  !> Progress of the stretch when it is due.
+  !> Progress of the task when it is due.
   subroutine progress(self, done)
     class(journal_t), intent(inout) :: self
     integer(int64), intent(in) :: done
@@ -180,7 +180,7 @@ contains
     if (is_due(self)) call put_progress(self, message, ', '//fields)
   end subroutine under_way
 
-  !> Whether it is time to tell; if so the next time is set.
+  !> Whether progress is due; if so the next time is set.
   logical function is_due(self)
     class(journal_t), intent(inout) :: self
     real(wp) :: now

@@ -37,7 +37,7 @@ contains
     call centre_of(search%branches, search%family, centre, known)
     if (.not. known) return
     associate (points => search%branches(b)%points)
-      ! Free motion is symmetric where impacts on one stop are not: nothing is said of a branch with both.
+      ! Free motion is symmetric where impacts on one stop are not: symmetry is not reported of a branch with both.
       if (.not. any(points%symmetric)) text = ', not symmetric'
       if (all(points%symmetric)) text = ', symmetric'
       if (count(points%symmetric) > size(points)/2) return

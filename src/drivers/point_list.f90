@@ -36,8 +36,8 @@ module point_list
 
 contains
 
-  !> Reads `path`; without a column `ratio` every point has `default_ratio`. `laws` say which bodies there are. Errors name the
-  !> line, what was found and what is allowed: code 66 for a file that cannot be read, 65 for its content.
+  !> Reads `path`; without a column `ratio` every point has `default_ratio`. `laws` determine which bodies there are. Errors name
+  !> the line, what was found and what is allowed: code 66 for a file that cannot be read, 65 for its content.
   subroutine read_point_list(path, default_ratio, contact, laws, list, error)
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: default_ratio

@@ -19,7 +19,7 @@ module point_work
     !> Where not all points are computed: how they are chosen, and along which two axes.
     type(refine_t) :: refine
     integer :: refined_axes(2) = 0
-    !> Values by which its points are told apart, which are those that are kept.
+    !> Number of values that distinguish its points; those are kept.
     integer :: marks = 0
     !> Points computed by this process, with those that several blocks have asked for.
     integer(int64) :: computed = 0
@@ -34,8 +34,8 @@ module point_work
   end type point_work_t
 
   abstract interface
-    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Where this takes long the
-    !> watch is looked at on the way; `whole` is false if it says stop, and the values are void.
+    !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Where this takes long the watch
+    !> is looked at on the way; `whole` is false if it requests a stop, and the values are void.
     subroutine compute_points(self, index, values, whole, error, watch)
       import :: error_t, point_work_t, watch_t, wp
       class(point_work_t), intent(inout) :: self
@@ -57,8 +57,8 @@ module point_work
 
 contains
 
-  !> What tells the points at `index` (axes, points) apart, of their values (points, variables): `marks` (points, marks) and
-  !> how long they take to settle, in drive periods.
+  !> What distinguishes the points at `index` (axes, points), of their values (points, variables): `marks` (points, marks) and how
+  !> long they take to settle, in drive periods.
   subroutine by_all_values(self, index, values, marks, settling, error)
     class(point_work_t), intent(inout) :: self
     integer, intent(in) :: index(:, :)
@@ -89,8 +89,8 @@ contains
     never_again = .true.
   end function never_again
 
-  !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch says stop before
-  !> the last of them.
+  !> Values (points, variables) of the points at `index` (axes, points); `whole` is false if the watch requests a stop before the
+  !> last of them.
   subroutine compute_list(work, index, values, whole, error, watch)
     class(point_work_t), intent(inout) :: work
     integer, intent(in) :: index(:, :)

@@ -9,7 +9,7 @@ module points_driver
   use case_setup, only: grid_of, output_path, points_of_tile, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use endings, only: judge_reasons, report_reasons
+  use endings, only: assess_reasons, report_reasons
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime, axis_dimension
   use lane_slots, only: prepare_flow
@@ -121,12 +121,12 @@ contains
       if (len(csv) > 0) call session%journal%line('written', 'wrote '//csv)
     end associate
     call report_reasons(session%journal, work%reasons)
-    call judge_reasons(session%journal, work%reasons, session%command%partial, error)
+    call assess_reasons(session%journal, work%reasons, session%command%partial, error)
     call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine end_points
 
-  !> The machine of a list of starts: whole durations, of whose windows only the regime is told.
+  !> The machine of a list of starts: whole durations, of whose windows only the regime is reported.
   subroutine open_list_ensemble(grid, the_case, ensemble, error)
     type(grid_t), intent(in) :: grid
     type(case_t), intent(in) :: the_case

@@ -20,8 +20,8 @@ module refined_tile
 
 contains
 
-  !> Values (points of the tile, the last axis fastest; marks and origin) of the tile that begins at `lower` (from 0) and
-  !> holds whole blocks. `lengths`: of the map. `whole` is false if the watch says stop before the last block is done.
+  !> Values (points of the tile, the last axis fastest; marks and origin) of the tile that begins at `lower` (from 0) and holds
+  !> whole blocks. `lengths`: of the map. `whole` is false if the watch requests a stop before the last block is done.
   subroutine refine_tile(work, lengths, lower, extent, values, whole, error, watch)
     class(point_work_t), intent(inout) :: work
     integer, intent(in) :: lengths(:), lower(:), extent(:)

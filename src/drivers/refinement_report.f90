@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What a refined map says of itself: how much of it was computed, what the probes found, and how much of it can be wrong.
+!> The report on a refined map: how much of it was computed, what the probes found, and how much of it can be wrong.
 module refinement_report
   use kinds, only: int64, wp
   use map_schema, only: schema_t

@@ -140,7 +140,7 @@ contains
     if (size(rows, 2) == 0 .or. .not. complete) return
     found = entries(work%catalogues) - before
     suggestion = ''
-    if (left > 0) suggestion = ', a longer run.extension may tell'
+    if (left > 0) suggestion = ', a longer run.extension may decide'
     call session%journal%line('second_look', 'second look from '//to_text(count(rows >= 0))//' of '//to_text(first)// &
       ' points that had ended without an attractor: '//to_text(found)//' more found, '//to_text(left)//' points left without'// &
       suggestion, '"starts": '//to_text(count(rows >= 0))//', "found": '//to_text(found)//', "left": '//to_text(left))
@@ -201,7 +201,7 @@ contains
     where (best(1, :) < 2) row = nint(best(2, :), int64)
   end subroutine choose
 
-  !> Keeps the smallest positions in order.
+  !> Keeps the smallest numbers drawn, in order, each with its point.
   pure subroutine put_in_order(best, drawn, flat)
     real(wp), intent(inout) :: best(:, :)
     real(wp), intent(in) :: drawn, flat
@@ -239,8 +239,8 @@ contains
     end do
   end function index_of
 
-  !> Adds what the points of a row lead to, in the order of the row, slices shared among the ranks; `changed` suggestion whether the
-  !> catalogues are others now. New attractors carry the labels of their branches in the neighbouring slices, or new ones.
+  !> Adds what the points of a row lead to, in the order of the row, slices shared among the ranks; `changed`: whether the
+  !> catalogues have changed. New attractors carry the labels of their branches in the neighbouring slices, or new ones.
   subroutine extend_catalogues(team, journal, grid, span, max_period, time_limit, row, catalogues, changed, error)
     class(team_t), intent(in) :: team
     type(journal_t), intent(in) :: journal
@@ -296,7 +296,7 @@ contains
     end do
   end subroutine extend_catalogues
 
-  !> Computes again the points that were not captured. `complete` is false after a stop.
+  !> Computes again the points that did not converge. `complete` is false after a stop.
   subroutine mend_labels(session, file, work, complete)
     type(session_t), intent(inout) :: session
     type(map_file_t), intent(inout) :: file

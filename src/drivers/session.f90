@@ -147,7 +147,7 @@ contains
       call start_provenance(self%team, record)
     end associate
     call report_binding(self%team, self%journal)
-    ! Plain text tells of the processor only where it was asked for.
+    ! Plain text names the processor only where it was asked for.
     if (allocated(self%provenance%device)) call self%journal%line('device', 'computed by '//self%provenance%device, &
       '"device": '//json_text(self%provenance%device)//', "gpus": '//to_text(self%gpus), &
       plain=self%gpus > 0 .or. self%command%device /= 'auto')
@@ -243,8 +243,8 @@ contains
     call self%end_with(error%code)
   end subroutine stop_if
 
-  !> After SIGTERM says how to go on with the run kept in `path`: mpirun ends its processes so when one of them has died,
-  !> and leaves them no time for more. Two ranks speak, because either may be the dead one.
+  !> After SIGTERM reports how to resume the run kept in `path`: mpirun ends its processes so when one of them has died, and leaves
+  !> them no time for more. Two ranks report, because either may be the dead one.
   subroutine report_how_to_resume(self, path)
     class(session_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -256,7 +256,7 @@ contains
     if (.not. asked) return
     own = self%journal
     own%active = .true.
-    call own%error('rank '//to_text(self%team%rank())//' was told to end (SIGTERM); the tiles done are kept in '// &
+    call own%error('rank '//to_text(self%team%rank())//' was asked to end (SIGTERM); the tiles done are kept in '// &
                    path//'; the same command with --resume (without --force) goes on')
   end subroutine report_how_to_resume
 

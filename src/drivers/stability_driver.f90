@@ -9,7 +9,7 @@ module stability_driver
   use case_setup, only: options_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use endings, only: judge_motion
+  use endings, only: assess_motion
   use errors, only: error_t
   use exponents, only: most_points, motion_names, spectrum_t, type_of_motion, zero_one_test
   use files, only: file_exists, is_special, is_text
@@ -81,7 +81,7 @@ contains
       else
         call session%journal%line('not_known', 'not known: '//why_not_known(spectrum))
       end if
-      call judge_motion(spectrum%reason, reason_name(spectrum%reason), command%partial, error)
+      call assess_motion(spectrum%reason, reason_name(spectrum%reason), command%partial, error)
     end if
     call session%stop_if(error)
     call session%end_with(exit_done)

@@ -9,7 +9,7 @@ module stability_of_map
   use case_setup, only: grid_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use endings, only: judge_given_up
+  use endings, only: assess_given_up
   use errors, only: error_t, fail
   use exponents, only: most_points, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
     motion_transient, period_of_section, spectrum_t, type_of_motion, zero_one_test
@@ -31,14 +31,14 @@ module stability_of_map
 
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
-  !> Logarithm of the contraction over a period from which on points that are the same report_stability a cycle.
+  !> Logarithm of the contraction over a period from which on points that are the same identify a cycle.
   real(wp), parameter :: contracts = 1e-2_wp
 
   integer, parameter :: not_known = 0, chaotic = 1, quasi_periodic = 2, long_transient = 3, above_limit = 4
   character(len=*), parameter :: type_names(0:4) = [character(len=22) :: 'not_known', 'chaotic', 'quasi_periodic', &
     'long_transient', 'period_above_the_limit']
 
-  !> An entry without a period, and a start of the map that it captured.
+  !> An entry without a period, and a start of the map that converged to it.
   type :: entry_t
     integer :: label = 0
     integer(int64) :: slice = 0
@@ -54,7 +54,7 @@ module stability_of_map
 
 contains
 
-  !> Tells the type of every entry of period 0 with its exponents. Code 65 for a file that is no map of attractors.
+  !> Reports the type of every entry of period 0 with its exponents. Code 65 for a file that is no map of attractors.
   subroutine run_stability_of_map(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
@@ -85,7 +85,7 @@ contains
     do i = 1, size(entries)
       call report_stability(journal, grid, the_case, entries(i), command%periods, given_up)
     end do
-    call judge_given_up(journal, given_up, size(entries, kind=int64), 'entries', command%partial, error)
+    call assess_given_up(journal, given_up, size(entries, kind=int64), 'entries', command%partial, error)
   end subroutine run_stability_of_map
 
   !> The case of a map, its grid, and the entries without a period among the `total`.
@@ -100,12 +100,14 @@ contains
     character(len=128) :: no_overrides(0)
     real(wp), allocatable :: columns(:, :), kinds(:)
     logical, allocatable :: wanted(:)
+    logical :: has_catalogue
     integer :: i
     integer, allocatable :: rows(:)
     total = 0
     call reader%text_attribute('/', 'kind', kind, error)
     if (allocated(error)) return
-    if (kind /= 'basin' .or. .not. reader%has('/catalogue/period')) then
+    has_catalogue = reader%has('/catalogue/period')
+    if (kind /= 'basin' .or. .not. has_catalogue) then
       call fail(error, exit_bad_case, ''''//reader%path//''' is a file of kind '//kind// &
                 ', allowed a map (basin) with a catalogue, or a case')
       return
@@ -132,7 +134,7 @@ contains
     if (size(entries) > 0) call find_starts(reader, grid, entries, error)
   end subroutine read_map
 
-  !> For each entry the first point of the map that it captured; none is left without an index where there is one.
+  !> For each entry the first point of the map that converged to it; none is left without an index where there is one.
   subroutine find_starts(reader, grid, entries, error)
     type(reader_t), intent(in) :: reader
     type(grid_t), intent(in) :: grid
@@ -190,7 +192,7 @@ contains
     end do
   end subroutine look_for
 
-  !> Computes and tells what an entry is; counts those whose motion was given up.
+  !> Computes and reports what an entry is; counts those whose motion was given up.
   subroutine report_stability(journal, grid, the_case, entry, periods, given_up)
     type(journal_t), intent(inout) :: journal
     type(grid_t), intent(in) :: grid

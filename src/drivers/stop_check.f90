@@ -16,7 +16,7 @@ module stop_check
 
 contains
 
-  !> Code 75 if a stop signal came or `time_limit` [s] since the start is over (0 = none); `doing` says what is left undone.
+  !> Code 75 if a stop signal came or `time_limit` [s] since the start is over (0 = none); `doing` states what is left undone.
   !> `resumable`: a working file is there, with which --resume goes on.
   subroutine check_stop(journal, time_limit, doing, error, resumable)
     type(journal_t), intent(in) :: journal

@@ -112,7 +112,7 @@ contains
   end subroutine restore_catalogues
 
   !> Labels of the plane over two axes (the first of them before the second) through the point `index`, as module `bisection` has
-  !> them; `inferred` tells which were not computed. Code 74 if the file has not the points that its case asks for.
+  !> them; `inferred`: which were not computed. Code 74 if the file has not the points that its case asks for.
   subroutine read_labels(reader, shape, axes, index, labels, inferred, error)
     type(reader_t), intent(in) :: reader
     integer, intent(in) :: shape(:), axes(2), index(:)
@@ -137,7 +137,8 @@ contains
     extent(axes) = shape(axes)
     call reader%read_block('/attractor', lower, extent, values, error)
     if (.not. allocated(error)) call reader%read_block('/reason', lower, extent, reasons, error)
-    if (.not. allocated(error) .and. reader%has('/origin')) call reader%read_block('/origin', lower, extent, origins, error)
+    if (allocated(error)) return
+    if (reader%has('/origin')) call reader%read_block('/origin', lower, extent, origins, error)
     if (allocated(error)) return
     allocate (labels(shape(axes(1)), shape(axes(2))), inferred(shape(axes(1)), shape(axes(2))))
     inferred = .false.

@@ -52,8 +52,8 @@ module sweep_chain
 
 contains
 
-  !> Runs the chains that `ran` asks for over `values` of the parameter `path`, from the grid's own start, and tells
-  !> every rank. Cycles of at most `longest` drive periods are looked for.
+  !> Runs the chains that `ran` asks for over `values` of the parameter `path`, from the grid's own start, and sends them to every
+  !> rank. Cycles of at most `longest` drive periods are looked for.
   subroutine run_chains(team, journal, time_limit, grid, span, path, values, ran, samples, longest, tolerance, chains, error)
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
@@ -73,7 +73,7 @@ contains
     chains%ran = ran
     allocate (mine(0))
     here = ran .and. modulo([0, 1], team%size()) == team%rank()
-    ! Both directions are one stretch of work: its progress never goes back.
+    ! Both directions are one task: its progress never goes back.
     call journal%begin('values', count(here)*size(values, kind=int64), 0_int64)
     done = 0
     do direction = 1, 2
@@ -115,7 +115,7 @@ contains
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), observed(2), bracket(2)
-    real(wp) :: limits(limit_numbers, size(values)), trajectory(size(values))
+    real(wp) :: limits(limit_numbers, size(values)), visited(size(values))
     type(hold_t) :: held
     type(settled_t) :: settled(size(values))
     type(section_state_t) :: state
@@ -125,11 +125,11 @@ contains
     found = 0
     before = 0
     mark = 0
-    trajectory = values
-    if (.not. up) trajectory = values(size(values):1:-1)
+    visited = values
+    if (.not. up) visited = values(size(values):1:-1)
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
-      call hold_parameter(grid, span, path, trajectory(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, &
+      call hold_parameter(grid, span, path, visited(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, &
         error)
       if (allocated(error)) return
       settled(i) = held%settled
@@ -139,8 +139,8 @@ contains
       if (held%reason == reason_time_over) then
         if (before > 0 .and. held%mark /= mark) then
           next = held%mark
-          call observe_limit(grid, span, path, trajectory(before), trajectory(i), state, mark, tolerance, next, observed, error)
-          if (.not. allocated(error)) call branch_end(grid, path, trajectory, settled(:before), state, mark, longest, tolerance, &
+          call observe_limit(grid, span, path, visited(before), visited(i), state, mark, tolerance, next, observed, error)
+          if (.not. allocated(error)) call branch_end(grid, path, visited, settled(:before), state, mark, longest, tolerance, &
                                                       bracket, outcome, error)
           if (allocated(error)) return
           found = found + 1

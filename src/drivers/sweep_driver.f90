@@ -12,7 +12,7 @@ module sweep_driver
   use case_type, only: case_t
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
-  use endings, only: judge_given_up, report_reasons
+  use endings, only: assess_given_up, report_reasons
   use errors, only: error_t
   use file_layout, only: add_map_variables, axis_dimension
   use grid, only: grid_t
@@ -101,12 +101,12 @@ contains
       call check_written(session, path)
       call session%journal%line('written', 'wrote '//path)
     end if
-    call judge_sweep(session, work, chains)
+    call assess_sweep(session, work, chains)
     call session%end_with(exit_done)
   end subroutine run_sweep
 
   !> Ends the program with code 78 where every hold of the runs and every one of the many starts was given up.
-  subroutine judge_sweep(session, work, chains)
+  subroutine assess_sweep(session, work, chains)
     type(session_t), intent(inout) :: session
     type(branch_work_t), intent(in) :: work
     type(chains_t), intent(in) :: chains
@@ -120,11 +120,11 @@ contains
       given_up = given_up + count(is_given_up(nint(chains%holds(hold_reason, :, i))))
       motions = motions + size(chains%holds, 2)
     end do
-    call judge_given_up(session%journal, given_up, motions, 'holds and starts', session%command%partial, error)
+    call assess_given_up(session%journal, given_up, motions, 'holds and starts', session%command%partial, error)
     call session%stop_if(error)
-  end subroutine judge_sweep
+  end subroutine assess_sweep
 
-  !> Says what would be done: holds of the runs, points of the many starts, bytes, time. Ends the program.
+  !> Reports what would be done: holds of the runs, points of the many starts, bytes, time. Ends the program.
   subroutine report_plan(session, work)
     type(session_t), intent(inout) :: session
     type(branch_work_t), intent(inout) :: work

@@ -37,7 +37,7 @@ module tiled_run
   !> Points of the small sample from which a dry run estimates the time.
   integer, parameter :: pilot_points = 64
 
-  !> Asks for signals and the time limit between pieces of a tile, and says how far the run is.
+  !> Checks for signals and the time limit between pieces of a tile, and reports how far the run is.
   type, extends(watch_t) :: tile_watch_t
     class(scheduler_t), pointer :: scheduler => null()
     type(session_t), pointer :: session => null()
@@ -63,7 +63,7 @@ contains
     type(error_t), allocatable :: error
     integer(int64) :: shape_of_tiles(size(tile_shape))
     integer :: found
-    ! A rank that dies takes the others with it, perhaps before they can say this.
+    ! A rank that dies takes the others with it, perhaps before they can report this.
     if (session%team%size() > 1) call session%journal%line('kept', 'the tiles done are kept in '//working_path(path)// &
       '; after an interruption the same command with --resume (without --force) goes on')
     ! Rank 0 decides, before it creates what the others would see.

@@ -10,7 +10,7 @@ module trajectory_driver
   use command_line, only: command_t
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
-  use endings, only: judge_motion
+  use endings, only: assess_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
@@ -44,7 +44,7 @@ module trajectory_driver
 
   !> Most samples of a trajectory: some hundred bytes each.
   real(wp), parameter :: most_samples = 2e7_wp
-  !> A search that may take so many seconds is told of.
+  !> A search that may take so many seconds is reported.
   real(wp), parameter :: worth_a_word = 5
 
 contains
@@ -108,7 +108,7 @@ contains
     call check_written(session, path)
     call report(session, moving, span, outcome, cycle, log)
     call report_files(session, command, path)
-    call judge_motion(outcome%reason, explained(outcome%reason)//' after '// &
+    call assess_motion(outcome%reason, explained(outcome%reason)//' after '// &
                       to_text(ended_after(moving, outcome%reason, log), 6)//' s of '//to_text(span%duration, 6)//' s; '// &
                       path//' has what comes before', command%partial, error)
     call session%stop_if(error)

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What `separatrix trajectory` says of a motion at its end: of drive periods only where there is a drive, of impacts only where
+!> What `separatrix trajectory` reports of a motion at its end: of drive periods only where there is a drive, of impacts only where
 !> there is something to hit.
 module trajectory_report
   use angle_units, only: unit_of

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> `separatrix verify`: checksums, invariants, and a random sample of the points run again: in double precision,
-!> which must give what the file holds, and in quadruple precision, which tells how far it can be trusted.
+!> which must give what the file holds, and in quadruple precision, which shows how far it can be trusted.
 module verify_driver
   use angle_units, only: unit_of
   use attractors, only: regime_names
@@ -14,7 +14,7 @@ module verify_driver
   use case_setup, only: grid_of, span_of
   use case_type, only: case_t
   use command_line, only: command_t
-  use endings, only: judge_file, judge_motion
+  use endings, only: assess_file, assess_motion
   use errors, only: error_t, fail
   use grid, only: grid_t, point_laws, point_slice, point_start
   use journal, only: journal_t, json_text
@@ -89,22 +89,22 @@ contains
         call reader%text_attribute('/', 'reason', reason, error)
       end select
     end if
-    if (.not. allocated(error)) call judge_file(journal, reader, command%partial, given_up)
+    if (.not. allocated(error)) call assess_file(journal, reader, command%partial, given_up)
     call reader%close(ignored)
     if (allocated(error)) return
     call report(command, kind, datasets, points, audit)
     if (audit%differing > 0) call fail(error, exit_io, "'"//command%path//"': "//to_text(audit%differing)// &
       ' of '//to_text(audit%points)//' points rerun differ from the file, first '//audit%first_difference)
-    if (.not. allocated(error)) call judge_changes(command, audit, error)
+    if (.not. allocated(error)) call check_changes(command, audit, error)
     if (allocated(error)) return
     if (allocated(given_up)) call move_alloc(given_up, error)
-    if (allocated(reason)) call judge_motion(reason_code(reason), reason//'; the file is whole', command%partial, &
+    if (allocated(reason)) call assess_motion(reason_code(reason), reason//'; the file is whole', command%partial, &
                                              error)
   end subroutine run_verify
 
-  !> Code 77 if the share of the sample whose label changes is above what is allowed. The share itself is judged, not its
+  !> Code 77 if the share of the sample whose label changes is above what is allowed. The share itself counts, not its
   !> confidence limit: without a change there is nothing against a file, however small the sample.
-  subroutine judge_changes(command, audit, error)
+  subroutine check_changes(command, audit, error)
     type(command_t), intent(in) :: command
     type(audit_t), intent(in) :: audit
     type(error_t), allocatable, intent(out) :: error
@@ -117,8 +117,8 @@ contains
     call fail(error, exit_uncertain, "warning: '"//command%path//"': "//to_text(audit%changes)//' of '// &
       to_text(audit%points)//' labels rerun would change, '// &
       per_cent(audit%changes/real(audit%points, wp))//limits//'; allowed are '//to_text(command%max_changes)// &
-      ' % (--max-changes). Points like these depend on rounding or were inferred wrongly: their labels tell nothing')
-  end subroutine judge_changes
+      ' % (--max-changes). Points like these depend on rounding or were inferred wrongly: their labels mean nothing')
+  end subroutine check_changes
 
   !> A share as '1.49 %'.
   pure function per_cent(share) result(text)
@@ -304,7 +304,7 @@ contains
     if (audit%compared == 0) deviations = '; none had settled: impact counts and states are not compared'
     ! Of a boundary the labels on its two sides are all that is asked.
     if (kind == 'boundary') deviations = ''
-    if (audit%wider > 0) deviations = '; '//to_text(audit%wider)//' of the others lie further out than the file says, by no '// &
+    if (audit%wider > 0) deviations = '; '//to_text(audit%wider)//' of the others lie further out than the file states, by no '// &
                                       'more than a hundred times'
     if (audit%inferred > 0) write (output_unit, '(a)') &
       '  '//to_text(audit%inferred)//' inferred points computed: '//to_text(audit%inferred_differing)// &

@@ -15,7 +15,7 @@ module flight_path
 
   public :: begin_path, begin_change, begin_series, path_at, unknowns_of, series_step, constant_forces
 
-  !> Terms of the exponential series over a stretch no longer than 1/rate.
+  !> Terms of the exponential series over an interval no longer than 1/rate.
   integer, parameter, public :: terms = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)
 
   type, public :: path_t
@@ -173,8 +173,8 @@ contains
     end do
   end subroutine carry_along
 
-  !> Amplitudes of the exponentials, and the steady part of what they answer to a push that grows steadily; `position` is less
-  !> what they carry of the damped rigid coordinates. All in basis coordinates.
+  !> Amplitudes of the exponentials, and the steady part of their response to a push that grows steadily; `position` is less what
+  !> they carry of the damped rigid coordinates. All in basis coordinates.
   pure subroutine begin_exponentials(flow, n, speed, push, push_rate, position, path)
     type(mode_flow_t), intent(in) :: flow
     integer, intent(in) :: n
@@ -270,7 +270,7 @@ contains
     end do
   end function unknowns_of
 
-  !> The unknowns over a stretch of `length` [s] by rising powers of its fraction.
+  !> The unknowns over an interval of `length` [s] by rising powers of its fraction.
   pure subroutine series_step(matrix, y, length, powers)
     real(wp), intent(in) :: matrix(:, :), y(:), length
     real(wp), intent(out) :: powers(:, 0:)

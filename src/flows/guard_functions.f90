@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The functions of time whose falls end a flight: sums of powers, exponentials and harmonics, with derivatives and bounds.
+!> The functions of time whose zeros end a flight: sums of powers, exponentials and harmonics, with derivatives and bounds.
 module guard_functions
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine

@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The first fall of guards to zero along a path, proven: nothing lies before it. Over panels the quintic through value, slope
-!> and curvature at both ends, in Bernstein's form, and a bound on the sixth derivative show that a guard stays positive;
-!> where they do not, steps certified by the third derivative lead to its zero from the left.
+!> The first zero of guards along a path, proven: nothing lies before it. Over panels the quintic through value, slope and
+!> curvature at both ends, in Bernstein's form, and a bound on the sixth derivative show that a guard stays positive; where they do
+!> not, steps certified by the third derivative lead to its zero from the left.
 module guard_search
   use elementary, only: exponential, logarithm
   use guard_functions, only: bases_at, bound, derivatives, search_t
@@ -27,9 +27,9 @@ module guard_search
 
 contains
 
-  !> The first falls within `duration` [s]: `time` is that of the first, `triggered` all guards that fall with it by no more than
-  !> rounding; time = duration and none triggered if there is none. `extremes` are those of the watched coordinate on the way,
-  !> `top_speed` the largest of its speeds if `needs_speed`; `margin` the smallest gap at which a stop was missed [m] if
+  !> The first that is triggered within `duration` [s]: `time` is that of the first, `triggered` all guards that are triggered with
+  !> it to within rounding; time = duration and none triggered if there is none. `extremes` are those of the watched coordinate on
+  !> the way, `top_speed` the largest of its speeds if `needs_speed`; `margin` the smallest gap at which a stop was missed [m] if
   !> `needs_margin`.
   pure subroutine find_first(search, list, origin, duration, needs_speed, needs_margin, time, triggered, extremes, top_speed, &
                              margin, evaluations)
@@ -131,8 +131,8 @@ contains
     end do
   end subroutine search_panel
 
-  !> Guards that are zero at the start, where the values are `here`: those that fall at once, and how long within `length` [s] the
-  !> others are `certified` not to fall. One that is nothing but rounding falls when it is below that.
+  !> Guards that are zero at the start, where the values are `here`: those that are triggered at once, and how long within `length`
+  !> [s] the others are `certified` not to be. One that is nothing but rounding is triggered when it is below that.
   pure subroutine look_at_start(search, list, here, length, certified, triggered)
     type(search_t), intent(inout) :: search
     type(joint_guard_t), intent(in) :: list(:)
@@ -219,7 +219,7 @@ contains
     end do
   end subroutine turning_point
 
-  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, where some have `triggered`. The rate of a gap has
+  !> Gaps that stop closing between `a`, with the derivatives `here`, and `b`, where some are `triggered`. The rate of a gap has
   !> one extreme on a panel at most: where it has, either side is looked at.
   pure subroutine note_misses(search, list, a, b, here, triggered, margin, evaluations)
     type(search_t), intent(in) :: search
@@ -300,8 +300,8 @@ contains
     if (d(first) < 0) return
     certified = longest
     do i = first + 1, 4
-      if (i == 4) against = fourth
-      if (i < 4) against = max(-d(i), 0.0_wp)
+      against = fourth
+      if (i < 4) against = max(-d(min(i, 3)), 0.0_wp)
       if (.not. against > 0) cycle
       ! A share of the first term for each of the others.
       associate (ratio => 0.3_wp*d(first)/factorial(first)*factorial(i)/against)

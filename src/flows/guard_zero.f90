@@ -100,7 +100,7 @@ contains
     root = at
   end subroutine approach
 
-  !> Steps from `a` that no zero is within, to the first, `root`, or `at` the position where they have become too many, `b` at most.
+  !> Steps from `a` that hold no zero, to the first, `root`, or to `at`, where they have become too many, `b` at most.
   pure subroutine step_on(search, g, a, b, root, at, evaluations)
     type(search_t), intent(in) :: search
     integer, intent(in) :: g
@@ -122,7 +122,7 @@ contains
         if (d(1) < 0) root = max(a, at - d(0)/d(1))
         return
       end if
-      ! Within the next stretch no curvature is below this.
+      ! Within the next interval no curvature is below this.
       falling = max(0.0_wp, -d(2) + third*(b - at)/3)
       step = positive_step(d(0), d(1), falling)
       if (at + step > b) then
@@ -142,7 +142,7 @@ contains
   end subroutine step_on
 
   !> Where a guard has been small for long, on from `a` over intervals on which the quintic proves that it has no zero, as far as
-  !> `low`; between that and `high` it does not, however short the stretch.
+  !> `low`; between that and `high` it does not, however short the interval.
   pure subroutine prove_on(search, g, a, b, low, high, evaluations)
     type(search_t), intent(in) :: search
     integer, intent(in) :: g

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> One flight of a linear mode: to the first guard that falls, or to a time.
+!> One flight of a linear mode: to the first guard that is triggered, or to a time.
 module linear_flight
   use flight_path, only: begin_path, path_at, path_t, series_step, terms
   use guard_functions, only: prepare_search, search_t
@@ -33,8 +33,8 @@ module linear_flight
 
 contains
 
-  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `triggered` those that fell together at
-  !> the end, none if the time is over. `path` is the way.
+  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `triggered` those triggered together at
+  !> the end, none if the time is over. `path` is that of the flight.
   pure subroutine fly_linear(machine, flow, state, until, list, count_guards, triggered, path, watch)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -92,7 +92,7 @@ contains
     do i = 1, intervals
       call series_step(path%matrix, y, length, powers)
       size_of_y = abs(y)
-      ! A position on its way through zero has the rounding of its swing.
+      ! A position on its way through zero has the rounding of its amplitude.
       size_of_y(:n) = size_of_y(:n) + length*size_of_y(n + 1:2*n)
       root = 2
       do g = 1, count_guards
@@ -126,7 +126,7 @@ contains
     state%v(:n) = y(n + 1:2*n)
   end subroutine fly_series
 
-  !> Extremes of the watched coordinate up to a fraction of a stretch, from its series and that of its speed.
+  !> Extremes of the watched coordinate up to a fraction of an interval, from its series and that of its speed.
   pure subroutine watch_series(position, speed, fraction, watch)
     real(wp), intent(in) :: position(0:), speed(0:), fraction
     type(watch_t), intent(inout) :: watch
@@ -144,7 +144,7 @@ contains
     watch%extremes = [min(watch%extremes(1), value(position, at)), max(watch%extremes(2), value(position, at))]
   end subroutine watch_series
 
-  !> Where a series changes its sign up to a fraction of a stretch, 0 if it does not.
+  !> Where a series changes its sign up to a fraction of an interval, 0 if it does not.
   pure real(wp) function zero_of(p, fraction) result(at)
     real(wp), intent(in) :: p(0:), fraction
     real(wp) :: low, high
@@ -163,7 +163,7 @@ contains
     end do
   end function zero_of
 
-  !> Gaps that stop closing on a stretch up to a `fraction` of it, from their series; those that fall there have a `root` at it.
+  !> Gaps that stop closing on an interval up to a `fraction` of it, from their series; those triggered there have a `root` at it.
   pure subroutine note_misses(list, gap, root, fraction, margin)
     type(joint_guard_t), intent(in) :: list(:)
     real(wp), intent(in) :: gap(0:, :), root(:), fraction
@@ -198,7 +198,7 @@ contains
   end function value
 
   !> Drops the leading terms of a series, where it `starts`, that are no more than the rounding of what they are sums of: `sizes`
-  !> times those of the unknowns. One that is nothing else is raised by its rounding, `lift`: it falls when it is below that.
+  !> times those of the unknowns. One that is nothing else is raised by its rounding, `lift`: it is triggered when below that.
   pure subroutine drop_rounding(sizes, matrix, unknowns, length, starts, p, lift)
     real(wp), intent(in) :: sizes(:), matrix(:, :), unknowns(:), length
     logical, intent(in) :: starts

@@ -78,7 +78,7 @@ contains
       end associate
     end do
     duration = machine%period
-    ! Held bodies move as they are told: only the force of the contact knows how fast that is.
+    ! Held bodies move as prescribed: only the force of the contact knows how fast that is.
     if (size(flow%held) > 0) duration = min(duration, 3*contact_time)
     call begin_march(flight%march, flight%system, tolerance, scale, duration, 0.0_wp, y)
   end subroutine begin_flight
@@ -203,8 +203,8 @@ contains
     if (amount > tiny(amount)*contact%stiffness) depth = exponential(logarithm(amount/contact%stiffness)/(contact%exponent + more))
   end function depth
 
-  !> One step, until `until` [s after the section] at most. `path` is the step; `triggered` are the guards that triggered_guard
-  !> together at its end; `ended` says that the flight is over, `failed` that no step is small enough.
+  !> One step, until `until` [s after the section] at most. `path` is the step; `triggered` are the guards triggered together at
+  !> its end; `ended`: the flight is over, `failed`: no step is small enough.
   pure subroutine step_flight(machine, flight, state, until, path, triggered, ended, failed, watch)
     type(multibody_t), intent(in) :: machine
     type(marched_flight_t), intent(inout) :: flight

@@ -185,9 +185,9 @@ contains
     end do
   end function marched_slope
 
-  !> Accelerations with the size of each term in its position, those of a nonlinear force and what its slopes make of the sizes
-  !> of its coordinate and speed: near an equilibrium the terms cancel, and their rounding is left. `origin` are the coordinates at
-  !> the start [m].
+  !> Accelerations with each term replaced by its size, those of a nonlinear force and what its slopes make of the sizes of its
+  !> coordinate and speed: near an equilibrium the terms cancel, and their rounding is left. `origin` are the coordinates at the
+  !> start [m].
   pure function sizes_of_terms(self, origin, time, y) result(sizes)
     class(marched_t), intent(in) :: self
     real(wp), intent(in) :: origin(:), time, y(:)

@@ -165,7 +165,7 @@ contains
     if (machine%extra) slope(2) = slope(2) + extra_force(machine, slip, time, y(1), y(2), spring_extension)/machine%mass
   end subroutine find_slope
 
-  !> How far the spring_extension of the spring is below or above a constant [m].
+  !> How far the extension of the spring is below or above a constant [m].
   pure real(wp) function margin_of(machine, guard, time, y)
     type(system_t), intent(in) :: machine
     type(guard_t), intent(in) :: guard

@@ -9,8 +9,8 @@
 !> The one harmonic that may be near resonance is kept out of the periodic response; its answer from
 !> rest, (exp(i n Omega s) - exp(lambda s))/(i n Omega - lambda), is written with exp(x) - 1 and stays
 !> accurate through undamped exact resonance.
-!> Far above critical damping the exponents are real, -slow and -fast: u = y' + fast y and w = y' + slow y are then
-!> u' = -slow u + f and w' = -fast w + f, and take the positions of the two parts of z.
+!> Far above critical damping the exponents are real, -slow and -fast: u = y' + fast y and w = y' + slow y then replace the two
+!> parts of z, with u' = -slow u + f and w' = -fast w + f.
 module exact_flow
   use effect_law, only: constant_force
   use elementary, only: exponential, exponential_minus_one, sine_cosine
@@ -67,7 +67,7 @@ module exact_flow
 
 contains
 
-  !> Closed form of a machine; `available` tells whether it has one.
+  !> Closed form of a machine; `available`: whether it has one.
   pure subroutine prepare_flow(machine, flow)
     type(oscillator_t), intent(in) :: machine
     type(flow_t), intent(out) :: flow

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Crossing the thin Stribeck layer in one stroke. The speed w takes the position of the time as the independent variable
+!> Crossing the thin Stribeck layer by collocation. The speed w replaces the time as the independent variable
 !> (Henon's trick), so that the end of the layer is known:
 !>   dt/dw = 1/A,  dx/dw = s w/A,  A = s (f(t) - omega^2 y) - 2 g w - (E/m) exp(-(w/v_s)^delta),
 !> y the distance from the sliding equilibrium, s the direction. The exponential at the collocation points does

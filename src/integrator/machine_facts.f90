@@ -19,7 +19,7 @@ module machine_facts
 
 contains
 
-  !> Whether `moving%machine` says all of the machine.
+  !> Whether `moving%machine` describes all of the machine.
   pure logical function is_one_body(moving)
     type(motion_t), intent(in) :: moving
     is_one_body = .not. allocated(moving%multibody)
@@ -89,7 +89,7 @@ contains
     if (has_driver(moving)) rest_lasts = moving%multibody%machine%driver%at == 0
   end function rest_lasts
 
-  !> Half range [m] of a motion below which it is one of the rounding: a thousandth of what the forces do.
+  !> Amplitude [m] of a motion below which it is rounding: a thousandth of what the forces do.
   pure real(wp) function smallest_motion(moving) result(smallest)
     type(motion_t), intent(in) :: moving
     smallest = 1e-3_wp
@@ -101,7 +101,7 @@ contains
     end if
   end function smallest_motion
 
-  !> The stops of the one body that is looked at, or of two; those of other structures are told by their joints.
+  !> The stops of the one body that is looked at, or of two; those of other structures belong to their joints.
   pure type(contact_t) function stops_of(moving) result(stops)
     type(motion_t), intent(in) :: moving
     integer :: stop

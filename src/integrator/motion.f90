@@ -54,7 +54,7 @@ module motion
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
     real(wp) :: layer = 0
-    !> The section is where the motion turns round, in the position of a time.
+    !> The section is where the motion turns round, not at a given time.
     logical :: by_event = .false.
     !> Several bodies with joints.
     type(multibody_motion_t), allocatable :: multibody

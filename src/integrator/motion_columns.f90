@@ -67,7 +67,7 @@ contains
     call set_column(columns(2), 'driver_v', 'm/s', 'velocity of the driving body', driver(2, :))
   end function driver_columns
 
-  !> Position and velocity of every coordinate of a structure; inner ones have a number in the position of a point's name.
+  !> Position and velocity of every coordinate of a structure; inner ones have a number instead of a point's name.
   pure function coordinate_columns(machine, log) result(columns)
     type(multibody_t), intent(in) :: machine
     type(log_t), intent(in) :: log

@@ -37,7 +37,7 @@ contains
     at = size(moving%directions, 2) + moving%machine%watched
   end function watched_speed
 
-  !> Whether there is room for the coordinates, and they tell what follows: nothing acts at times of its own.
+  !> Whether there is room for the coordinates, and they determine what follows: nothing acts at times of its own.
   pure logical function fits_section(moving)
     type(multibody_motion_t), intent(in) :: moving
     fits_section = coordinates_of_multibody(moving) <= most_coordinates .and. .not. acts_on_time(moving%machine)
@@ -88,10 +88,9 @@ contains
     keeps_clear = .true.
   end function keeps_clear
 
-  !> A state with the watched position at `x` [m], `v` [m/s], what does not follow it where the machine says, and the
-  !> drive at `angle` [rad].
-  !> `others`, if it is not empty, has position and velocity of every coordinate in the position of what the machine says.
-  !> One that no mode fits, or that lies beyond a stop, is not a number.
+  !> A state with the watched position at `x` [m], `v` [m/s], what does not follow it as in the machine, and the drive at `angle`
+  !> [rad]. `others`, if it is not empty, has position and velocity of every coordinate in place of those of the machine. A state
+  !> that no mode fits, or that lies beyond a stop, is not a number.
   pure function start_of_multibody(moving, x, v, angle, others) result(state)
     type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, angle
@@ -131,8 +130,8 @@ contains
     end do
   end function is_allowed
 
-  !> Places and velocities of all coordinates for those of the section, `point`; what these leave open is zero: of two bodies that
-  !> nothing ties to the ground position and velocity of the driving one.
+  !> Positions and velocities of all coordinates for those of the section, `point`; what these leave open is zero: of two bodies
+  !> that nothing ties to the ground position and velocity of the driving one.
   pure subroutine lay_out(moving, point, q, v)
     type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)

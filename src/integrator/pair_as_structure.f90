@@ -60,7 +60,7 @@ contains
                                         time=pair%impulse_time))
   end subroutine structure_of_pair
 
-  !> What is told of the driving body, and where it starts.
+  !> What is reported of the driving body, and where it starts.
   pure subroutine name_driver(pair, wave, machine)
     type(pair_t), intent(in) :: pair
     type(wave_t), intent(in) :: wave

@@ -86,8 +86,8 @@ contains
     end if
   end function coordinates_of
 
-  !> Whether the state on the section tells what follows: not with a controller that acts at times of its own, nor before
-  !> an impulse.
+  !> Whether the state on the section determines what follows: not with a controller that acts at times of its own, nor before an
+  !> impulse.
   pure logical function has_section(moving)
     type(motion_t), intent(in) :: moving
     has_section = .true.
@@ -105,15 +105,15 @@ contains
              to_text(most_coordinates)
       if (acts_on_time(moving%multibody%machine)) text = &
         'with impulses, or samples of a controller, the state at crank angle 0 '// &
-                                                       'does not tell what follows'
+                                                       'does not determine what follows'
     end if
     if (has_driver(moving)) text = 'with '//trim(merge('body.impulse     ', 'drive.sample_time', &
                                                        allocated(moving%multibody%machine%impulses)))// &
-                                   ' the state at crank angle 0 does not tell what follows'
+                                   ' the state at crank angle 0 does not determine what follows'
   end function section_obstacle
 
-  !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as its machine says. What follows in `start`
-  !> are positions and velocities of the coordinates of several bodies, in the position of those that the machine says.
+  !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as in its machine. What follows in `start` are
+  !> positions and velocities of the coordinates of several bodies, in place of those of the machine.
   pure function start_section(moving, start) result(section)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(:)
@@ -140,8 +140,8 @@ contains
     end if
   end function start_is_allowed
 
-  !> The state of one machine given to another, on the section with the crank at an angle [rad]; a driving body whose motion
-  !> is given has that of the new one. What was never moved starts as the new machine says.
+  !> The state of one machine given to another, on the section with the crank at an angle [rad]; a driving body whose motion is
+  !> given has that of the new one. What was never moved starts as in the new machine.
   pure function resume_section(moving, before, angle) result(section)
     type(motion_t), intent(in) :: moving
     type(section_state_t), intent(in) :: before

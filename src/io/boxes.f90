@@ -45,7 +45,7 @@ contains
     end do
   end subroutine copy_common
 
-  !> How many values lie before a subscripts (from 0) in C order.
+  !> How many values lie before given subscripts (from 0) in C order.
   pure integer(int64) function offset(subscripts, extent)
     integer(int64), intent(in) :: subscripts(:), extent(:)
     integer :: k

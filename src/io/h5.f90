@@ -126,7 +126,7 @@ contains
     call h5pcreate_f(H5P_FILE_CREATE_F, creation, status)
     ! Readers with HDF5 1.10 open the file.
     if (status >= 0) call h5pset_libver_bounds_f(access, oldest, H5F_LIBVER_V110_F, status)
-    ! Data gets its place at the end of the file, each piece by itself (module h5_chunks).
+    ! Data gets its space at the end of the file, each piece by itself (module h5_chunks).
     if (status >= 0) call h5pset_small_data_block_size_f(access, 0_hsize_t, status)
     if (status >= 0) call h5pset_link_creation_order_f(creation, ior(H5P_CRT_ORDER_TRACKED_F, H5P_CRT_ORDER_INDEXED_F), status)
     if (status >= 0) call h5fcreate_f(path, H5F_ACC_TRUNC_F, file%id, status, creation, access)
@@ -156,7 +156,7 @@ contains
     if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
     if (status >= 0) call h5pset_meta_block_size_f(access, front_bytes, status)
     if (status >= 0) call h5pset_small_data_block_size_f(access, front_bytes, status)
-    ! Without caches of its own for data HDF5 hands over at once what it is told to write: nothing has to be flushed.
+    ! Without caches of its own for data HDF5 hands over at once what it writes: nothing has to be flushed.
     if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_cache_f(access, 0, 0_size_t, 0_size_t, 0.0, status)
     if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_sieve_buf_size_f(access, 0_size_t, status)
     if (present(team) .and. status >= 0) then

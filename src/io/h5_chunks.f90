@@ -9,7 +9,7 @@ module h5_chunks
   use guard, only: end_guard
   use h5, only: h5_dataset_t, h5_failed, h5_file_t
   use h5_trap, only: trap
-  use hdf5, only: h5fget_filesize_f, H5P_DEFAULT_F, hid_t, hsize_t
+  use hdf5, only: h5fget_filesize_f, H5P_DEFAULT_F, hsize_t
   use kinds, only: int64, int8
   use status, only: exit_io
   implicit none
@@ -20,30 +20,30 @@ module h5_chunks
   interface
     ! HDF5's Fortran interface lacks these.
     integer(c_int) function write_chunk(dataset, access, filters, corner, size, bytes) bind(c, name='H5Dwrite_chunk')
-      import :: c_int, c_int32_t, c_ptr, c_size_t, hid_t
-      integer(hid_t), value :: dataset, access
+      import :: c_int, c_int32_t, c_int64_t, c_ptr, c_size_t
+      integer(c_int64_t), value :: dataset, access
       integer(c_int32_t), value :: filters
       integer(c_size_t), value :: size
       type(c_ptr), value :: corner, bytes
     end function write_chunk
 
     integer(c_int) function read_chunk(dataset, access, corner, filters, bytes) bind(c, name='H5Dread_chunk')
-      import :: c_int, c_int32_t, c_ptr, hid_t
-      integer(hid_t), value :: dataset, access
+      import :: c_int, c_int32_t, c_int64_t, c_ptr
+      integer(c_int64_t), value :: dataset, access
       integer(c_int32_t), intent(out) :: filters
       type(c_ptr), value :: corner, bytes
     end function read_chunk
 
     integer(c_int) function chunk_size(dataset, corner, size) bind(c, name='H5Dget_chunk_storage_size')
-      import :: c_int, c_int64_t, c_ptr, hid_t
-      integer(hid_t), value :: dataset
+      import :: c_int, c_int64_t, c_ptr
+      integer(c_int64_t), value :: dataset
       type(c_ptr), value :: corner
       integer(c_int64_t), intent(out) :: size
     end function chunk_size
 
     integer(c_int) function chunk_info(dataset, corner, filters, offset, size) bind(c, name='H5Dget_chunk_info_by_coord')
-      import :: c_int, c_int32_t, c_int64_t, c_ptr, hid_t
-      integer(hid_t), value :: dataset
+      import :: c_int, c_int32_t, c_int64_t, c_ptr
+      integer(c_int64_t), value :: dataset
       type(c_ptr), value :: corner
       integer(c_int32_t), intent(out) :: filters
       integer(c_int64_t), intent(out) :: offset, size
@@ -68,7 +68,7 @@ contains
     if (h5_failed(status, 'find a chunk of', dataset%name, dataset%path, error)) return
   end subroutine h5_chunk_offset
 
-  !> Takes the space of a chunk that no one has written yet, by writing these bytes into it, as they are, and says where that is.
+  !> Takes the space of a chunk that no one has written yet, by writing these bytes into it, as they are, and returns its offset.
   subroutine h5_reserve_chunk(file, dataset, corner, bytes, offset, error)
     type(h5_file_t), intent(in) :: file
     type(h5_dataset_t), intent(in) :: dataset

@@ -25,7 +25,7 @@ module map_reader
 
   public :: open_final, open_reader
 
-  !> What `variables` tells about a dataset. `group` '' is the root.
+  !> What `variables` reports about a dataset. `group` '' is the root.
   type, public :: variable_info_t
     character(len=:), allocatable :: group, name, type
     !> Lengths in C order; none = a scalar.

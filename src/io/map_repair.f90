@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A working file whose tail is lost gets its length back: HDF5 refuses a file that is shorter than it says. What was in
+!> A working file whose tail is lost gets its length back: HDF5 refuses a file that is shorter than it states. What was in
 !> the tail is zero then, and its tiles do not match their checksums.
 module map_repair
   use errors, only: error_t, fail

@@ -56,8 +56,8 @@ contains
     n = 0
     call read_square(reader, 'mass', n, content%mass, problem)
     if (.not. allocated(problem)) call read_square(reader, 'stiffness', n, content%stiffness, problem)
-    if (allocated(problem) .or. .not. reader%has(group//'/damping')) return
-    call read_square(reader, 'damping', n, content%damping, problem)
+    if (allocated(problem)) return
+    if (reader%has(group//'/damping')) call read_square(reader, 'damping', n, content%damping, problem)
   end subroutine read_matrices
 
   subroutine read_modes(reader, content, n, problem)
@@ -80,8 +80,8 @@ contains
       return
     end if
     if (reader%has(group//'/damping_ratio')) call read_list(reader, 'damping_ratio', n, content%damping_ratio, problem)
-    if (allocated(problem) .or. .not. reader%has(group//'/damping')) return
-    call read_square(reader, 'damping', n, content%damping, problem)
+    if (allocated(problem)) return
+    if (reader%has(group//'/damping')) call read_square(reader, 'damping', n, content%damping, problem)
   end subroutine read_modes
 
   !> Points: a row of as many numbers as there are coordinates each.

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A table written line by line. gfortran does not tell that a full disk has lost lines, so the length of the file is
+!> A table written line by line. gfortran does not report that a full disk has lost lines, so the length of the file is
 !> compared with what was written.
 module text_table
   use errors, only: error_t, fail

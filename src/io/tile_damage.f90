@@ -52,7 +52,7 @@ contains
     end do
   end function damaged_tiles
 
-  !> `expected` is allocated only if the file says all that is needed.
+  !> `expected` is allocated only if the file has all that is needed.
   subroutine open_tiles(file, datasets, tiling, expected)
     type(h5_file_t), intent(in) :: file
     type(h5_dataset_t), allocatable, intent(out) :: datasets(:)

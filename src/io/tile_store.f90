@@ -39,7 +39,7 @@ contains
     type(h5_dataset_t), intent(in) :: datasets(:)
     type(tiling_t), intent(in) :: tiling
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: corner(size(tiling%lengths)), place
+    integer(int64) :: corner(size(tiling%lengths)), last_tile
     integer :: i
     self%tiling = tiling
     if (allocated(self%first)) deallocate (self%first, self%width)
@@ -50,9 +50,9 @@ contains
       call h5_chunk_offset(datasets(i), corner, self%first(i), error)
       if (allocated(error)) return
       corner = (tiling%lengths - 1)/tiling%shape*tiling%shape
-      call h5_chunk_offset(datasets(i), corner, place, error)
+      call h5_chunk_offset(datasets(i), corner, last_tile, error)
       if (allocated(error)) return
-      if (place == offset_of(self, i, tiling%count())) cycle
+      if (last_tile == offset_of(self, i, tiling%count())) cycle
       call fail(error, exit_io, 'the tiles of '''//datasets(i)%name//''' in '''//datasets(i)%path// &
                 ''' do not lie one after the other')
       return
@@ -109,42 +109,42 @@ contains
     integer(int64), intent(in) :: lower(:), extent(:)
     integer(int8), intent(inout), contiguous :: bytes(:)
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: first(size(lower)), last(size(lower)), place(size(lower))
+    integer(int64) :: first(size(lower)), last(size(lower)), tile(size(lower))
     integer :: k
     first = lower/self%tiling%shape
     last = (lower + extent - 1)/self%tiling%shape
-    place = first
+    tile = first
     do
-      call read_row(self, variable, place, last(size(lower)), lower, extent, bytes, error)
+      call read_row(self, variable, tile, last(size(lower)), lower, extent, bytes, error)
       if (allocated(error)) return
       do k = size(lower) - 1, 1, -1
-        place(k) = place(k) + 1
-        if (place(k) <= last(k)) exit
-        place(k) = first(k)
+        tile(k) = tile(k) + 1
+        if (tile(k) <= last(k)) exit
+        tile(k) = first(k)
       end do
       if (k < 1) exit
     end do
   end subroutine read_block
 
-  !> What a row of tiles along the last axis, which lie one after the other, holds of a block. `place`: the first of them, counted
+  !> What a row of tiles along the last axis, which lie one after the other, holds of a block. `tile`: the first of them, counted
   !> in tiles from 0 along each axis; `last`: the last of them along the last axis.
-  subroutine read_row(self, variable, place, last, lower, extent, bytes, error)
+  subroutine read_row(self, variable, tile, last, lower, extent, bytes, error)
     class(tile_store_t), intent(in) :: self
     integer, intent(in) :: variable
-    integer(int64), intent(in) :: place(:), last, lower(:), extent(:)
+    integer(int64), intent(in) :: tile(:), last, lower(:), extent(:)
     integer(int8), intent(inout), contiguous :: bytes(:)
     type(error_t), allocatable, intent(out) :: error
     integer(int8), allocatable :: stored(:)
-    integer(int64) :: corner(size(place)), tile_bytes, number, i
+    integer(int64) :: corner(size(tile)), tile_bytes, number, i
     associate (tiling => self%tiling)
       tile_bytes = product(tiling%shape)*self%width(variable)
-      number = tiling%number_at(place)
-      allocate (stored((last - place(size(place)) + 1)*tile_bytes))
+      number = tiling%number_at(tile)
+      allocate (stored((last - tile(size(tile)) + 1)*tile_bytes))
       call self%file%read(stored, offset_of(self, variable, int(number)), error)
       if (allocated(error)) return
-      do i = 0, last - place(size(place))
-        corner = place*tiling%shape
-        corner(size(place)) = corner(size(place)) + i*tiling%shape(size(place))
+      do i = 0, last - tile(size(tile))
+        corner = tile*tiling%shape
+        corner(size(tile)) = corner(size(tile)) + i*tiling%shape(size(tile))
         call copy_common(self%width(variable), corner, tiling%shape, stored(i*tile_bytes + 1:(i + 1)*tile_bytes), lower, extent, &
                          bytes)
       end do

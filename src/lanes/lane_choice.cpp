@@ -4,6 +4,7 @@
 // Which kernel this processor gets. All give the same bits.
 #include "lane_types.hpp"
 #include "lane_untrapped.hpp"
+#include "lane_widths.hpp"
 
 #include <cstddef>
 
@@ -19,13 +20,15 @@ void separatrix_sample_sse2(const lane_machine *, lane_batch *, const lane_sampl
 void separatrix_sample_avx2(const lane_machine *, lane_batch *, const lane_samples *);
 void separatrix_sample_avx512(const lane_machine *, lane_batch *, const lane_samples *);
 
-// Doubles in the widest vector that the processor has: 2, 4 or 8.
+// Doubles in the widest vector that the processor has and this build a kernel for: 2, 4 or 8.
 int separatrix_lane_width(void) {
-#if defined(__x86_64__)
+#if defined(LANES_AVX512)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
       __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw") &&
       __builtin_cpu_supports("avx512cd"))
     return 8;
+#endif
+#if defined(LANES_AVX2)
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma"))
     return 4;
 #endif
@@ -42,23 +45,13 @@ void separatrix_lane_sizes(size_t *machine, size_t *regions, size_t *batch, size
 void separatrix_fly_lanes(int width, const lane_machine *machine, const lane_regions *regions,
                           lane_batch *batch) {
   const untrapped around;
-  if (width >= 8)
-    separatrix_fly_avx512(machine, regions, batch);
-  else if (width >= 4)
-    separatrix_fly_avx2(machine, regions, batch);
-  else
-    separatrix_fly_sse2(machine, regions, batch);
+  CHOOSE(separatrix_fly, machine, regions, batch);
 }
 
 void separatrix_vary_lanes(int width, const lane_machine *machine, lane_batch *batch,
                            lane_tangents *tangents) {
   const untrapped around;
-  if (width >= 8)
-    separatrix_vary_avx512(machine, batch, tangents);
-  else if (width >= 4)
-    separatrix_vary_avx2(machine, batch, tangents);
-  else
-    separatrix_vary_sse2(machine, batch, tangents);
+  CHOOSE(separatrix_vary, machine, batch, tangents);
 }
 
 void separatrix_sample_lanes(int width, const lane_machine *machine, lane_batch *batch, int64_t most,
@@ -66,11 +59,6 @@ void separatrix_sample_lanes(int width, const lane_machine *machine, lane_batch 
                              int64_t *impacts, double *impact, double most_steps, double *steps) {
   const untrapped around;
   const lane_samples samples = {most, count, times, taken, x, v, impacts, impact, most_steps, steps};
-  if (width >= 8)
-    separatrix_sample_avx512(machine, batch, &samples);
-  else if (width >= 4)
-    separatrix_sample_avx2(machine, batch, &samples);
-  else
-    separatrix_sample_sse2(machine, batch, &samples);
+  CHOOSE(separatrix_sample, machine, batch, &samples);
 }
 }

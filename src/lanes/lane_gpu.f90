@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Bodies on a GPU, a thread each (`lane_gpu.hpp`): the batches of `lane_types`, many at once, in two halves. While one half
-!> flies, the other can be serviced to. What comes out is that of `fly_lanes`, to the bit.
+!> Bodies on a GPU, a thread each (`lane_gpu.hpp`): the batches of `lane_types`, many at once, in two halves. While one half flies,
+!> the other can be served. What comes out is that of `fly_lanes`, to the bit.
 module lane_gpu
   use errors, only: error_t, fail
   use kinds, only: int64, wp
@@ -25,7 +25,7 @@ module lane_gpu
   !> The GPU of this process, -1 = none.
   integer, protected :: gpu_in_use = -1
 
-  !> Threads of this process that service to its bodies.
+  !> Threads of this process that serve its bodies.
   integer, protected :: gpu_threads = 1
 
   interface
@@ -86,7 +86,7 @@ contains
     gpu_is_built = separatrix_gpu_built() /= 0
   end function gpu_is_built
 
-  !> GPUs that this process sees and has code for; `why`: what CUDA says where it sees none.
+  !> GPUs that this process sees and has code for; `why`: what CUDA reports where it sees none.
   subroutine count_gpus(number, why)
     integer, intent(out) :: number
     character(len=:), allocatable, intent(out) :: why
@@ -110,7 +110,7 @@ contains
     name = text_of(text)
   end function gpu_name
 
-  !> From here on machines are made ready for this GPU, or with -1 for the processor's vectors; so many `threads` service to it.
+  !> From here on machines are made ready for this GPU, or with -1 for the processor's vectors; so many `threads` serve it.
   subroutine use_gpu(device, threads)
     integer, intent(in) :: device
     integer, intent(in), optional :: threads

@@ -3,7 +3,7 @@
 
 // A pool of bodies on a GPU, one thread each, by the kernel of the lanes. Written with the calls of CUDA's
 // runtime, which `lane_gpu_host.hpp` has for the host as well. The pool has two halves: while one flies, the
-// host services to the other.
+// host serves the other.
 #ifndef SEPARATRIX_LANE_GPU_HPP
 #define SEPARATRIX_LANE_GPU_HPP
 
@@ -86,8 +86,8 @@ struct gpu_attempt {
       (attempt)(#call, call(__VA_ARGS__));                                                                   \
   } while (0)
 
-// Compute capabilities (100 major + 10 minor) that this build has code for, ascending, as nvcc says; for the
-// stand-in those that CMake asks it for by default.
+// Compute capabilities (100 major + 10 minor) that this build has code for, ascending, as nvcc lists them;
+// for the stand-in those that CMake asks it for by default.
 #ifdef __CUDA_ARCH_LIST__
 const int architectures[] = {__CUDA_ARCH_LIST__};
 #else
@@ -144,7 +144,7 @@ void gpu_name(int device, char *text, int size) {
   snprintf(text, size, "%s", known ? properties.name : "unknown");
 }
 
-// Gives back what the halves have; what fails then has been said, or does no harm.
+// Gives back what the halves have; what fails then has been reported, or does no harm.
 void gpu_free() {
   for (gpu_half &half : pool.half) {
     cudaFreeHost(half.batches);
@@ -227,7 +227,7 @@ int gpu_send(int which, int64_t batches, const lane_machine *machine, const lane
   return attempt.end(message, size);
 }
 
-// Says what went wrong in the kernel as well: its errors come late.
+// Reports what went wrong in the kernel as well: its errors come late.
 int gpu_wait(int which, char *message, int size) {
   gpu_attempt attempt;
   GPU_ATTEMPT(attempt, cudaStreamSynchronize, pool.half[which].stream);

@@ -130,7 +130,7 @@ LANE_DEVICE inline mask find_events(const machine &m, mask seek, mask upward, ve
     vec step = -f * (f1 * f1 - 0.5 * f * f2) / (f1 * (f1 * f1 - f * f2) + (1.0 / 6) * f * f * f3);
     vec next = s + step;
     mask guided = (f1 < 0.0) & (next >= low) & (next <= high) & (next > 0.0);
-    // Newton's step is asked, too: where the numerator vanishes Householder's says nothing.
+    // Newton's step counts, too: where the numerator vanishes Householder's means nothing.
     mask close = guided & (magnitude(step) <= m.close) & (magnitude(f) <= -2 * m.close * f1);
     vec half = 0.5 * step, third = (1.0 / 3) * step, fourth = 0.25 * step;
     vec turn_x = k.x + step * (k.v + half * (k.a + third * (k.j + fourth * k.s)));
@@ -401,8 +401,8 @@ LANE_DEVICE void fly_through_modes(const lane_machine &m, const lane_regions &re
         mask free = flying & ~pressed, seek = free & (g.found < 0.5);
         if (any(seek))
           left = look_ahead<true, false>(f, seek, g.direction > 0.0, f.barrier, g);
-        // Friction that has dropped to zero stays there. A slip has it where either end has, as its position does
-        // not turn round.
+        // Friction that has dropped to zero stays there. A slip has it where either end has, as its position
+        // does not turn round.
         if (m.friction_slope != 0)
           left = left | (seek & ((1.0 + m.friction_slope * g.x <= 0.0) |
                                  (1.0 + m.friction_slope * (f.origin + g.end_x) <= 0.0)));

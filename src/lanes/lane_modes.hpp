@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // Machines whose equation is linear in every mode of slip, but not the same in all: barriers that are springs
-// with dampers, friction that differs by direction or changes with the position. Each lane has the coefficients
-// of the mode it is in; the search for events and its proof are those of the plain machine.
+// with dampers, friction that differs by direction or changes with the position. Each lane has the
+// coefficients of the mode it is in; the search for events and its proof are those of the plain machine.
 #ifndef SEPARATRIX_LANE_MODES_HPP
 #define SEPARATRIX_LANE_MODES_HPP
 
@@ -75,16 +75,16 @@ LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_gro
   mask hit = g.hits > 0.5, impact = hit & (f.leads_to < 0.0), passage = hit & (f.leads_to >= 0.0);
   mask free = g.pressed_on < 0.5;
   vec w = g.direction * g.end_v, gap = g.direction * (f.barrier - g.end_x);
-  vec pressed_on = f.origin + pick(hit & (f.lead <= 0.0), f.barrier, g.end_x);
-  vec factor = 1.0 + m.friction_slope * pressed_on;
+  vec position = f.origin + pick(hit & (f.lead <= 0.0), f.barrier, g.end_x);
+  vec factor = 1.0 + m.friction_slope * position;
   vec push = -g.direction * g.end_a - m.kinetic * factor;
   vec restitution = m.restitution;
   if (any(due & impact))
     restitution = restitution_at(m, w);
-  mask turns_back = (push > m.break_away * factor) & (~free | ((pressed_on < m.upper) & (pressed_on > m.lower)));
+  mask turns_back = (push > m.break_away * factor) & (~free | ((position < m.upper) & (position > m.lower)));
   mask passes = (w > 0.0) & leaves_for_good(f, g, w);
   mask plain = pick(impact, restitution * w > m.slow, pick(passage, passes, turns_back)) &
-               (magnitude(pressed_on) < m.domain) & (factor > 0.0);
+               (magnitude(position) < m.domain) & (factor > 0.0);
   mask rare = due & ~plain;
   due = due & plain;
   mask up = due & free & (g.direction > 0.0), down = due & free & (g.direction < 0.0);
@@ -100,7 +100,7 @@ LANE_DEVICE inline mask take_mode_events(const lane_modes &f, mask due, lane_gro
   put(g.last_speed, struck, w);
   put(g.margin, due & ~hit & free & (gap < g.margin), gap);
   put(g.time, due, g.start + g.span);
-  put(g.x, due, pressed_on);
+  put(g.x, due, position);
   put(g.v, due, pick(passage, g.end_v, pick(impact, -restitution * g.end_v, 0)));
   put(g.direction, due & ~passage, -g.direction);
   put(g.touch, due & passage & free, w);

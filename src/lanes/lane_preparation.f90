@@ -147,7 +147,7 @@ contains
     end associate
   end function has_linear_modes
 
-  !> The surface [m] that a body in `pressed_on` presses on (0: none, and zero), as in lane_types.hpp.
+  !> The surface [m] that a body presses on, by `pressed_on` as in lane_types.hpp (0: none, and zero).
   pure real(wp) function surface_of(law, pressed_on)
     type(oscillator_t), intent(in) :: law
     integer, intent(in) :: pressed_on
@@ -156,7 +156,7 @@ contains
     if (pressed_on == 2) surface_of = law%contact%soft_lower
   end function surface_of
 
-  !> The mode of a slip in `direction` +1 or -1 in `pressed_on`. `available` becomes false where it has no closed form for lanes.
+  !> The mode of a slip in `direction` +1 or -1. `available` becomes false where it has no closed form for lanes.
   pure subroutine set_mode(law, pressed_on, direction, m, mode, available)
     type(oscillator_t), intent(in) :: law
     integer, intent(in) :: pressed_on, direction

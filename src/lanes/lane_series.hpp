@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // Machines without a closed form, by Taylor series over the lanes: cubic springs, free play and pendulums,
-// drag, friction that depends on speed or position, Dahl's friction, tables. Every step expands the motion to a
-// fixed order by recurrences; its length follows from the last coefficients (Jorba & Zou 2005). Events are
+// drag, friction that depends on speed or position, Dahl's friction, tables. Every step expands the motion to
+// a fixed order by recurrences; its length follows from the last coefficients (Jorba & Zou 2005). Events are
 // roots of the polynomials; that nothing comes before them is proven by the Bernstein coefficients of the
 // velocity.
 #ifndef SEPARATRIX_LANE_SERIES_HPP
@@ -130,7 +130,7 @@ struct table_series {
   }
 };
 
-// The acceleration of a body that slips as `direction` says, by everything but a soft barrier, as a series.
+// The acceleration of a body that slips in `direction`, by everything but a soft barrier, as a series.
 struct force_series {
   vec extension[order], square[order], turn[order], sine[order], cosine[order], dry[order], behind[order],
       factor[order], speed_square[order];
@@ -203,7 +203,7 @@ struct force_series {
     return a - product(factor, dry, k);
   }
 
-  // Stretch and factor of dry friction where `x` has one coefficient more than they have.
+  // Extension and factor of dry friction where `x` has one coefficient more than they have.
   LANE_DEVICE inline void keep(const vec *x, vec *all_extension, vec *all_factor) const {
     for (int k = 0; k < order - 1; k++) {
       all_extension[k] = extension[k];
@@ -245,7 +245,7 @@ LANE_DEVICE inline vec step_length(const lane_machine &m, const expansion &p) {
 }
 
 // How much the speed may change over a step where there is friction E exp(-(v/v_s)^delta): the terms of its
-// series grow before they shrink, so that the last one says little. While the speed changes steadily what is
+// series grow before they shrink, so that the last one means little. While the speed changes steadily what is
 // left out of exp(-(u + x)^2) begins with x^18 H_18(u) exp(-u^2)/18!, at most 7.0e-6 exp(-u^2/2) |x|^18
 // (Cramer's inequality): 7e-10 at |x| = 0.6 exp(u^2/36), whatever u; above u = 6.2 it is nil. In a contact
 // the speed's own higher terms count: |x| <= 0.5. For |x| <= 2 what is left out of exp(-(u + x)) is below
@@ -320,7 +320,7 @@ LANE_DEVICE inline mask fall(const vec (&c)[degree + 1], mask seek, vec high, ve
     put(high, f <= 0.0, s);
     vec next = s - 2.0 * f * f1 / (2.0 * f1 * f1 - f * f2);
     mask guided = (f1 < 0.0) & (next >= low) & (next <= high);
-    // Newton's step is asked, too: where the slope vanishes Halley's says nothing.
+    // Newton's step counts, too: where the slope vanishes Halley's means nothing.
     mask close = (magnitude(next - s) <= 1e-7 * high) & (magnitude(f) <= -2e-7 * high * f1);
     mask done = seek & ((guided & close) | (high - low <= 4e-16 * high));
     put(root, done, pick(guided, next, s));

@@ -24,7 +24,7 @@ module lane_slots
   !> Every lane is controlled by `batch`; the motion of several bodies is in `structures`.
   type, public :: lane_slots_t
     type(lane_batch_t) :: batch
-    !> What one body can be converged by.
+    !> What one body can converge to.
     type(regions_t) :: regions
     type(structure_batch_t), allocatable :: structures
   end type lane_slots_t
@@ -48,8 +48,8 @@ contains
     if (allocated(moving%multibody)) allocate (lane_slots%structures)
   end subroutine open_lanes
 
-  !> The lanes can be converged by attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What
-  !> does not fit makes every lane stop at every section.
+  !> The lanes can converge to attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What does
+  !> not fit makes every lane stop at every section.
   pure subroutine add_capture(moving, lane_slots, attractor, point, scale, metric, reach)
     type(motion_t), intent(in) :: moving
     type(lane_slots_t), intent(inout) :: lane_slots
@@ -101,7 +101,7 @@ contains
   end subroutine put_into_lane
 
   !> The motion in a lane, where it stopped or at the start of the flight that is left to the event loop; what the lane has
-  !> counted goes to the tally. Not a function: the copy of its result, just written, would stall every stop.
+  !> counted goes to the tally. Not a function: the copy of its result, just written, would delay every stop.
   pure subroutine take_from_lane(moving, lane, batch, structures, section, tally)
     type(motion_t), intent(in) :: moving
     integer, intent(in) :: lane

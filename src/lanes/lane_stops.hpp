@@ -17,7 +17,7 @@ LANE_LEAF bool is_due_back(int &rounds) { return vec_size == 1 && ++rounds > mos
 
 // Nothing rides along with the bodies; see `lane_variation.hpp` and `lane_samples.hpp` for what may.
 struct nothing_along {
-  // The lanes `flying` move until `end` as `known` says.
+  // The lanes `flying` move until `end` along `known`.
   template <class motion> LANE_LEAF void flown(mask, vec, const motion &) {}
   // Lanes that have taken too many steps.
   LANE_LEAF mask weary() const { return mask{}; }
@@ -37,7 +37,8 @@ const double for_ever = 1e300;
 // What is not known: the speed after a soft contact while that lasts, a sample without a root.
 const double not_known = __builtin_nan("");
 
-// The attractors that have converged points on the section, 0 = none; as `find_capture` of `attractors.f90`.
+// The attractors to which points on the section have converged, 0 = none; as `find_capture` of
+// `attractors.f90`.
 LANE_DEVICE inline vec attractors_reached(const lane_regions &regions, vec x, vec v) {
   vec reached = {};
   for (int i = regions.count - 1; i >= 0; i--) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Forces that a table gives over the extension, the position or the speed: a cubic between two knots. A step of a
-// series knows one piece of each table; it ends where a lane leaves that.
+// Forces that a table gives over the extension, the position or the speed: a cubic between two knots. A step
+// of a series knows one piece of each table; it ends where a lane leaves that.
 #ifndef SEPARATRIX_LANE_TABLES_HPP
 #define SEPARATRIX_LANE_TABLES_HPP
 

@@ -16,8 +16,8 @@ enum {
   most_knots = 16,
   // Of the series of machines without a closed form.
   series_order = 18,
-  // Tables of a force: over the extension, over the pressed_on, the factor of dry friction over the position, friction
-  // over the speed upwards and downwards, free play over the extension.
+  // Tables of a force: over the extension, over the position, the factor of dry friction over the position,
+  // friction over the speed upwards and downwards, free play over the extension.
   over_extension = 0,
   over_position = 1,
   factor_over_position = 2,
@@ -44,8 +44,8 @@ struct lane_layer {
   double first_from_edge[layer_nodes], second_from_edge[layer_nodes];
 };
 
-// A mode of slip of a machine that has several: number 2 pressed_on + (0 up, 1 down), pressed_on 0 = free, 1 = pressed
-// on the upper and 2 on the lower barrier. Positions are relative to `origin` [m].
+// A mode of slip of a machine that has several: number 2 pressed_on + (0 up, 1 down), pressed_on 0 = free, 1
+// = pressed on the upper and 2 on the lower barrier. Positions are relative to `origin` [m].
 struct lane_mode {
   double natural, damped, decay, origin, rest;
   // Where the flight ends unless it turns before, and the position that follows there; -1 = an impact. With a
@@ -169,8 +169,8 @@ template <class T> struct lane_fields {
   // Counts and extremes since the caller last took them away. A section ends a flight, too.
   T flights, impacts, speed_sum, last_speed, margin;
   // Sections that the lane passes before it stops at one; the flights after which it is left to the scalar
-  // code; whether it stops where it is converged. Time since the start of the trajectory, the attractor that
-  // has converged it (0 = none), and since when (-1 = not).
+  // code; whether it stops where it has converged. Time since the start of the trajectory, the attractor to
+  // which it has converged (0 = none), and since when (-1 = not).
   T sections, budget, leaves, elapsed, reached, settled;
   // From here on with several modes, or a Stribeck layer, only. Free, or pressed on the upper (1) or the
   // lower barrier (2).
@@ -191,8 +191,8 @@ struct lane_region {
   double attractor, x, v, scaling_x, scaling_v, metric_xx, metric_xv, metric_vv, reach;
 };
 
-// What the lanes can be converged by; a point in several belongs to the first. Unless these are all, every
-// lane stops at every section.
+// What the lanes can converge to; a point in several belongs to the first. Unless these are all, every lane
+// stops at every section.
 struct lane_regions {
   int count, complete;
   lane_region region[most_regions];
@@ -230,12 +230,12 @@ struct lane_samples {
 };
 
 // Bodies on a GPU, see `lane_gpu.hpp`: by CUDA, or on the host for tests. 0 = all went well, else `message`
-// says what has failed.
+// states what has failed.
 struct lane_gpu {
-  // Devices that can be used; where there are none, `message` may say why. The number that CUDA gives to the
-  // one at `position` among them, from 0, which the others take.
+  // Devices that can be used; where there are none, `message` may state why. The number that CUDA gives to
+  // the one at `index` among them, from 0, which the others take.
   int (*count)(char *message, int size);
-  int (*number)(int pressed_on);
+  int (*number)(int index);
   void (*name)(int device, char *text, int size);
   // Makes both halves on a device, of at most `wanted` batches each; `batches`: as many as there are.
   int (*open)(int device, int64_t wanted, lane_batch *halves[2], int64_t *batches, char *message, int size);

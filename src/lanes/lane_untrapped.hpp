@@ -9,7 +9,7 @@
 
 namespace {
 
-// Lanes that a step does not concern hold any value, so that exceptions say nothing: a build that traps them
+// Lanes that a step does not concern hold any value, so that exceptions mean nothing: a build that traps them
 // goes on.
 struct untrapped {
   std::fenv_t held;

@@ -17,8 +17,8 @@ module lanes
 
 contains
 
-  !> The lanes can be converged by attractor number `attractor` near its point [x, v]: where the square of the distance from
-  !> that, in scaled coordinates and a metric (xx, xv, vv), is at most `reach`. The first of several takes precedence.
+  !> The lanes can converge to attractor number `attractor` near its point [x, v]: where the square of the distance from that, in
+  !> scaled coordinates and a metric (xx, xv, vv), is at most `reach`. The first of several takes precedence.
   pure subroutine add_region(regions, attractor, point, scale, metric, reach)
     type(regions_t), intent(inout) :: regions
     integer, intent(in) :: attractor
@@ -76,7 +76,7 @@ contains
   end subroutine find_stop_side
 
   !> The body in a lane: where it stopped, or at the start of the flight that is left to the event loop. Not a function: the
-  !> copy of its result, just written, would stall every stop.
+  !> copy of its result, just written, would delay every stop.
   pure subroutine lane_state(batch, lane, state)
     type(lane_batch_t), intent(in) :: batch
     integer, intent(in) :: lane

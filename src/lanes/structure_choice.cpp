@@ -4,6 +4,7 @@
 // Which kernel for multibody structures this processor gets. All give the same bits.
 #include "lane_types.hpp"
 #include "lane_untrapped.hpp"
+#include "lane_widths.hpp"
 #include "structure_types.hpp"
 
 #include <cstddef>
@@ -22,11 +23,6 @@ void separatrix_structure_sizes(size_t *machine, size_t *batch) {
 void separatrix_fly_structures(int width, const structure_machine *machine, lane_batch *control,
                                structure_batch *batch) {
   const untrapped around;
-  if (width >= 8)
-    separatrix_fly_structures_avx512(machine, control, batch);
-  else if (width >= 4)
-    separatrix_fly_structures_avx2(machine, control, batch);
-  else
-    separatrix_fly_structures_sse2(machine, control, batch);
+  CHOOSE(separatrix_fly_structures, machine, control, batch);
 }
 }

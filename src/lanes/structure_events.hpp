@@ -84,7 +84,7 @@ inline mask chatters_out(const structure_machine &m, const structure_joint &join
 }
 
 // Flights of the lanes `fresh`, where `b` has the harmonics. Returns those that do not start as their phases
-// say: joints that should stick but do not, or a chatter that ends.
+// require: joints that should stick but do not, or a chatter that ends.
 template <class size>
 inline mask set_off(const structure_machine &m, const size &z, mask fresh, structure_bases &b,
                     structure_group &g) {
@@ -120,7 +120,7 @@ inline mask set_off(const structure_machine &m, const size &z, mask fresh, struc
 }
 
 // Sticking or sliding of joint j where `at` it was found. Where it turns, and it or another that sticks takes
-// more force to hold than to slide, the other might give way instead: the scalar code tells which does.
+// more force to hold than to slide, the other might give way instead: the scalar code decides which does.
 inline void slide_or_stick(const structure_machine &m, int j, mask at, mask &rare, mask &stuck,
                            structure_group &g) {
   const structure_joint &joint = m.joint[j];
@@ -169,7 +169,7 @@ inline void press_again(int j, mask at, structure_group &g) {
 // Impact of contact j where `at` it was found.
 template <class size>
 inline void apply_impact(const structure_machine &m, const size &z, int j, mask at, mask &rare,
-                   structure_group &g) {
+                         structure_group &g) {
   const structure_joint &joint = m.joint[j];
   vec change = -(1 + restitution_at(joint, magnitude(g.s.end_f1[j]))) * g.s.end_f1[j];
   for (int i = 0; i < z.coordinates; i++)
@@ -258,11 +258,11 @@ inline mask take_events(const structure_machine &m, const size &z, mask due, str
   return rare;
 }
 
-// The attractors that have converged points on the section, 0 = none; as `squared_distance` of
+// The attractors to which points on the section have converged, 0 = none; as `squared_distance` of
 // `attractors.f90`.
 template <class size>
 inline vec attractors_reached(const size &z, const structure_batch &batch, const vec (&q)[most_coordinates],
-                   const vec (&v)[most_coordinates]) {
+                              const vec (&v)[most_coordinates]) {
   vec reached = {};
   for (int r = batch.regions - 1; r >= 0; r--) {
     const structure_region &region = batch.region[r];

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Exact flight for a batch of multibody structures at once, in vectors (the kernel is C++: `structure_kernel.hpp`). What module
-!> `lanes` says of one body holds here.
+!> `lanes` states of one body holds here.
 module structure_lanes
   use multibody, only: joint_contact, joint_friction, joint_soft, multibody_t
   use multibody_motion, only: multibody_motion_t
@@ -71,8 +71,8 @@ contains
     flies = flies .and. flow%structure%mode(key + 1)%known > 0
   end function structure_flies
 
-  !> The lanes can be converged by attractor number `attractor` near its `point` of the section (positions, speeds): where
-  !> the square of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`.
+  !> The lanes can converge to attractor number `attractor` near its `point` of the section (positions, speeds): where the square
+  !> of the distance from that, in coordinates times 1/`scale` and the `metric` (upper triangle), is at most `reach`.
   !> The section's coordinates lie along directions of its own, at right angles; positions share a scale, and so do speeds.
   pure subroutine add_structure_region(moving, batch, attractor, point, scale, metric, reach)
     type(multibody_motion_t), intent(in) :: moving

@@ -22,8 +22,8 @@ struct gap_derivatives {
 
 // The gap of joint j on `side` at the time t.
 template <class size>
-inline gap_derivatives gap_at(const structure_machine &m, const size &z, const structure_group &g, int j, int side,
-                         vec t) {
+inline gap_derivatives gap_at(const structure_machine &m, const size &z, const structure_group &g, int j,
+                              int side, vec t) {
   structure_bases b;
   outlook o;
   bases_at(m, z, g, t, b);
@@ -43,8 +43,8 @@ inline void put(gap_derivatives &to, mask where, const gap_derivatives &from) {
 
 // Between two instants at which the rate of a gap, or its curvature, has opposite signs: where it is zero.
 template <bool of_rate, class size>
-inline gap_derivatives turning_gap(const structure_machine &m, const size &z, const structure_group &g, mask asked,
-                              int j, int side, gap_derivatives low, gap_derivatives high) {
+inline gap_derivatives turning_gap(const structure_machine &m, const size &z, const structure_group &g,
+                                   mask asked, int j, int side, gap_derivatives low, gap_derivatives high) {
   const vec y0 = of_rate ? low.rate : low.curl, y1 = of_rate ? high.rate : high.curl;
   vec share = y0 / (y0 - y1), from = low.t, to = high.t;
   vec t = from + (to - from) * pick(share < 0.05, 0.05, pick(share > 0.95, 0.95, share));
@@ -100,8 +100,9 @@ inline void note_misses(const structure_machine &m, const size &z, mask passed, 
       const vec limit = side > 0 ? g.high[j] : g.low[j];
       const double away = -side;
       gap_derivatives from = {start, away * (here.f[j] - limit), away * here.f1[j], away * here.f2[j],
-                         away * here.f3[j]};
-      gap_derivatives to = {end, away * (far.f[j] - limit), away * far.f1[j], away * far.f2[j], away * far.f3[j]};
+                              away * here.f3[j]};
+      gap_derivatives to = {end, away * (far.f[j] - limit), away * far.f1[j], away * far.f2[j],
+                            away * far.f3[j]};
       mask open = passed & (g.s.phase[j] == 0.0);
       mask bends = open & (from.curl * to.curl < 0.0) & ((from.rate < 0.0) | (to.rate >= -at_rest(from, to)));
       gap_derivatives middle = to;

@@ -10,8 +10,8 @@
 
 namespace {
 
-// What a joint adds to `still` and `level`: its direction, its coordinate where it is held, the position of the
-// stop that is pressed.
+// What a joint adds to `still` and `level`: its direction, its coordinate where it is held, the position of
+// the stop that is pressed.
 inline vec pull_of(const structure_joint &joint, const structure_fields<vec> &s, int j) {
   if (joint.soft > 0.5)
     return pick(s.phase[j] == 1.0, joint.upper, pick(s.phase[j] == -1.0, joint.lower, 0));
@@ -45,8 +45,8 @@ inline vec moves_of(const structure_machine &m, const size &z, const structure_g
 // The lanes of `among`, whose bases are `b`: coordinates and speeds.
 template <class size>
 inline void position_at(const structure_machine &m, const size &z, mask among, const structure_group &g,
-                     const vec (&re)[most_terms], const vec (&im)[most_terms], const structure_bases &b,
-                     vec (&q)[most_coordinates], vec (&v)[most_coordinates]) {
+                        const vec (&re)[most_terms], const vec (&im)[most_terms], const structure_bases &b,
+                        vec (&q)[most_coordinates], vec (&v)[most_coordinates]) {
   const structure_fields<vec> &s = g.s;
   for (int key = 0; key < g.modes; key++) {
     mask in = g.in_mode[key] & among;

@@ -14,7 +14,7 @@ namespace {
 
 const double unlimited = 1e300;
 
-// What the caller tells the lanes, and what they count for it; members of `lane_fields`.
+// What the caller sets for the lanes, and what they count for it; members of `lane_fields`.
 struct structure_control {
   vec status, until, sections, budget, leaves, elapsed, reached, settled, flights, impacts, speed_sum,
       last_speed, margin;
@@ -113,7 +113,7 @@ template <class size> inline int functions_of(const size &z, const structure_gro
   return z.pushes > 0 && g.waits ? z.joints + z.pushes : z.joints;
 }
 
-// Whether the phase of a joint has a say in what mode it is.
+// Whether the mode of a joint depends on its phase.
 inline bool switches(const structure_joint &joint) { return joint.slides > 0.5 || joint.soft > 0.5; }
 
 // Number of the joint that function j is of.

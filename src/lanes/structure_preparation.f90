@@ -76,8 +76,8 @@ contains
     end associate
   end subroutine prepare_structure_lanes
 
-  !> Panels over which quintics err by no more than about 2 % of what a function swings: as the fastest exponent of a mode [rad/s]
-  !> asks for, and longer; where misses are noted, such that the rate of a gap turns once within.
+  !> Panels over which quintics err by no more than about 2 % of the amplitude of a function: as the fastest exponent of a mode
+  !> [rad/s] asks for, and longer; where misses are noted, such that the rate of a gap turns once within.
   pure subroutine set_panels(moving, mode)
     type(multibody_motion_t), intent(in) :: moving
     type(structure_mode_t), intent(inout) :: mode
@@ -205,7 +205,7 @@ contains
       if (terms > lane_terms .or. flow%damped + flow%rigid > lane_drifts) return
       ! What grows has no bounds.
       if (any(real(flow%exponent) > rounding*modulus(flow%exponent))) return
-      ! The event loop tells whether what is held by surfaces that move stands still.
+      ! The event loop decides whether what is held by surfaces that move stands still.
       if (size(flow%basis, 2) == 0 .and. any([(goes_anywhere(machine%joints(flow%held(i))), i=1, size(flow%held))])) return
       mode%known = 1
       mode%terms = terms

@@ -94,8 +94,8 @@ struct guard_derivatives {
 
 // -side (f - limit) of the targets: positive before the event.
 template <class size>
-inline guard_derivatives derivatives_of(const size &z, const structure_group &g, const structure_target &target,
-                              const outlook &o) {
+inline guard_derivatives derivatives_of(const size &z, const structure_group &g,
+                                        const structure_target &target, const outlook &o) {
   guard_derivatives c;
   for (int j = 0; j < functions_of(z, g); j++) {
     mask is = target.joint == double(j + 1);
@@ -118,8 +118,9 @@ inline void make_zero(const size &z, const structure_group &g, const structure_t
 // of the guards triggered at the end of a panel, the one that a straight line lets fall first; none:
 // joint 0. The target of `zero`, which lies exactly there, is no other.
 template <class size>
-inline structure_target earliest_triggered(const structure_machine &m, const size &z, const structure_group &g,
-                                        const outlook &here, const outlook &far) {
+inline structure_target earliest_triggered(const structure_machine &m, const size &z,
+                                           const structure_group &g, const outlook &here,
+                                           const outlook &far) {
   structure_target target = {0, 0};
   // The share is a ratio.
   vec least_value = 2, least_span = 1;

@@ -47,10 +47,10 @@ struct structure_mode {
   double shape_re[most_terms][most_coordinates], shape_im[most_terms][most_coordinates];
   double wave_re[most_waves][most_coordinates], wave_im[most_waves][most_coordinates];
   double still[most_powers][most_coordinates], still_by_joint[most_powers][most_joints][most_coordinates];
-  // Along the directions without a spring: positions and paces from what amplitudes are made from, shapes, and
-  // what positions and paces add to the levels.
-  double position_from_position[most_coordinates][most_drifts], position_from_speed[most_coordinates][most_drifts],
-      pace_from_speed[most_coordinates][most_drifts];
+  // Along the directions without a spring: positions and paces from what amplitudes are made from, shapes,
+  // and what positions and paces add to the levels.
+  double position_from_position[most_coordinates][most_drifts],
+      position_from_speed[most_coordinates][most_drifts], pace_from_speed[most_coordinates][most_drifts];
   double drift[most_drifts][most_coordinates];
   double level_by_position[most_drifts][most_functions], level_by_pace[2][most_drifts][most_functions];
   double part_re[most_terms][most_functions], part_im[most_terms][most_functions],
@@ -121,7 +121,7 @@ template <class T> struct structure_fields {
   T phase[most_joints];
   // The flight: start [s after the section], amplitudes, coordinates of the joints held.
   T start, re[most_terms], im[most_terms], held[most_joints];
-  // Places and paces along the directions without a spring.
+  // Positions and paces along the directions without a spring.
   T position[most_drifts], pace[most_drifts];
   // What ends it: 1 = found, 2 = the next stop, when, joint (1, ...; 0 = none, the flight goes on), side;
   // amplitudes then; functions of the joints and their rates then.

@@ -4,7 +4,7 @@
 !> Barriers. A rigid one turns the velocity round at once, with a restitution that may depend on the speed. A
 !> soft one pushes back over the penetration p >= 0,
 !>   K p^n (1 + a p')  or  K p + D p'  or  q(p) (1 + a p')  with a table q,
-!> and never pulls unless the law says so.
+!> and never pulls unless the law allows it.
 module contact_law
   use contact_rows, only: restitution_formulas
   use curve_law, only: continued_at, curve_of, curve_t, integral_of, slope_of, value_at
@@ -122,7 +122,7 @@ contains
     case ('contact_curve')
       law%kind = contact_table
       law%change = force_table(choice)
-      ! What it is on average tells its size.
+      ! Its mean gives its size.
       law%stiffness = maxval(law%change%value)/law%change%at(law%change%count)
     case ('kelvin_voigt_contact')
       law%kind = contact_kelvin_voigt
@@ -191,7 +191,7 @@ contains
     positions = [min(law%upper, law%soft_upper), max(law%lower, law%soft_lower)]
   end function barrier_positions
 
-  !> Whether `x` [m] is no position for a body: beyond a rigid barrier. Inside a soft one a body may be.
+  !> Whether a body cannot be at `x` [m]: beyond a rigid barrier. Inside a soft one it may be.
   pure elemental logical function beyond_barrier(law, x)
     type(contact_t), intent(in) :: law
     real(wp), intent(in) :: x

@@ -74,7 +74,7 @@ module contact_rows
     parameter_row_t('contact', 'hunt_crossley', 'damping', 's/m', not_negative, &
                     'a = lambda/K; 1/a bounds the speed of rebound'), &
     parameter_row_t('contact', 'kelvin_voigt_restitution', 'restitution', '1', positive_to_one, &
-                    'e of a free body, released as `tension` says'), &
+                    'e of a free body, released as `tension` sets'), &
     (parameter_row_t('contact', restitution_formulas(i), 'restitution', '1', positive_to_one, &
                      'e that the formula is asked for'), i=1, size(restitution_formulas)), &
     (parameter_row_t('contact', restitution_formulas(i), 'speed', 'm/s', not_negative, &

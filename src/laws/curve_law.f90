@@ -40,7 +40,7 @@ contains
     end if
   end function knots_problem
 
-  !> The curve through `values` at the knots `at`, for which `knots_problem` has nothing to say.
+  !> The curve through `values` at the knots `at`, in which `knots_problem` finds no problem.
   pure type(curve_t) function curve_of(at, values) result(curve)
     real(wp), intent(in) :: at(:), values(:)
     integer :: i, first, last

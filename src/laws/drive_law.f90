@@ -180,7 +180,7 @@ contains
     e = lever%lever*d/sqrt(d(1)**2 + d(2)**2)
   end function lever_end
 
-  !> Puts phi + sine sin(n phi) + cosine cos(n phi) in the position of the crank angle phi, as the effect `choice` says.
+  !> Replaces the crank angle phi by phi + sine sin(n phi) + cosine cos(n phi), by the effect `choice`.
   pure subroutine add_ripple(law, choice)
     type(drive_t), intent(inout) :: law
     type(law_choice_t), intent(in) :: choice

@@ -122,7 +122,7 @@ contains
     end select
   end subroutine add_to_sensor
 
-  !> Dahl's friction, where it is, takes the position of the dry friction of the machine.
+  !> Dahl's friction, where it is, replaces the dry friction of the machine.
   pure subroutine replace_friction(effects, friction)
     type(effects_t), intent(inout) :: effects
     type(friction_t), intent(inout) :: friction
@@ -154,8 +154,8 @@ contains
     effects%present = effects%nonlinear .or. any(abs([effects%asymmetric_coulomb, effects%offset]) > 0)
   end subroutine finish_effects
 
-  !> Force [N] on a body at `x` [m] that slips at `v` [m/s] as `slip` says, the spring being stretched by `extension` [m].
-  !> Continued smoothly beyond v = 0, where a slip ends.
+  !> Force [N] on a body at `x` [m] that slips at `v` [m/s] in the direction and pieces of `slip`, the spring being stretched by
+  !> `extension` [m]. Continued smoothly beyond v = 0, where a slip ends.
   pure real(wp) function effect_force(effects, friction, slip, x, v, extension) result(force)
     type(effects_t), intent(in) :: effects
     type(friction_t), intent(in) :: friction
@@ -196,7 +196,7 @@ contains
     change = change + height*(bounds(1) + steepest(effects%force))
   end function change_over_bounce
 
-  !> Force [N] by which cubic spring, table and free play change that of the spring at a `extension` [m].
+  !> Force [N] by which cubic spring, table and free play change that of the spring at an `extension` [m].
   pure real(wp) function extension_force(effects, extension) result(force)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: extension

@@ -69,7 +69,7 @@ module law_table
               'calibrated stand-in for the drive of Lemes et al.'), &
     law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
               'geometry derived from '//lemes), &
-    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats as `periodic` says', &
+    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats as `periodic` sets', &
               'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)')]
 
   type(parameter_row_t), parameter :: other_parameters(*) = [ &

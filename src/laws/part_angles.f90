@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Which positions of a machine of several bodies have an angle for a position: those that a pendulum acts on, and those
+!> Which reference points of a machine of several bodies have an angle for a position: those that a pendulum acts on, and those
 !> joined to them, as a joint takes the difference of two positions.
 module part_angles
   use law_table, only: label_length, law_choice_t, part_family, value_of
@@ -12,7 +12,7 @@ module part_angles
 
 contains
 
-  !> For each position, bodies and points of structures in the order of the choices, whether it is an angle.
+  !> For each reference point, bodies and points of structures in the order of the choices, whether its position is an angle.
   pure function are_angles(choices) result(angles)
     type(law_choice_t), intent(in) :: choices(:)
     logical, allocatable :: angles(:)
@@ -32,7 +32,7 @@ contains
     end do
   end function are_angles
 
-  !> Names of the positions that are angles.
+  !> Names of the reference points whose positions are angles.
   pure function names_of_angles(choices) result(names)
     type(law_choice_t), intent(in) :: choices(:)
     character(len=label_length), allocatable :: names(:)
@@ -78,7 +78,7 @@ contains
       'point:') == 1)
   end function is_reference_point
 
-  !> Whether a part acts between two positions, or one and the ground.
+  !> Whether a part acts between two reference points, or one and the ground.
   pure logical function is_joint(choice)
     type(law_choice_t), intent(in) :: choice
     is_joint = choice%family == part_family .and. (index(choice%name, 'spring:') == 1 .or. &

@@ -66,8 +66,8 @@ module part_rows
     law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
     law_row_t('part', drives(4), 'impulse on a body at a time after the start', '')]
 
-  !> The ends of a part are numbers of positions: bodies, then points of structures, in the order of the file, 0 the ground;
-  !> of a drive, one position.
+  !> The ends of a part are numbers of reference points: bodies, then points of structures, in the order of the file, 0 the ground;
+  !> of a drive, one of them.
   type(parameter_row_t), parameter, public :: part_parameters(*) = [ &
     parameter_row_t('body', 'structure', 'in_sequence', '1', zero_to_one, &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other', &
@@ -87,7 +87,7 @@ module part_rows
     (parameter_row_t('part', structures(i), 'damping', '1', any_value, &
                      'C row by row, of any form, in the coordinates of the law', optional=.true., list=.true.), i=1, 2), &
     (parameter_row_t('part', structures(i), 'damping_ratio', '1', range_t(-1.0_wp, none_above), &
-                     'of every mode, in the place of any other damping; -1: none is given', optional=.true., &
+                     'of every mode, in place of any other damping; -1: none is given', optional=.true., &
                      default=-1.0_wp), i=1, 2), &
     (parameter_row_t('part', structures(i), 'x0', '1', any_value, &
                      'coordinates at the start, before the watched point is moved', optional=.true., list=.true.), i=1, 2), &
@@ -115,7 +115,7 @@ module part_rows
                     'half of permittivity times area times voltage squared'), &
     parameter_row_t('part', springs(4), 'gap', 'm', positive, 's at which the plates would meet'), &
     (parameter_row_t('part', springs(i), 'modulation', '1', any_value, &
-                     'the force of the spring, its damping excepted, is multiplied by 1 + modulation cos(phi) + Fourier series', &
+                     'force of the spring, not its damping, times 1 + modulation cos(phi) + Fourier series', &
                      optional=.true.), i=1, 4), &
     (parameter_row_t('part', springs(i), 'modulation_cosine', '1', any_value, &
                      'a_1, a_2, ... of cos(n phi), besides the modulation', optional=.true., list=.true.), i=1, 4), &

@@ -21,7 +21,7 @@ module restoring_law
     integer :: kind = kind_none
     !> Stiffness at zero extension [N/m]; gives the natural frequency.
     real(wp) :: stiffness = 0
-    !> Stretch-free distance between foot and body [m].
+    !> Distance between foot and body without extension [m].
     real(wp) :: free_length = 0
     logical :: is_linear = .true.
     !> The extension after which the force repeats, where it is an angle [rad]; 0 if it never does.
@@ -54,7 +54,7 @@ contains
     end do
   end function position_is_angle
 
-  !> Force on the body [N] at a extension [m].
+  !> Force on the body [N] at an extension [m].
   pure elemental real(wp) function restoring_force(law, extension)
     type(restoring_t), intent(in) :: law
     real(wp), intent(in) :: extension
@@ -86,7 +86,7 @@ contains
     end select
   end function restoring_stiffness
 
-  !> Energy stored at a extension [m], in J.
+  !> Energy stored at an extension [m], in J.
   pure elemental real(wp) function restoring_energy(law, extension)
     type(restoring_t), intent(in) :: law
     real(wp), intent(in) :: extension

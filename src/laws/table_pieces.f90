@@ -27,7 +27,7 @@ module table_pieces
 
 contains
 
-  !> Keeps `slip` to the pieces that it is in at `x` [m], `v` [m/s] and a `extension` [m] of the spring.
+  !> Keeps `slip` to the pieces that it is in at `x` [m], `v` [m/s] and an `extension` [m] of the spring.
   pure subroutine enter_pieces(effects, x, v, extension, slip)
     type(effects_t), intent(in) :: effects
     real(wp), intent(in) :: x, v, extension

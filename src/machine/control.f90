@@ -92,7 +92,7 @@ contains
     call move_alloc(more, machine%impulses)
   end subroutine add_impulse
 
-  !> What a controller sees, reference less place, and its rate [m, m/s].
+  !> What a controller sees, reference less position, and its rate [m, m/s].
   pure subroutine error_of(machine, state, turning, error, rate)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state

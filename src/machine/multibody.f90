@@ -52,8 +52,8 @@ module multibody
     type(wave_t), allocatable :: strength
   end type joint_t
 
-  !> A controller that moves a place s = row'q after a reference, its force u = P e + I (integral of e) + D e' acting along the row,
-  !> e = reference - s; the reference runs on from the start. What is continuous of it is part of the structure (`control`).
+  !> A controller that moves a position s = row'q after a reference, its force u = P e + I (integral of e) + D e' acting along the
+  !> row, e = reference - s; the reference runs on from the start. What is continuous of it is part of the structure (`control`).
   type, public :: controller_t
     real(wp), allocatable :: row(:)
     type(wave_t) :: reference
@@ -72,9 +72,9 @@ module multibody
     real(wp) :: amount = 0, time = 0
   end type impulse_t
 
-  !> A body that drives the watched one through friction and stops alone: what is counted and written down is then told of two
-  !> bodies. They stick where the one does not slide over the other; the energy is that of bodies and springs, without that of
-  !> the drive and of what presses a stop.
+  !> A body that drives the watched one through friction and stops alone: what is counted and written down is then that of two
+  !> bodies. They stick where the one does not slide over the other; the energy is that of bodies and springs, without that of the
+  !> drive and of what presses a stop.
   type, public :: driver_t
     !> Its coordinate; 0 where its motion is given.
     integer :: at = 0

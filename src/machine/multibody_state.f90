@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> State of a multibody structure and of each of its joints, and the forces of the joints that the state tells.
+!> State of a multibody structure and of each of its joints, and the forces of the joints that follow from the state.
 module multibody_state
   use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
@@ -23,7 +23,7 @@ module multibody_state
     !> Since the section [s].
     real(wp) :: time = 0
     integer :: phase(most_joints) = 0
-    !> Place of the slider of elastic friction [m]; speed at which a soft contact began [m/s].
+    !> Position of the slider of elastic friction [m]; speed at which a soft contact began [m/s].
     real(wp) :: slider(most_joints) = 0, touch_speed(most_joints) = 0
     !> The joint has just changed its phase: the guard of its new phase starts at zero. +1, -1: the stop it has left.
     integer :: left(most_joints) = 0

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Places of a machine between which joints act: bodies, then named points of structures. Each has a row: its displacement
-!> for one of each coordinate.
+!> Reference points of a machine between which joints act: bodies, then named points of structures. Each has a row: its
+!> displacement for one of each coordinate.
 module reference_points
   use errors, only: error_t, fail
   use multibody, only: multibody_t, most_degrees
@@ -32,8 +32,8 @@ contains
     end do
   end function watched_body
 
-  !> Places that are coordinates of their own: bodies, the watched reference_point, and those whose motion is given; 0 for others. A
-  !> reference_point has one given motion at most, and not the watched one.
+  !> Reference points that are coordinates of their own: bodies, the watched one, and those whose motion is given; 0 for others. A
+  !> reference point has one given motion at most, and not the watched one.
   pure subroutine name_coordinates(choices, machine, rows, coordinate, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(multibody_t), intent(inout) :: machine
@@ -78,7 +78,7 @@ contains
     is_reference_point = index(choice%name, 'body:') == 1 .or. index(choice%name, 'point:') == 1
   end function is_reference_point
 
-  !> Label of a reference_point, for messages and results.
+  !> Label of a reference point, for messages and results.
   pure function reference_point_name(choices, reference_point) result(name)
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: reference_point
@@ -93,7 +93,7 @@ contains
     end do
   end function reference_point_name
 
-  !> A reference_point whose motion is given is not the watched one, and has one motion.
+  !> A reference point whose motion is given is not the watched one, and has one motion.
   pure subroutine check_given(choices, i, watched, error)
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: i, watched
@@ -261,7 +261,7 @@ contains
     if (second > 0) row = row + rows(:, second)
   end function row_of
 
-  !> Number of the reference_point that a drive acts on.
+  !> Number of the reference point that a drive acts on.
   pure integer function reference_point_of(choice)
     type(law_choice_t), intent(in) :: choice
     reference_point_of = nint(value_of(choice, 'body'))

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Friction joints that are not to be told apart.
+!> Friction joints whose forces only act as a sum.
 module shared_friction
   use friction_law, only: falls, friction_t, same_shape
   use multibody, only: joint_friction, joint_t, multibody_t
@@ -13,8 +13,8 @@ module shared_friction
 
 contains
 
-  !> Rigid friction on the same row against the same surface becomes one joint: what each holds is not to be told apart. `first` and
-  !> `second` are joints whose laws do not add up to one, 0 without any.
+  !> Rigid friction on the same row against the same surface becomes one joint: only the sum of what they hold is determined.
+  !> `first` and `second` are joints whose laws do not add up to one, 0 without any.
   pure subroutine merge_friction(machine, first, second)
     type(multibody_t), intent(inout) :: machine
     integer, intent(out) :: first, second

@@ -73,8 +73,8 @@ contains
     position = matmul(shapes, weight)/sum(share*weight)
   end subroutine start_shapes
 
-  !> Makes the displacement row(:, k) of a position a coordinate, in the position of the one that has the largest part in it among
-  !> those not yet `taken`; `at` is its number, 0 if the position moves with those that are taken. All rows follow.
+  !> Makes the displacement row(:, k) of a position a coordinate, in place of the one that has the largest part in it among those
+  !> not yet `taken`; `at` is its number, 0 if the position moves with those that are taken. All rows follow.
   pure subroutine make_coordinate(machine, rows, k, name, taken, at)
     type(multibody_t), intent(inout) :: machine
     real(wp), intent(inout) :: rows(:, :)

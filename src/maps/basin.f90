@@ -107,7 +107,7 @@ contains
       return
     end if
     allocate (starts(3 + size(grid%others), 0))
-    ! A start has no position for the driving body of two.
+    ! A start has no coordinates of the driving body of two.
     if (is_pair(grid%laws)) return
     do i = 1, size(neighbours)
       if (neighbours(i)%rests) cycle
@@ -144,7 +144,7 @@ contains
 
   !> Values (points, variables) of the points at `index` (axes, points), from 1 along each axis. Without a start among the
   !> axes every point is its own slice: then `catalogues` is empty and the point's attractor is discovered on the spot,
-  !> unlabelled. `whole` is false if the watch says stop on the way.
+  !> unlabelled. `whole` is false if the watch requests a stop on the way.
   subroutine basin_points(grid, span, max_period, catalogues, index, cache, values, error, whole, watch)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span

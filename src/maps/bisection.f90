@@ -17,8 +17,8 @@ module bisection
   !> Intervals that one edge may fall into: beyond, of an interval with a third label in it the upper part is not followed, and the
   !> next interval begins with another label than the one below ends with.
   integer, parameter :: most_intervals = 6
-  !> Starts that are not converged in time lie between two basins in a sliver; one narrower than this share of its edge is taken
-  !> for the boundary itself.
+  !> Starts that do not converge in time lie between two basins in a sliver; one narrower than this share of its edge is taken for
+  !> the boundary itself.
   real(wp), parameter :: sliver = 1e-3_wp
 
   !> A piece of an edge on which the label changes: positions 0 to 1 along the edge, and the labels there.

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What is told of each point of a map, in one table: name, type and unit in a file, meaning, and value. Files, verification, the
-!> C interface and the merging of shares take it from here.
+!> What is reported of each point of a map, in one table: name, type and unit in a file, meaning, and value. Files, verification,
+!> the C interface and the merging of shares take it from here.
 module point_columns
   use kinds, only: wp
   use single_trajectory, only: outcome_t
@@ -20,7 +20,7 @@ module point_columns
     character(len=80) :: meaning
   end type point_column_t
 
-  !> The first are the same wherever an attractor captures; `regime` and `reason` are codes. A new one goes to the end.
+  !> The first are the same for all that converged to one attractor; `regime` and `reason` are codes. A new one goes to the end.
   type(point_column_t), parameter, public :: point_table(13) = [ &
     point_column_t('regime', 'int8', '1', 'regime of the motion'), &
     point_column_t('attractor', 'int32', '1', 'label of the attractor in the catalogue, 0 = none'), &
@@ -36,12 +36,12 @@ module point_columns
     point_column_t('settle_time', 'float32', 's', 'time from the start to capture by the attractor'), &
     point_column_t('grazing_margin', 'float32', 'm', 'smallest distance to a barrier at a turning point that missed it')]
 
-  !> How many there are; how many of them are marks of the attractor, by which points are told apart; where the settling time is.
+  !> How many there are; how many of them are marks of the attractor, which distinguish points; where the settling time is.
   integer, parameter, public :: point_values = size(point_table), marks_of_attractor = 5, settling_value = 12
 
 contains
 
-  !> The values of a point, in the order of the table: settling time not a number where it was not converged, grazing margin
+  !> The values of a point, in the order of the table: settling time not a number where it did not converge, grazing margin
   !> infinite where no barrier was missed.
   pure function outcome_values(outcome) result(values)
     type(outcome_t), intent(in) :: outcome

@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Which points of a map are computed and which are inferred: one square block at a time, a pure function of the settings,
-!> the position of the block and the values asked for. The caller computes what `next_points` wants, tells it to `learn_points`,
-!> and once nothing is wanted takes the whole block out with `block_content`. docs/theory.md says what can be missed.
+!> Which points of a map are computed and which are inferred: one square block at a time, a pure function of the settings, the
+!> position of the block and the values asked for. The caller computes the points of `next_points`, passes them to `learn_points`,
+!> and once no more are wanted takes the whole block out with `block_content`. docs/theory.md states what can be missed.
 module refinement
   use kinds, only: int64, wp
   use random, only: uniform
@@ -161,8 +161,8 @@ contains
     if (block%stage == stage_probes) block%expected = inferred_kinds(block, points)
   end subroutine next_points
 
-  !> Takes the values (points, values), by which kinds of points are told apart, and the settling times [drive periods]
-  !> of the points that `next_points` wanted.
+  !> Takes the values (points, values) that distinguish kinds of points, and the settling times [drive periods] of the points that
+  !> `next_points` wanted.
   pure subroutine learn_points(block, points, values, settling)
     type(block_t), intent(inout) :: block
     integer, intent(in) :: points(:, :)
@@ -230,7 +230,7 @@ contains
     if (lines(size(lines)) < range(2)) lines = [lines, range(2)]
   end function lines
 
-  !> Halves each side of every cell that is not uniform, and wants the new corners that are not known.
+  !> Halves each side of every cell that is not uniform, and requests the new corners that are not known.
   pure subroutine divide_cells(block, wanted, divided)
     type(block_t), intent(inout) :: block
     logical, intent(inout), allocatable :: wanted(:, :)

@@ -118,7 +118,7 @@ contains
     settled%mark = mark_of(moving, settled%features)
   end subroutine settle_on_section
 
-  !> By what limits are told: the regime of bodies that may ride along, else whether there are impacts.
+  !> The mark by which limits are found: the regime of bodies that may ride along, else whether there are impacts.
   pure integer function mark_of(moving, features) result(mark)
     type(motion_t), intent(in) :: moving
     type(features_t), intent(in) :: features

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Whether a trajectory of this length comes to its end in a human's time: a stop is heard only between trajectories.
+!> Whether a trajectory of this length ends within a human's time: a stop is noticed only between trajectories.
 module span_check
   use errors, only: error_t, fail
   use kinds, only: wp

@@ -72,13 +72,13 @@ contains
     bracket = [min(near, far), max(near, far)]
   end subroutine observe_limit
 
-  !> Follows the motion with `mark` whose mark has changed behind the last of the values in `trajectory` that `settled` tells
-  !> of, where the state was `state`, from the last of them at which it had settled. A motion may have left its branch long
-  !> before its mark shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
-  subroutine branch_end(grid, path, trajectory, settled, state, mark, longest, tolerance, bracket, outcome, error)
+  !> Follows the motion with `mark`, whose mark has changed behind the last of the `values` for which there is a `settled`, where
+  !> the state was `state`, from the last of them at which it had settled. A motion may have left its branch long before its mark
+  !> shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
+  subroutine branch_end(grid, path, values, settled, state, mark, longest, tolerance, bracket, outcome, error)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path
-    real(wp), intent(in) :: trajectory(:), tolerance
+    real(wp), intent(in) :: values(:), tolerance
     type(settled_t), intent(in) :: settled(:)
     type(section_state_t), intent(in) :: state
     integer, intent(in) :: mark, longest
@@ -93,7 +93,7 @@ contains
     there = settled(from)
     if (there%period == 0) then
       there%state = state
-      call settle_at(grid, path, trajectory(from), there, longest, patience, next, error)
+      call settle_at(grid, path, values(from), there, longest, patience, next, error)
       if (.not. allocated(error)) there = next
     end if
     if (allocated(error)) return
@@ -103,7 +103,7 @@ contains
       if (from == 0) return
       there = settled(from)
     end do
-    call follow_limit(grid, path, trajectory(from), trajectory(size(trajectory)), abs(trajectory(from + 1) - trajectory(from)), &
+    call follow_limit(grid, path, values(from), values(size(values)), abs(values(from + 1) - values(from)), &
       there, longest, &
                       tolerance, bracket, outcome, error)
   end subroutine branch_end

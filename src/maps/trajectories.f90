@@ -23,7 +23,7 @@ module trajectories
 
   public :: run_trajectories, run_on_device, block_size
 
-  !> What is asked of the statistics window of a motion that is not converged.
+  !> What is needed of the statistics window of a motion that has not converged.
   integer, parameter, public :: describe_regime = 1, describe_all = 2
 
   !> All that trajectories have in common.
@@ -38,7 +38,7 @@ module trajectories
   !> Starts that a GPU is given at a time, where a tile has so many: its pool is refilled many times.
   integer, parameter :: gpu_block = 2**22
 
-  !> Batches of a GPU that are serviced to between two looks at the watch.
+  !> Batches of a GPU that are served between two looks at the watch.
   integer, parameter :: batches_per_look = 256
 
   !> The trajectory in a lane: number of its start among those of its thread (0 = none), whether the extremes of its window went
@@ -53,7 +53,7 @@ module trajectories
   !> Batches that are worth a thread.
   integer, parameter :: fewest_batches = 64
 
-  !> What one thread services to: batches of a half and starts, from and to; the number among these of the start that comes next;
+  !> What one thread serves: batches of a half and starts, from and to; the number among these of the start that comes next;
   !> whether any of its lanes is to fly.
   type :: part_t
     integer :: batches(2) = [1, 0], starts(2) = [1, 0], next = 1
@@ -63,7 +63,7 @@ module trajectories
 contains
 
   !> `run_trajectories` on the GPU of the ensemble, if it has one; the watch is looked at on the way. Code 75 if that fails; then,
-  !> and where `whole` is false because the watch said stop, there are no outcomes.
+  !> and where `whole` is false because the watch requested a stop, there are no outcomes.
   subroutine run_on_device(ensemble, catalogue, starts, outcomes, whole, error, watch)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
@@ -107,7 +107,7 @@ contains
     end do
   end subroutine run_trajectories
 
-  !> A GPU's lanes: while one half of them flies, the threads service to the other. The watch is looked at whenever a
+  !> A GPU's lanes: while one half of them flies, the threads serve the other. The watch is looked at whenever a
   !> half has come back and every few of its batches, until all outcomes are known.
   subroutine run_on_gpu(ensemble, catalogue, starts, outcomes, whole, error, watch)
     type(ensemble_t), intent(in) :: ensemble
@@ -299,7 +299,7 @@ contains
     batch%status(lane) = lane_idle
   end subroutine load_slot
 
-  !> Tells the lanes what they can be converged by: what moves, by a cycle.
+  !> Gives the lanes the attractors to which they can converge: what moves, to a cycle.
   pure subroutine set_regions(moving, catalogue, lanes)
     type(motion_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
@@ -316,7 +316,7 @@ contains
     end do
   end subroutine set_regions
 
-  !> Tells a lane where to stop: at every section where a motion may have settled in a family of which lanes do not know.
+  !> Sets where a lane stops: at every section where a motion may have settled in a family of which lanes do not know.
   pure subroutine send_on(ensemble, catalogue, trajectory, outcome, lane, batch)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
@@ -404,7 +404,7 @@ contains
       slot%slips = trajectory%tally%slips
       if (trajectory%phase /= phase_over) return
       if (slot%unseen .and. trajectory%reason == 0 .and. trajectory%converged == 0 .and. ensemble%describe == describe_all) then
-        ! It was converged when its window began, and lost: once more, in the event loop.
+        ! It was within a capture neighbourhood when its window began, and left: once more, in the event loop.
         call run_trajectory(ensemble%moving, catalogue, ensemble%span, start(1), start(2), start(3), outcome, &
                             others=start(4:))
       else

@@ -12,7 +12,7 @@ module work_watch
   end type watch_t
 
   abstract interface
-    !> Hands out work, says how far the run is; whether to stop.
+    !> Hands out work, reports how far the run is; whether to stop.
     subroutine look_up(self, stop_now)
       import :: watch_t
       class(watch_t), intent(inout) :: self

@@ -18,8 +18,8 @@ module build_control
 
 contains
 
-  !> The controllers, every joint and force being in position; `rows` are those of the positions (columns), `given` the
-  !> coordinates whose motion is given.
+  !> The controllers, once every joint and force is there; `rows` are those of the positions (columns), `given` the coordinates
+  !> whose motion is given.
   pure subroutine add_controllers(choices, rows, given, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     real(wp), intent(in) :: rows(:, :)

@@ -80,7 +80,7 @@ contains
     end associate
   end subroutine multibody_of
 
-  !> Laws of machines of one or two bodies, and effects, have no position here.
+  !> Refuses laws of machines of one or two bodies, and effects.
   pure subroutine refuse_others(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error

@@ -155,7 +155,7 @@ contains
     call add_forces(machine, lcp, r, force)
   end subroutine hold_against
 
-  !> Adds the forces `r` of the joints in lcp [N], or their rates, to those on the coordinates.
+  !> Adds the forces `r` of the joints in `lcp` [N], or their rates, to those on the coordinates.
   pure subroutine add_forces(machine, lcp, r, force)
     type(multibody_t), intent(in) :: machine
     type(mode_lcp_t), intent(in) :: lcp

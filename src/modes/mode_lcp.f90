@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The convex problem that a choice of modes puts: forces of the joints in lcp within their limits, each with no
-!> acceleration along its joint unless it is at a limit. Derivatives of it settle ties.
+!> The convex problem that a choice of modes puts: forces of its joints within their limits, each with no acceleration along its
+!> joint unless it is at a limit. Derivatives of it settle ties.
 module mode_lcp
   use bounded_lcp, only: depends_on, solve_bounded_lcp
   use multibody, only: joint_contact, joint_friction, joint_spring, multibody_t, most_joints
@@ -14,12 +14,12 @@ module mode_lcp
   public :: add_constraint, set_mobility, drift_of, sizes, second_rate, solve, is_degenerate, restrict_bounds, keep_loaded, &
     resolve_degeneracy
 
-  !> What the choice is made of: the joints in lcp, their rows, and the drift of the free structure along them.
+  !> What the choice is made of: the joints of the problem, their rows, and the drift of the free structure along them.
   type, public :: mode_lcp_t
     integer :: count = 0
     integer :: joint(most_joints) = 0
     real(wp), dimension(most_joints) :: lower = 0, upper = 0
-    !> Not in lcp any more: no force is sought.
+    !> No longer part of the problem: no force is sought.
     logical :: fixed(most_joints) = .false.
     real(wp) :: g(most_joints, most_joints) = 0
     real(wp) :: tolerance = 0
@@ -50,8 +50,8 @@ contains
     end do
   end subroutine set_mobility
 
-  !> Derivative number `order` of the joint coordinates in lcp without the forces sought: that of the free structure
-  !> under `force` (or its rates), and that of the surfaces.
+  !> Derivative number `order` of the joint coordinates of the problem without the forces sought: that of the free structure under
+  !> `force` (or its rates), and that of the surfaces.
   pure subroutine drift_of(machine, lcp, state, turning, order, force, drift)
     type(multibody_t), intent(in) :: machine
     type(mode_lcp_t), intent(in) :: lcp
@@ -87,7 +87,7 @@ contains
     if (state%time /= state%time) surface = 0
   end function surface
 
-  !> Sizes of what the accelerations in lcp, or their rates (derivative number `order`), are sums of, for their rounding.
+  !> Sizes of what the accelerations of the problem, or their rates (derivative number `order`), are sums of, for their rounding.
   pure function sizes(machine, lcp, state, turning, order, force) result(size_of_y)
     type(multibody_t), intent(in) :: machine
     type(mode_lcp_t), intent(in) :: lcp
@@ -136,7 +136,7 @@ contains
     end do
   end function sizes
 
-  !> What the modes of a motion may bring to one position, whatever of them is there now [J].
+  !> What the modes of a motion may bring to one coordinate, whatever of them is there now [J].
   pure real(wp) function energy_scale(machine, state) result(energy)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
@@ -252,7 +252,7 @@ contains
     end do
   end subroutine resolve_degeneracy
 
-  !> The limit at which joint number `i` in lcp is degenerate, 0 if it is not.
+  !> The limit at which joint number `i` of the problem is degenerate, 0 if it is not.
   pure integer function degenerate_at(lcp, i, r, y, side, tolerance) result(limit)
     type(mode_lcp_t), intent(in) :: lcp
     integer, intent(in) :: i, side(:)

@@ -23,8 +23,8 @@ module multibody_flight
 
 contains
 
-  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `triggered` those that fell together at
-  !> the end, none if the time is over. `steps` counts, and bounds, the work; `reason` says why a flight was given up, 0.
+  !> Flies from `state` to `until` [s after the section] at most. `list` are the guards, `triggered` those triggered together at
+  !> the end, none if the time is over. `steps` counts, and bounds, the work; `reason`: why a flight was given up, else 0.
   pure subroutine fly(machine, flow, options, state, until, list, count_guards, triggered, watch, steps, reason, log)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
@@ -44,7 +44,7 @@ contains
     reason = 0
     if (.not. (options%flight == flight_adaptive .or. is_marched(machine, state%phase))) then
       start = state
-      ! Stretches of a series, of which a stiff structure has many.
+      ! Intervals of a series, of which a stiff structure has many.
       if (.not. flow%modal .and. flow%rate*(until - state%time) > options%step_budget) then
         triggered = .false.
         count_guards = 0

@@ -85,7 +85,7 @@ contains
 
   !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given
   !> up (codes of module `status`). With `one_event` it stops after the first event that no burst of impacts contains,
-  !> and goes on with a burst; what idle_steps is counted from the call.
+  !> and goes on with a burst; steps without progress are counted from the call.
   pure subroutine advance_multibody(moving, state, time_end, tally, reason, log, transitions, one_event)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state
@@ -199,7 +199,7 @@ contains
     if (present(log) .and. ok) call log_action(moving, start, state, log)
   end subroutine act_and_log
 
-  !> The transition at guards that have `triggered`; phases are `held` for an instant where the motion has without_progress.
+  !> The transition at guards that have `triggered`; phases are `held` for an instant where the motion makes no progress.
   pure subroutine change_mode(moving, state, list, triggered, held, tally, reason, log, transitions)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state

@@ -18,15 +18,15 @@ module multibody_transition
   implicit none
   private
 
-  public :: transition, settle, judge_friction
+  public :: transition, settle, assess_friction
 
   !> So many impacts, each within this share of a period after the last, are the end of a chatter of several contacts.
   integer, parameter :: long_burst = 60
 
 contains
 
-  !> Rigid contacts in `touching` that do not open stay closed if the forces say so; joints at rest stick or slide. `at_level`: a
-  !> guard says that their force has come to its limit.
+  !> Rigid contacts in `touching` that do not open stay closed if the forces require it; joints at rest stick or slide. `at_level`:
+  !> a guard reports that their force has come to its limit.
   pure subroutine settle(moving, state, turning, at_rest, touching, ok, at_level)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state
@@ -84,7 +84,7 @@ contains
       end do
       ok = .true.
       if (any(hit /= 0)) then
-        call judge_burst(machine, hit, turning, state, plastic)
+        call count_burst(machine, hit, turning, state, plastic)
         call add_degenerate(machine, state, turning, hit, touching)
         if (plastic) call add_near(machine, state, turning, touching)
         call apply_impact(machine, state, turning, touching, plastic, speed, lost, ok)
@@ -92,7 +92,7 @@ contains
           if (hit(j) /= 0) call count_impact(tally, hit(j), abs(speed(j)))
         end do
       end if
-      call judge_friction(machine, start, turning, any(hit /= 0), state, at_rest)
+      call assess_friction(machine, start, turning, any(hit /= 0), state, at_rest)
       if (without_progress) then
         call hold(moving, state, turning, at_rest, touching)
         return
@@ -109,7 +109,7 @@ contains
   end subroutine transition
 
   !> Counts an impact in the burst that it belongs to; a long one that dies away is `plastic`: without loss it may go on for ever.
-  pure subroutine judge_burst(machine, hit, turning, state, plastic)
+  pure subroutine count_burst(machine, hit, turning, state, plastic)
     type(multibody_t), intent(in) :: machine
     integer, intent(in) :: hit(:)
     complex(wp), intent(in) :: turning(:)
@@ -127,7 +127,7 @@ contains
     state%burst = state%burst + 1
     if (state%burst > 1) state%burst_speed = max(state%burst_speed, fastest)
     plastic = state%burst > long_burst .and. fastest <= state%burst_speed/2
-  end subroutine judge_burst
+  end subroutine count_burst
 
   !> Counts friction that has come to stick; of two bodies also where they have come to rest against a stop, the end of a chatter
   !> being in the word already.
@@ -151,7 +151,7 @@ contains
     end do
   end subroutine count_sticks
 
-  !> What each triggered guard says of its own joint: its phase, or that it is at rest, touches, is hit.
+  !> What each triggered guard means for its own joint: its phase, or that it is at rest, touches, is hit.
   pure subroutine change_phases(machine, turning, list, triggered, state, tally, at_rest, touching, hit)
     type(multibody_t), intent(in) :: machine
     complex(wp), intent(in) :: turning(:)
@@ -211,7 +211,7 @@ contains
 
   !> Which friction joints are at rest, and the directions of the others. One that stuck in the state `before` is at rest unless
   !> an impact has set it in motion: what its speed was then is rounding. What an impact leaves of a speed may be rounding, too.
-  pure subroutine judge_friction(machine, before, turning, struck, state, at_rest)
+  pure subroutine assess_friction(machine, before, turning, struck, state, at_rest)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: before
     complex(wp), intent(in) :: turning(:)
@@ -236,7 +236,7 @@ contains
       if (abs(u) <= rounding) at_rest(j) = .true.
       if (.not. at_rest(j)) state%phase(j) = merge(1, -1, u > 0)
     end do
-  end subroutine judge_friction
+  end subroutine assess_friction
 
   !> The slider of elastic friction stops: its spring holds what friction was.
   pure subroutine stop_slider(machine, j, state, turning)
@@ -322,7 +322,7 @@ contains
     end associate
   end subroutine hold_soft
 
-  !> What cannot be told apart by rounding is held, for a billionth of a period.
+  !> What rounding cannot distinguish is held, for a billionth of a period.
   pure subroutine hold(moving, state, turning, at_rest, touching)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(inout) :: state

@@ -18,7 +18,7 @@ module section_directions
 contains
 
   !> Directions of the positions on which forces and stops depend, orthonormal columns: the bodies themselves if all count. Where
-  !> fewer count between the stops, those that count only for the stops come first. What is degenerate to what tells them, not how
+  !> fewer count between the stops, those that count only for the stops come first. They follow from what is tied to what, not how
   !> strongly: machines of one build have the same.
   pure subroutine directions_of(machine, directions, count_directions)
     type(multibody_t), intent(in) :: machine
@@ -90,7 +90,7 @@ contains
     end do
     if (.not. (machine%driven .or. machine%section_time > 0) .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)
     if (integral_of(machine) > 0) then
-      ! What a controller sees tells how its integral grows.
+      ! What a controller sees determines how its integral grows.
       depends(:, integral_of(machine)) = 0
       depends(integral_of(machine), :) = 0
     end if

@@ -73,7 +73,7 @@ contains
   end subroutine apply_impact
 
   !> Takes from the speeds what the rounding of the impulses has left of those of contacts in `list` that have none. Impulses that
-  !> go through a row leave bodies at rest with no speed that would tell what rounding is.
+  !> go through a row leave bodies at rest with no speed to compare rounding with.
   pure subroutine still(machine, turning, list, impulse, state)
     type(multibody_t), intent(in) :: machine
     complex(wp), intent(in) :: turning(:)

@@ -9,7 +9,7 @@ module timed_actions
   use multibody_flows, only: multibody_motion_t
   use multibody_log, only: balance_change, energy_of_multibody, record_change
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
-  use multibody_transition, only: judge_friction, settle
+  use multibody_transition, only: assess_friction, settle
   use kinds, only: wp
   use motion_state, only: event_impulse, log_t, put_column
   implicit none
@@ -123,13 +123,13 @@ contains
       end do
       if (strikes) call apply_impact(machine, state, turning, touching, .false., speed, lost, ok)
       at_rest = .false.
-      call judge_friction(machine, before, turning, .true., state, at_rest)
+      call assess_friction(machine, before, turning, .true., state, at_rest)
       if (ok) call settle(moving, state, turning, at_rest, touching, ok)
       if (.not. present(log) .or. .not. ok) return
       log%balance%work = log%balance%work + energy_of_multibody(machine, pushed) - energy_of_multibody(machine, before)
       call balance_change(machine, pushed, state, log)
       call record_change(machine, event_impulse, before, state, log)
-      ! In the position of a joint stands the number after the last.
+      ! Instead of a joint stands the number after the last.
       call put_column(log%event_joint, log%events, &
                       [count(machine%joints%kind /= joint_section) + 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
     end associate

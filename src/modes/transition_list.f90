@@ -9,8 +9,8 @@ module transition_list
 
   public :: note_transition
 
-  !> One transition: the joint whose guard fell, and which. `certain` is false where several fell together, or where a tie was held
-  !> for an instant: the motions beside may go other ways.
+  !> One transition: the joint whose guard was triggered, and which. `certain` is false where several were triggered together, or
+  !> where a tie was held for an instant: the motions beside may go other ways.
   type, public :: transition_t
     type(multibody_state_t) :: before, after
     integer :: joint = 0, meaning = 0

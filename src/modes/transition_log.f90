@@ -72,8 +72,8 @@ contains
           rest = rest_of_chatter(moving, before, turning, j, after%phase(j))
           ! In a row the impacts of others can take the rebound away.
           if (.not. rest > 0 .and. count(machine%joints%kind == joint_contact) > 1) cycle
-          ! Told of the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled first
-          ! comes first.
+          ! Reported at the instant where the impacts accumulate, even where the clock stops before it; what is given or sampled
+          ! first comes first.
           call log_event(machine, kind, j, struck, struck, log, at=min(before%time + rest, next_action(machine, before)))
         end if
       end do
@@ -82,7 +82,7 @@ contains
     end associate
   end subroutine log_transition
 
-  !> Friction that holds from here on, or no longer, where that is not `reported` yet; of two bodies it goes with what did it.
+  !> Friction that holds from here on, or no longer, where that is not `reported` yet; of two bodies it is part of its cause.
   pure subroutine log_friction(machine, before, after, stood, stands, reported, log)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: before, after

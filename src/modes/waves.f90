@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The course of a drive in time.
+!> A drive as a function of time.
 module waves
   use elementary, only: sine_cosine
   use multibody, only: wave_t

@@ -1,10 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A few ordinary differential equations, integrated step by step by the embedded Runge-Kutta pair of
-!> `dormand_prince_table` until a guard falls to zero: a linear function of the state, or a margin of the system's own,
-!> interpolated over the step. Guards are isolated on the continuous extension of a step, which the caller may look at,
-!> then the step is taken again to the fall itself.
+!> A few ordinary differential equations, integrated step by step by the embedded Runge-Kutta pair of `dormand_prince_table` until
+!> a guard falls to zero: a linear function of the state, or a margin of the system's own, interpolated over the step. Guards are
+!> isolated on the continuous extension of a step, which the caller may look at, then the step is taken again to the zero itself.
 module guarded_march
   use dormand_prince_table, only: error_3, error_5, extension, node, stage
   use kinds, only: wp
@@ -64,8 +63,8 @@ contains
     call set_out(size(y), march, system, tolerance, scale, longest, time, y)
   end subroutine begin_march
 
-  !> One step, to `time_end` [s] at most. `triggered` is the guard that fell first, and the state then is that at its fall;
-  !> or one of `march_goes_on`, `march_time_over`, `march_failed`.
+  !> One step, to `time_end` [s] at most. `triggered` is the guard triggered first, and the state then is that at its zero; or one
+  !> of `march_goes_on`, `march_time_over`, `march_failed`.
   pure subroutine take_step(march, system, guards, time_end, triggered)
     type(march_t), intent(inout) :: march
     class(system_t), intent(in) :: system

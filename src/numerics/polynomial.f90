@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Polynomials of degree 7 on [0, 1], the continuous extension of the adaptive flight: first fall
-!> through zero and maximum, certified by Bernstein coefficients (a polynomial lies within the hull of them,
+!> Polynomials of degree 7 on [0, 1], the continuous extension of the adaptive flight: first zero
+!> from above and maximum, certified by Bernstein coefficients (a polynomial lies within the hull of them,
 !> and has no more roots than they have changes of sign).
 module polynomial
   use kinds, only: wp
@@ -65,7 +65,7 @@ contains
     t = 2
   end function first_zero
 
-  !> The one fall in [low, high], by bisection that ends in Newton's step.
+  !> The one zero in [low, high], by bisection that ends in Newton's step.
   pure real(wp) function zero_between(p, low, high) result(t)
     real(wp), intent(in) :: p(0:degree), low, high
     real(wp) :: a, b
@@ -106,7 +106,7 @@ contains
     end do
   end function maximum_until
 
-  !> The polynomial with given values at given positions (Newton's divided differences).
+  !> The polynomial with given values at given fractions (Newton's divided differences).
   pure function interpolate(fractions, value) result(p)
     real(wp), intent(in) :: fractions(0:degree), value(0:degree)
     real(wp) :: p(0:degree), difference(0:degree)

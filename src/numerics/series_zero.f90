@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The first zero of an exponential series over a stretch no longer than 1/rate, the rate being that of the fastest motion in it:
+!> The first zero of an exponential series over an interval no longer than 1/rate, the rate being that of the fastest motion in it:
 !> rounded at `order` it is a polynomial, whose derivatives certify its zeros.
 module series_zero
   use certified_step, only: departure_step, positive_step, single_root_limit, taylor_root
@@ -20,7 +20,7 @@ contains
 
   !> First fraction in (0, 1] at which a series that is positive at 0, or leaves zero upwards there, has dropped to zero;
   !> 2 if it stays positive or is zero throughout, 0 if it falls at once. Nothing can hide: the steps are certified by
-  !> bounds on the second and third derivative over the stretch, and from zero also by the first term of the series.
+  !> bounds on the second and third derivative over the interval, and from zero also by the first term of the series.
   pure real(wp) function first_zero(p) result(t)
     real(wp), intent(in) :: p(0:order)
     real(wp) :: value, rate, curvature, second_bound, third_bound, step, limit

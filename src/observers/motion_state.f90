@@ -96,7 +96,7 @@ module motion_state
     real(wp) :: origin = 0
     !> Distance of samples within a period [s]; 0 = no samples.
     real(wp) :: sample_interval = 0
-    !> Instants of the samples [s], ascending, in position of the equidistant ones.
+    !> Instants of the samples [s], ascending, in place of the equidistant ones.
     real(wp), allocatable :: instants(:)
     integer :: events = 0, samples = 0
     !> Index of the next sample, from 0: within the current period, or of the chosen instants.
@@ -110,7 +110,7 @@ module motion_state
     real(wp) :: peak_force = 0, peak_penetration = 0, contact_work = 0
     !> Position and velocity of the driving body of two, at events and at samples.
     real(wp), allocatable :: event_driver(:, :), sample_driver(:, :)
-    !> Where the energy went until now, and until each sample: rows as in `energy_balance_t`, `at_end` being the energy then.
+    !> Energy balance until now, and until each sample: rows as in `energy_balance_t`, `at_end` being the energy then.
     type(energy_balance_t) :: balance
     real(wp), allocatable :: sample_balance(:, :)
     !> Speed at which the last contact with a soft barrier began, at samples; one row.
@@ -155,7 +155,7 @@ contains
     end do
   end function samples_before
 
-  !> What is missing in a balance [J].
+  !> What is missing in an energy balance [J].
   pure elemental real(wp) function closing_error(balance)
     type(energy_balance_t), intent(in) :: balance
     closing_error = balance%at_start + balance%work - balance%friction - balance%damping - balance%contact - balance%at_end
@@ -275,7 +275,7 @@ contains
     if (present(driver)) call put_column(log%event_driver, log%events, driver)
   end subroutine record_event
 
-  !> Puts the last event before those that end after it: a chatter is told when it is completed, at the time when it is over.
+  !> Puts the last event before those that end after it: a chatter is reported when it is completed, at the time when it is over.
   pure subroutine put_in_order(log)
     type(log_t), intent(inout) :: log
     integer :: k

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Which effects the laws of a machine have a position for.
+!> Which effects the laws of a machine admit.
 module effect_check
   use contact_law, only: force_table, softening
   use curve_law, only: is_positive, knots_problem, most_knots
@@ -21,7 +21,7 @@ module effect_check
 
 contains
 
-  !> Refuses effects of one body that its laws have no position for. The message begins with the key.
+  !> Refuses effects of one body that its laws do not admit. The message begins with the key.
   pure subroutine refuse_effects(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error

@@ -52,7 +52,7 @@ contains
 
   !> The machine of one law per family: body, restoring, friction, contact, drive, and any number of effects, in any order.
   !> Parameters are taken as they are (the case reader checks bounds); what only the whole shows is
-  !> refused: a drive without a natural frequency, a series that does not converge, an effect that the laws have no position for.
+  !> refused: a drive without a natural frequency, a series that does not converge, an effect that the laws do not admit.
   pure subroutine build_oscillator(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(oscillator_t), intent(out) :: machine
@@ -188,7 +188,7 @@ contains
     end associate
   end subroutine set_bounds
 
-  !> One body has no position for the laws of two. The message begins with the key.
+  !> Refuses the laws of two bodies for one. The message begins with the key.
   pure subroutine refuse_pair(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error

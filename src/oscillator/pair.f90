@@ -56,7 +56,7 @@ contains
     end do
   end function is_pair
 
-  !> The machine of one law per family. Refuses laws that a pair has no position for; the message begins with the key.
+  !> The machine of one law per family. Refuses laws that a pair does not admit; the message begins with the key.
   pure subroutine build_pair(choices, machine, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(pair_t), intent(out) :: machine

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What the environment of mpirun or srun tells before MPI is started, and without it.
+!> What the environment of mpirun or srun shows before MPI is started, and without it.
 module launcher
   implicit none
   private

@@ -39,8 +39,8 @@ contains
     position = 1 + int(modulo((number - 1)*self%step, self%length))
   end function position
 
-  !> Place number `number` of a sample of a grid of so many points along each axis, from 1 along each: the additive
-  !> recurrence with square roots of primes. Axes after the eighth repeat the others.
+  !> Point number `number` of a sample of a grid of so many points along each axis, from 1 along each: the additive recurrence with
+  !> square roots of primes. Axes after the eighth repeat the others.
   pure function spread_subscripts(number, lengths) result(subscripts)
     integer, intent(in) :: number, lengths(:)
     integer :: subscripts(size(lengths)), k

@@ -54,8 +54,8 @@ contains
     self%open = .false.
   end subroutine end_entry
 
-  !> The entries of all ranks on rank 0, rank by rank; `entries(:, i)` as `entry_values` says and `rank(i)`
-  !> who did it. Empty elsewhere. Collective.
+  !> The entries of all ranks on rank 0, rank by rank; `entries(:, i)` as in `entry_values`, done by `rank(i)`. Empty elsewhere.
+  !> Collective.
   subroutine collect(self, team, entries, rank)
     class(work_log_t), intent(in) :: self
     class(team_t), intent(in) :: team

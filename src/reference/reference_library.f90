@@ -21,7 +21,7 @@ module reference_library
 contains
 
   !> Runs `points` trajectories. Laws and effects: row in the law table of each, lengths and values of their parameters one
-  !> after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at capture;
+  !> after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at convergence;
   !> `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
   !> Returns 0, or 1 if the machine cannot be built.
   integer(c_int) function separatrix_reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
@@ -56,7 +56,7 @@ contains
     end do
     options%flight = flight
     options%event_budget = event_budget
-    ! Its tolerance asks for more steps than the results that it judges took.
+    ! Its tolerance asks for more steps than the results that it checks took.
     options%step_budget = huge(options%step_budget)
     options%tolerance = numbers(1)
     options%domain = numbers(2)

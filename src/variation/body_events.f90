@@ -18,7 +18,7 @@ module body_events
 contains
 
   !> The events that `log` holds of a motion from `start` to `finish`, in order; `mode` is that after the last. Turning points
-  !> at which no force changes are left out. With `collapsed` a completed chatter is one event, in position of its impacts.
+  !> at which no force changes are left out. With `collapsed` a completed chatter is one event, in place of its impacts.
   pure subroutine events_of_body(body, start, log, finish, collapsed, events, mode)
     type(one_body_t), intent(in) :: body
     type(state_t), intent(in) :: start, finish

@@ -43,8 +43,8 @@ module body_family
 
 contains
 
-  !> Half range of x [m] that the drive alone brings about, at least a thousandth of the length that the forces extension the
-  !> spring by: a size for differences, never 0.
+  !> Amplitude of x [m] that the drive alone causes, at least a thousandth of the length by which the forces extend the spring: a
+  !> size for differences, never 0.
   pure real(wp) function size_of_motion(moving) result(length)
     type(motion_t), intent(in) :: moving
     length = 1

@@ -3,7 +3,7 @@
 
 !> A machine as smooth flights between events: what linearisation, periodic orbits and their continuation need to know of it.
 !> Every event has a guard, which is zero at it, and a jump. Flights are of a given duration and guards are smooth functions,
-!> both also beyond the position where the real motion would have had another event.
+!> both also beyond the instant at which the real motion would have had another event.
 module hybrid_machine
   use kinds, only: wp
   implicit none

@@ -246,8 +246,8 @@ contains
     end select
   end function watched_rows
 
-  !> Section points (columns) for searches: `watched` (columns) are positions and speeds of what is watched. Of a structure
-  !> the other coordinates of every second one are as the machine says, those of the rest spread evenly over twice their sizes, or
+  !> Section points (columns) for searches: `watched` (columns) are positions and speeds of what is watched. Of a structure the
+  !> other coordinates of every second one are those of the machine, those of the rest spread evenly over twice their sizes, or
   !> over the share `spread` of that, start by start.
   pure function starts_of_section(machine, watched, spread) result(points)
     class(hybrid_t), intent(in) :: machine

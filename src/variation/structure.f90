@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A multibody structure as a hybrid machine. Its state has the positions and the velocities on which anything depends (see
-!> `section_directions`), and the stretches of the springs of elastic friction, which are constant while those slide.
+!> `section_directions`), and the extensions of the springs of elastic friction, which are constant while those slide.
 module structure
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
   use hybrid_machine, only: event_t, hybrid_t
@@ -130,17 +130,17 @@ contains
         j = self%frame%elastic(k)
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
         y(n + k) = s - state%slider(j)
-        if (state%phase(j) /= 0) y(n + k) = sliding_interval(machine, j, state%phase(j))
+        if (state%phase(j) /= 0) y(n + k) = sliding_extension(machine, j, state%phase(j))
       end do
     end associate
   end function coordinates_of
 
-  !> Stretch of the spring of elastic friction that slides [m].
-  pure real(wp) function sliding_interval(machine, j, phase)
+  !> Extension of the spring of elastic friction that slides [m].
+  pure real(wp) function sliding_extension(machine, j, phase)
     type(multibody_t), intent(in) :: machine
     integer, intent(in) :: j, phase
-    sliding_interval = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
-  end function sliding_interval
+    sliding_extension = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
+  end function sliding_extension
 
   !> Whether the joints that are held leave no coordinate free.
   pure logical function structure_rests(self, mode)
@@ -224,7 +224,7 @@ contains
       do k = 1, size(self%frame%elastic)
         j = self%frame%elastic(k)
         if (phase(j) == 0) cycle
-        y(n + k) = sliding_interval(machine, j, phase(j))
+        y(n + k) = sliding_extension(machine, j, phase(j))
         by_state(n + k, :) = 0
       end do
     end associate
@@ -371,7 +371,7 @@ contains
       ! A slider stops with its spring stretched by what friction was.
       k = findloc(self%frame%elastic, event%joint, 1)
       if (k > 0 .and. event%guard == slide_ends) then
-        after(n + k) = sliding_interval(machine, event%joint, event%side)
+        after(n + k) = sliding_extension(machine, event%joint, event%side)
         struck(n + k, :) = 0
       end if
       call settle(self, event%after, t, after, by_state, by_time)

@@ -25,7 +25,7 @@ module structure_flight
   !> A mode, what its coordinates are, and what may change in it.
   type, public :: frame_t
     type(multibody_motion_t) :: moving
-    !> Directions of the positions and of the velocities (columns), joints with a extension, numbers of positions and velocities.
+    !> Directions of the positions and of the velocities (columns), joints with an extension, numbers of positions and velocities.
     real(wp), allocatable :: directions(:, :), velocities(:, :)
     integer, allocatable :: elastic(:)
     integer :: positions = 0, speeds = 0

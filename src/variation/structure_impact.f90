@@ -59,8 +59,8 @@ contains
     end do
   end subroutine carried_by
 
-  !> Speeds after an impact of the contacts with `side` +1, -1 (0: not touching), see module `simultaneous_impact`, and their derivatives by the
-  !> speeds before and by the time. Not a number where the impact is not smooth.
+  !> Speeds after an impact of the contacts with `side` +1, -1 (0: not touching), see module `simultaneous_impact`, and their
+  !> derivatives by the speeds before and by the time. Not a number where the impact is not smooth.
   pure subroutine apply_impact_with_slopes(machine, state, turning, side, plastic, v, by_speed, by_time)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state

@@ -29,7 +29,7 @@ module variations
   !> A machine and, for derivatives by a parameter, its four neighbours.
   type, public :: neighbourhood_t
     class(hybrid_t), allocatable :: centre, near(:)
-    !> Distance of the neighbours in the parameter; `side` -1, 0 or 1 tells which stencil they make.
+    !> Distance of the neighbours in the parameter; `side` -1, 0 or 1: which stencil they make.
     real(wp) :: step = 1
     integer :: side = 0
   end type neighbourhood_t

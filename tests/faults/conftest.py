@@ -16,7 +16,7 @@ sys.path.insert(0, str(PYTHON_TESTS))
 
 import life  # noqa: E402
 
-# The fixtures that say where the program is.
+# The fixtures that locate the program.
 _shared = importlib.util.spec_from_file_location("python_tests_conftest", PYTHON_TESTS / "conftest.py")
 _fixtures = importlib.util.module_from_spec(_shared)
 _shared.loader.exec_module(_fixtures)

@@ -32,7 +32,7 @@ TILES = 6 * 7
 def launch(
     program: Path, folder: Path, ranks: int, *more: object, variables: dict[str, str] | None = None
 ) -> subprocess.Popen:
-    """Start the run; what it says is added to the file `log`."""
+    """Start the run; its output is added to the file `log`."""
     command = ["mpirun", "-n", str(ranks)] if ranks else []
     with (folder / "log").open("a") as log:
         return subprocess.Popen(
@@ -83,7 +83,7 @@ def kill(process: subprocess.Popen, victims: list[int]) -> float:
 
 
 def stage(folder: Path) -> str:
-    """How far the run has come, as its files tell."""
+    """Progress of the run according to its files."""
     final, part = folder / NAME, folder / f"{NAME}.part"
     if final.exists():
         return "renamed" if part.exists() else "done"

@@ -40,7 +40,7 @@ def folder(killed, tmp_path):
 
 def data_of_tiles(part: Path) -> dict[int, list[tuple[int, int]]]:
     """Where the working file holds the data of each tile that is done: (offset, bytes)."""
-    places = {}
+    extents = {}
     with h5py.File(part, locking=False) as file:
         state, shape = file["tiles/state"][()], file["tiles/tile_shape"][()]
         columns = -(-file["reason"].shape[1] // shape[1])
@@ -55,8 +55,8 @@ def data_of_tiles(part: Path) -> dict[int, list[tuple[int, int]]]:
                     c + s <= n for c, s, n in zip(chunk.chunk_offset, shape, dataset.shape, strict=True)
                 )
                 if state[tile] == 1 and whole:
-                    places.setdefault(tile, []).append((chunk.byte_offset, chunk.size))
-    return places
+                    extents.setdefault(tile, []).append((chunk.byte_offset, chunk.size))
+    return extents
 
 
 def flip(path: Path, offset: int, bit: int) -> None:
@@ -71,15 +71,15 @@ def flip(path: Path, offset: int, bit: int) -> None:
 def test_flipped_bits_cost_their_tiles(mpi_separatrix, folder, reference, amount, figures):
     chance = random.Random(SEED)
     original = (folder / PART).read_bytes()
-    places = data_of_tiles(folder / PART)
+    extents = data_of_tiles(folder / PART)
     done = life.tiles_of(folder)[0]
     flips = 0
     for trial in range(amount(2, 25)):
         (folder / PART).write_bytes(original)
         (folder / life.NAME).unlink(missing_ok=True)
-        tiles = chance.sample(sorted(places), 1 + trial % 5)
+        tiles = chance.sample(sorted(extents), 1 + trial % 5)
         for tile in tiles:
-            offset, size = chance.choice(places[tile])
+            offset, size = chance.choice(extents[tile])
             flip(folder / PART, offset + chance.randrange(size), chance.randrange(8))
             flips += 1
         outcome = life.resume(mpi_separatrix, folder, chance.choice([0, 1, 2, 3]))
@@ -91,8 +91,8 @@ def test_flipped_bits_cost_their_tiles(mpi_separatrix, folder, reference, amount
 def test_a_cut_tail_costs_its_tiles(mpi_separatrix, folder, reference, amount, figures):
     chance = random.Random(SEED)
     original = (folder / PART).read_bytes()
-    places = data_of_tiles(folder / PART)
-    first = min(offset for tiles in places.values() for offset, _ in tiles)
+    extents = data_of_tiles(folder / PART)
+    first = min(offset for tiles in extents.values() for offset, _ in tiles)
     done = life.tiles_of(folder)[0]
     cuts = [len(original) - 1, first, *(chance.randrange(first, len(original)) for _ in range(amount(2, 40)))]
     lost = Counter()
@@ -102,12 +102,12 @@ def test_a_cut_tail_costs_its_tiles(mpi_separatrix, folder, reference, amount, f
         outcome = life.resume(mpi_separatrix, folder, chance.choice([0, 1, 2, 3]))
         assert f"lacked {len(original) - cut} bytes" in outcome.out
         kept = int(re.search(r"(\d+) of \d+ tiles were done before", outcome.out)[1])
-        # Tiles that lost a byte other than zero; those at the edge of the grid are not in `places`.
+        # Tiles that lost a byte other than zero; those at the edge of the grid are not in `extents`.
         least = sum(
-            any(any(original[max(at, cut) : at + size]) for at, size in tile) for tile in places.values()
+            any(any(original[max(at, cut) : at + size]) for at, size in tile) for tile in extents.values()
         )
         assert done - kept >= least
-        assert done - kept <= least + done - len(places)
+        assert done - kept <= least + done - len(extents)
         lost[done - kept > 0] += 1
         assert life.differences(reference, folder / life.NAME) == []
     assert lost[True]
@@ -116,7 +116,7 @@ def test_a_cut_tail_costs_its_tiles(mpi_separatrix, folder, reference, amount, f
     )
 
 
-def test_a_cut_head_is_told(separatrix, folder):
+def test_a_cut_head_is_reported(separatrix, folder):
     original = (folder / PART).read_bytes()
     for cut in (0, 10, 47, 48, 1000, 20000):
         (folder / PART).write_bytes(original[:cut])

@@ -38,7 +38,7 @@ CASES = {
         "axis[1].from=1.099",
         "start.x0=1.0995",
     ],
-    "barriers at one place": [
+    "barriers at one position": [
         "contact.upper=0.5",
         "contact.lower=0.5",
         "axis[1]={name='v0', from=-6, to=6, count=13}",
@@ -80,7 +80,7 @@ FEW = [
     "restitution 0",
     "restitution 1",
     "leaves the domain",
-    "barriers at one place",
+    "barriers at one position",
     "huge stiffness",
     "tiny event budget",
     "huge speeds",

@@ -163,7 +163,7 @@ def test_another_layout_is_refused(separatrix, folder):
     assert "settle_time" in outcome.messages[0]
 
 
-def test_another_build_is_told_and_both_are_kept(separatrix, folder, reference):
+def test_another_build_is_reported_and_both_are_kept(separatrix, folder, reference):
     set_attribute(folder / PART, "commit", "0123456789ab")
     outcome = life.succeed(separatrix, *life.RUN, "--resume", folder=folder)
     assert "begun by another build: commit 0123456789ab" in outcome.out

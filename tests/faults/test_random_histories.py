@@ -91,8 +91,8 @@ class History:
             return life.content_hash(self.folder / life.NAME)
         parts = [f"{life.NAME}.shard-{i + 1}-of-{self.shares}.part" for i in range(self.shares)]
         order = self.chance.sample(range(self.shares), self.shares)
-        for place, i in enumerate(order):
-            taken = ["--catalogue", parts[order[0]]] if place > 0 and self.command[0] == "basin" else []
+        for number, i in enumerate(order):
+            taken = ["--catalogue", parts[order[0]]] if number > 0 and self.command[0] == "basin" else []
             self.compute(["--shard", f"{i + 1}/{self.shares}", *self.chance.choice([taken, []])], first=True)
         self.chance.shuffle(parts)
         life.succeed(self.program, "merge", life.NAME, *parts, folder=self.folder)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A signal or the time limit stops a run with code 75, soon; after a death the others say how to go on."""
+"""A signal or the time limit stops a run with code 75, soon; after a death the others name the next step."""
 
 import json
 import os
@@ -114,7 +114,7 @@ def test_sigterm_to_all_ranks_stops_soon(mpi_separatrix, tmp_path, reference, am
 
 
 def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, figures):
-    """mpirun ends its ranks itself and returns 1; they have a second to say how to go on."""
+    """mpirun ends its ranks itself and returns 1; they have a second to report how to continue."""
     chance, done, folder = random.Random(SEED), 0, tmp_path
     while done == 0:  # on a busy machine a stop may come before the first tile is done
         folder = folder / "run"
@@ -147,7 +147,7 @@ def test_sigterm_to_mpirun_leaves_a_resumable_file(mpi_separatrix, tmp_path, fig
 def test_the_time_limit_is_kept(mpi_separatrix, tmp_path, reference, amount, figures):
     chance = random.Random(SEED)
     codes = Counter()
-    longest, told = 0.0, 0
+    longest, reported = 0.0, 0
     for trial in range(amount(2, 30)):
         folder = tmp_path / str(trial)
         folder.mkdir()
@@ -159,42 +159,42 @@ def test_the_time_limit_is_kept(mpi_separatrix, tmp_path, reference, amount, fig
         lines = [json.loads(line) for line in outcome.out.splitlines() if line.startswith("{")]
         stopped = [line["seconds"] for line in lines if line["event"] == "stopped"]
         if stopped:
-            told += 1
+            reported += 1
             longest = max(longest, stopped[0] - limit)
         assert outcome.code in (0, 75)
         life.resume(mpi_separatrix, folder, chance.choice([0, 2])) if outcome.code else None
         assert life.content_hash(folder / life.NAME) == life.content_hash(reference)
     assert codes[75]
     # The others were stopped in the search for attractors.
-    assert told >= amount(0, 5)
+    assert reported >= amount(0, 5)
     assert longest < SOON
     figures.update(
-        seed=SEED, stops=codes.total(), codes=codes, with_tiles=told, longest_excess=round(longest, 2)
+        seed=SEED, stops=codes.total(), codes=codes, with_tiles=reported, longest_excess=round(longest, 2)
     )
 
 
 @pytest.mark.parametrize("dead", [0, 1, 2])
-def test_a_dead_rank_ends_the_job_and_the_others_say_how_to_go_on(
+def test_a_dead_rank_ends_the_job_and_the_others_report_how_to_continue(
     mpi_separatrix, tmp_path, amount, figures, long_if, dead
 ):
     long_if(dead > 0)
     chance = random.Random(f"{SEED} {dead}")
     longest = 0.0
-    deaths, told = amount(1, 5), 0
+    deaths, reported = amount(1, 5), 0
     for trial in range(deaths):
         folder = tmp_path / str(trial)
         folder.mkdir()
         process = start_and_wait(mpi_separatrix, folder, 3, chance, *SLOW)
         ranks = life.ranks_of(process, 3)
         assert len(ranks) == 3
-        # mpirun passes on what was said.
+        # mpirun passes on the messages of its ranks.
         time.sleep(0.2)
         longest = max(longest, life.kill(process, [ranks[dead]]))
         assert process.returncode == 137
         log = (folder / "log").read_text()
         assert "after an interruption the same command with --resume" in log
-        told += "was told to end (SIGTERM); the tiles done are kept" in log
+        reported += "was asked to end (SIGTERM); the tiles done are kept" in log
         assert life.stage(folder) == "fill"
         life.tiles_of(folder)
     assert longest < 10
-    figures.update(seed=SEED, deaths=deaths, survivors_spoke=told, longest=round(longest, 2))
+    figures.update(seed=SEED, deaths=deaths, survivors_spoke=reported, longest=round(longest, 2))

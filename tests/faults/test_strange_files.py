@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files where none can be, odd names, two runs at one file: told before any work, and nothing is spoilt."""
+"""Files where none can be, odd names, two runs at one file: reported before any work, nothing is spoilt."""
 
 import os
 import shutil
@@ -78,15 +78,15 @@ def test_a_folder_that_is_not_there(separatrix, folder):
 
 
 def test_blanks_quotes_and_letters_of_all_alphabets(mpi_separatrix, folder):
-    place = folder / "a b ü'\"$x;#漢"
-    place.mkdir()
-    shutil.move(folder / "case.toml", place / "ça se.toml")
+    odd = folder / "a b ü'\"$x;#漢"
+    odd.mkdir()
+    shutil.move(folder / "case.toml", odd / "ça se.toml")
     asked = ["basin", "ça se.toml", *QUICK[2:], "-o", "out put é.h5", "--log", "lo g.jsonl"]
-    life.succeed(mpi_separatrix, *asked, folder=place, ranks=2)
-    life.succeed(mpi_separatrix, "verify", "out put é.h5", "--sample", "2", folder=place)
-    life.succeed(mpi_separatrix, *asked[:-4], "-o", "s h.h5", "--shard", "1/1", folder=place)
-    life.succeed(mpi_separatrix, "merge", "m m.h5", "s h.h5.shard-1-of-1.part", folder=place)
-    assert life.content_hash(place / "m m.h5") == life.content_hash(place / "out put é.h5")
+    life.succeed(mpi_separatrix, *asked, folder=odd, ranks=2)
+    life.succeed(mpi_separatrix, "verify", "out put é.h5", "--sample", "2", folder=odd)
+    life.succeed(mpi_separatrix, *asked[:-4], "-o", "s h.h5", "--shard", "1/1", folder=odd)
+    life.succeed(mpi_separatrix, "merge", "m m.h5", "s h.h5.shard-1-of-1.part", folder=odd)
+    assert life.content_hash(odd / "m m.h5") == life.content_hash(odd / "out put é.h5")
 
 
 def test_a_title_as_long_as_a_book(separatrix, folder):
@@ -133,12 +133,12 @@ def test_a_folder_to_read_only(separatrix, public):
     assert ended.returncode == 74
     assert listing(public) == before
     # Shares are only read.
-    place = public / "writable"
-    place.mkdir()
-    place.chmod(0o777)
-    ended = as_nobody(public / "program", place, "merge", "map.h5", part)
+    writable = public / "writable"
+    writable.mkdir()
+    writable.chmod(0o777)
+    ended = as_nobody(public / "program", writable, "merge", "map.h5", part)
     assert ended.returncode == 0, ended
-    assert life.run(separatrix, "verify", "map.h5", "--sample", "2", folder=place).code == 0
+    assert life.run(separatrix, "verify", "map.h5", "--sample", "2", folder=writable).code == 0
 
 
 def test_merge_changes_no_share(separatrix, folder):

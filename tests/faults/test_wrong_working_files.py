@@ -23,7 +23,7 @@ SMALL = ["--set", "axis[1].count=6", "--set", "axis[2].count=8", "--set", "attra
 RUN = ["basin", "case.toml", *SMALL, "--set", "grid.tile=[3, 3]"]
 PART = "map.h5.part"
 SHARE = "map.h5.shard-1-of-1.part"
-# What may be said of a file that is wrong.
+# Exit codes allowed for a file that is wrong.
 REFUSED = (65, 66, 73, 74, 75, 76)
 
 
@@ -57,7 +57,7 @@ def transposed(file: h5py.File, name: str) -> None:
 
 
 def linked(file: h5py.File, name: str) -> None:
-    """A link to nowhere in the place of the object."""
+    """A link to nowhere in place of the object."""
     del file[name]
     file[name] = h5py.SoftLink("/nowhere")
 
@@ -126,23 +126,23 @@ def test_wrong_working_files(separatrix, model, tmp_path, amount, figures):
             shutil.rmtree(folder)
             continue
         tried += 1
-        told = change.__qualname__, what
+        which = change.__qualname__, what
         for end, command in {
             "resumed": [*RUN, "-o", "map.h5", "--resume"],
             "merged": ["merge", "merged.h5", SHARE],
         }.items():
             outcome = life.run(separatrix, *command, folder=folder)
-            assert outcome.code == 0 or is_refusal(outcome), (told, end, outcome)
+            assert outcome.code == 0 or is_refusal(outcome), (which, end, outcome)
             ends[end if outcome.code == 0 else "refused"] += 1
             result = folder / ("map.h5" if end == "resumed" else "merged.h5")
-            assert result.exists() == (outcome.code == 0), (told, end, outcome)
+            assert result.exists() == (outcome.code == 0), (which, end, outcome)
             if outcome.code == 0:
-                assert life.content_hash(result) == expected, (told, end)
+                assert life.content_hash(result) == expected, (which, end)
         for reader in ("info", "verify"):
             outcome = life.run(separatrix, reader, SHARE, folder=folder)
-            assert outcome.code == 0 or is_refusal(outcome), (told, reader, outcome)
+            assert outcome.code == 0 or is_refusal(outcome), (which, reader, outcome)
         left = [name for name in listing(folder) if name.endswith((".new", ".lock"))]
-        assert not left, (told, left)
+        assert not left, (which, left)
         shutil.rmtree(folder)
     assert min(ends.values()) > 0
     figures.update(seed=SEED, changes=len(every), tried=tried, ends=ends)

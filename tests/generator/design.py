@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws cases: machine, experiments, sensor, and the hidden effect with the size that was asked for."""
+"""Draws cases: machine, experiments, sensor, and the hidden effect with the requested size."""
 
 import math
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ LONGEST = 36
 PLANNED = 100
 """Samples per drive period on which the size of an effect of a long case is chosen."""
 RIG = (1e-4, 1e-3)
-"""Small faults of a rig over the signal: a sensor that is not quite linear, further harmonics; of the crank
+"""Small imperfections of a rig over the signal: a slightly nonlinear sensor, further harmonics; of the crank
 angle in rad."""
 ANOTHER_SHAPE = 2 / 3
 TARGETS = (3.0, 5.0, 10.0, 30.0)
@@ -58,7 +58,7 @@ NEEDS_DRY = ("stribeck", "static_excess", "dahl", "asymmetric_friction", "positi
 
 
 class Unreachable(Exception):
-    """No size of the effect is worth what was asked for here."""
+    """No size of the effect has the requested d' here."""
 
 
 @dataclass
@@ -102,12 +102,12 @@ class Case:
     colour: str
     velocity: bool
     crank_angle: bool
-    tells_noise: bool
+    states_noise: bool
     phase_error: list[float]
     target: float
     seed: list[int]
     rig: dict[str, float] = field(default_factory=dict)
-    """Small faults of the rig: crank_noise [rad]; curved, cubic (sensor) and harmonics over the signal."""
+    """Imperfections of the rig: crank_noise [rad]; curved, cubic (sensor) and harmonics over the signal."""
     density: int = 1
     """Samples of a record for each on which its size was chosen."""
     d_prime: dict[str, float] = field(default_factory=dict)
@@ -123,36 +123,36 @@ def sizes_of_noise(seen: np.ndarray, level: float) -> tuple[float, float]:
 
 def plan(seed: int, number: int) -> tuple[str, str, float]:
     """Kind, name and target of a case, in equal shares over every block of cases."""
-    block, place = divmod(number, BLOCK)
+    block, index = divmod(number, BLOCK)
     random = np.random.default_rng([seed, 1, block])
     kinds = [kind for kind, share in SHARES.items() for _ in range(share)]
     kinds += ["single"] * (BLOCK - len(kinds))
     order = random.permutation(BLOCK)
-    kind = kinds[order[place]]
-    before = int(np.sum(np.array(kinds)[order[:place]] == kind)) + block * kinds.count(kind)
+    kind = kinds[order[index]]
+    before = int(np.sum(np.array(kinds)[order[:index]] == kind)) + block * kinds.count(kind)
     names = {
         "none": [""],
         "outside": list(OUTSIDE),
         "pair": ["+".join(pair) for pair in PAIRS],
         "single": [*CATALOGUE, "asymmetric_viscous"],
     }[kind]
-    turn, place = divmod(before, len(names))
+    turn, index = divmod(before, len(names))
     order = np.random.default_rng([seed, 2, turn, len(names)]).permutation(len(names))
-    index = int(order[place])
+    index = int(order[index])
     targets = (10.0, 30.0) if kind in ("outside", "pair") else TARGETS
     return kind, names[index], targets[(turn + index) % len(targets)]
 
 
 def is_long(seed: int, number: int) -> bool:
     """Whether a case has records as long as those of a rig."""
-    block, place = divmod(number, BLOCK)
-    return int(np.random.default_rng([seed, 4, block]).permutation(BLOCK)[place]) < LONG
+    block, index = divmod(number, BLOCK)
+    return int(np.random.default_rng([seed, 4, block]).permutation(BLOCK)[index]) < LONG
 
 
 def draw(seed: int, number: int, plain: bool = False) -> Case:
-    """The case of this number; a regime in which its effect cannot have the size asked for is drawn again.
+    """The case of this number; a regime in which its effect cannot have the requested size is drawn again.
 
-    `plain`: a short one with the law of the catalogue and no faults of the rig.
+    `plain`: a short one with the law of the catalogue and no imperfections of the rig.
     """
     kind, name, target = plan(seed, number)
     long = is_long(seed, number) and not plain
@@ -160,7 +160,7 @@ def draw(seed: int, number: int, plain: bool = False) -> Case:
 
 
 def draw_shaped(seed: int, number: int, name: str, shape: dict[str, float], target: float) -> Case:
-    """A short case with one effect of a given shape and size, and no faults of the rig."""
+    """A short case with one effect of a given shape and size, and no imperfections of the rig."""
     return _attempted(seed, number, True, ("single", name, target, False, shape))
 
 
@@ -237,7 +237,7 @@ def _hide(
 
 
 def _rig(random: np.random.Generator) -> dict[str, float]:
-    """The small faults of a rig, which half of the cases have."""
+    """The small imperfections of a rig, which half of the cases have."""
     if random.random() < 0.5:
         return {}
     sizes = np.exp(random.uniform(*np.log(RIG), 4)) * [1, *random.choice([-1, 1], 2), 1]
@@ -279,7 +279,7 @@ def _draw(
         colour=str(random.choice(["white", "coloured", "quantised"], p=[0.6, 0.2, 0.2])),
         velocity=bool(random.random() < 0.3),
         crank_angle=name == "sensor_delay" or bool(random.random() < 0.4),
-        tells_noise=bool(random.random() < 0.5),
+        states_noise=bool(random.random() < 0.5),
         phase_error=[float(error) for error in random.normal(0, PHASE_ERROR, 3)],
         target=target if name else 0.0,
         seed=[],
@@ -298,7 +298,7 @@ def _draw(
     if sum(part.impacts for part in information.parts) < 6:
         raise Unreachable
     if name:
-        _judge(case, information)
+        _measure(case, information)
     if long:
         _sample_densely(case, more)
     return case
@@ -371,7 +371,7 @@ def _worth(information: Information, case: Case, hidden: Hidden, *imitators: str
 
 
 def _choose_size(case: Case, hidden: Hidden) -> None:
-    """Bisects the logarithm of the size; where the motion jumps the size may be missed."""
+    """Bisects the logarithm of the size; a jump of the motion may make it unreachable."""
     low, high = (math.log(size) for size in hidden.effect.sizes)
     before = math.log(hidden.size) if hidden.size > 0 else math.inf
 
@@ -402,8 +402,8 @@ def _choose_size(case: Case, hidden: Hidden) -> None:
     raise Unreachable
 
 
-def _judge(case: Case, information: Information) -> None:
-    """What the effects are worth in the records as they are, and how much of it is their own."""
+def _measure(case: Case, information: Information) -> None:
+    """d' of the effects in the records, and the part that no other effect imitates."""
     for hidden in case.hidden:
         case.d_prime[hidden.name] = _worth(information, case, hidden)
         own = {hidden.name, *(other.name for other in case.hidden)}

@@ -125,9 +125,9 @@ class Experiment:
             seen[:, X] = self._delayed(driven, states, delay, self.substeps(steps_per_period))
         curved, cubic = self.sensor.get("sensor_curved", 0.0), self.sensor.get("sensor_cubic", 0.0)
         if curved or cubic:
-            middle, swing = seen[:, X].mean(), seen[:, X].std()
-            u = (seen[:, X] - middle) / swing
-            seen[:, X] += swing * (curved * u**2 + cubic * u**3)
+            middle, deviation = seen[:, X].mean(), seen[:, X].std()
+            u = (seen[:, X] - middle) / deviation
+            seen[:, X] += deviation * (curved * u**2 + cubic * u**3)
         seen[:, X] *= 1 + self.sensor.get("sensor_gain", 0.0)
         seen[:, X] += self.sensor.get("sensor_bias", 0.0)
         return seen

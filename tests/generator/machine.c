@@ -42,8 +42,8 @@ static double foot(const struct machine *m, double t) {
 
 /* The position `delay` ago, by cubic Hermite interpolation. */
 static double delayed_position(const struct machine *m, double t, double now) {
-  double place = (t - m->delay - m->history_first) / m->history_step;
-  long i = (long)floor(place);
+  double at = (t - m->delay - m->history_first) / m->history_step;
+  long i = (long)floor(at);
   if (i < 0 || m->history_count < 2) {
     return now;
   }
@@ -51,7 +51,7 @@ static double delayed_position(const struct machine *m, double t, double now) {
     i = m->history_count - 2;
   }
   const double *a = m->history + 2 * i, *b = a + 2;
-  double s = place - (double)i, r = 1 - s;
+  double s = at - (double)i, r = 1 - s;
   return a[0] * r * r * (1 + 2 * s) + b[0] * s * s * (3 - 2 * s) +
          m->history_step * s * r * (a[1] * r - b[1] * s);
 }
@@ -61,11 +61,11 @@ static double power_of(double size, double exponent, double usual) {
   return pow(size, exponent > 0 ? exponent : usual);
 }
 
-static double spring_beyond_linear(const struct machine *m, double stretch) {
+static double spring_beyond_linear(const struct machine *m, double extension) {
   if (m->cubic_exponent > 0) {
-    return m->cubic * copysign(pow(fabs(stretch), m->cubic_exponent), stretch);
+    return m->cubic * copysign(pow(fabs(extension), m->cubic_exponent), extension);
   }
-  return m->cubic * stretch * stretch * stretch;
+  return m->cubic * extension * extension * extension;
 }
 
 /* The force of the soft barrier beside its damping. */
@@ -76,12 +76,12 @@ static double contact_force(const struct machine *m, double depth) {
 
 /* Every force but friction and the soft barrier. */
 static double driving_force(const struct machine *m, double t, const double y[STATES]) {
-  double stretch = m->free_length + foot(m, t) - y[X];
+  double extension = m->free_length + foot(m, t) - y[X];
   double stiffness = m->stiffness;
   if (m->stiffness_wave != 0) {
     stiffness *= 1 + m->stiffness_wave * cos(m->stiffness_wave_frequency * t);
   }
-  double force = stiffness * stretch + spring_beyond_linear(m, stretch) + m->offset - y[U];
+  double force = stiffness * extension + spring_beyond_linear(m, extension) + m->offset - y[U];
   if (m->second_mass > 0) {
     force += m->second_stiffness * (y[X2] - y[X]) + m->second_damping * (y[V2] - y[V]);
   }
@@ -101,10 +101,10 @@ static double holding_force(const struct machine *m, const struct motion *b, dou
   return force;
 }
 
-/* Share of dry friction at a place. */
+/* Share of dry friction at a position. */
 static double roughness(const struct machine *m, double x) {
-  double place = m->friction_wave > 0 ? sin(m->friction_wave * x) / m->friction_wave : x;
-  return fmax(0, 1 + m->friction_slope * place);
+  double profile = m->friction_wave > 0 ? sin(m->friction_wave * x) / m->friction_wave : x;
+  return fmax(0, 1 + m->friction_slope * profile);
 }
 
 /* Friction force that opposes sliding in a direction. */

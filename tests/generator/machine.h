@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: The Separatrix developers
  * SPDX-License-Identifier: GPL-3.0-or-later */
 
-/* The simulator that hides an effect in a record. It shares neither code nor method with the program: fixed
- * steps of the classical Runge-Kutta method, events found by halving the step in which they are. */
+/* The simulator that hides an effect in a record. It shares neither code nor method with the program: it uses
+ * fixed steps of the classical Runge-Kutta method and locates events by bisection of a step. */
 #ifndef GENERATOR_MACHINE_H
 #define GENERATOR_MACHINE_H
 
@@ -26,11 +26,11 @@ struct machine {
   double restitution_slope, contact_stiffness, contact_damping, lower;
   double ripple_sine, ripple_cosine, ripple_harmonic;
 
-  /* Shapes of these laws; 0 is that of the catalogue. Speeds are over 1 m/s, stretches and depths over 1 m.
-   */
+  /* Shapes of these laws; 0 is that of the catalogue. Speeds are over 1 m/s, extensions and depths over
+   * 1 m. */
   double quadratic_exponent, stribeck_exponent, cubic_exponent, contact_exponent;
   double restitution_shape, restitution_constant;
-  double friction_wave; /* of friction over place [1/m] */
+  double friction_wave; /* of friction over position [1/m] */
 
   /* What the catalogue does not have. Drifts and waves are functions of the time since the record began. */
   double stiffness_wave, stiffness_wave_frequency;

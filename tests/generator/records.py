@@ -59,22 +59,22 @@ angle = {ANGLE!r}
 """
 
 
-def with_faults(case: Case, experiment: Experiment) -> tuple[Machine, dict[str, float]]:
-    """Machine and sensor of an experiment with the small faults of the rig."""
+def with_imperfections(case: Case, experiment: Experiment) -> tuple[Machine, dict[str, float]]:
+    """Machine and sensor of an experiment with the small imperfections of the rig."""
     driven = experiment.driven(case.machine)
     if not case.rig:
         return driven, {}
     first = case.training[0]
-    swing = float(np.std(first.states(first.driven(case.machine), COARSE)[0][:, X]))
-    size = case.rig["harmonics"] * swing / math.sqrt(3)
+    deviation = float(np.std(first.states(first.driven(case.machine), COARSE)[0][:, X]))
+    size = case.rig["harmonics"] * deviation / math.sqrt(3)
     driven = driven.copy(cosine=(*COSINE, size, 0.0, size), sine=(*SINE, 0.0, size, 0.0))
     return driven, {"sensor_curved": case.rig["curved"], "sensor_cubic": case.rig["cubic"]}
 
 
 def seen_by(case: Case, experiment: Experiment) -> np.ndarray:
     """Position and velocity (samples, 2) that the sensors show but for their noise."""
-    driven, faults = with_faults(case, experiment)
-    experiment.sensor = {**experiment.sensor, **faults}
+    driven, imperfections = with_imperfections(case, experiment)
+    experiment.sensor = {**experiment.sensor, **imperfections}
     states, _ = experiment.states(driven, FINE)
     return experiment.observe(driven, states, FINE)
 
@@ -126,11 +126,11 @@ def write_record(
     head["drive_ratio"] = repr(experiment.ratio)
     if experiment.scale != 1:
         head["drive_scale"] = repr(experiment.scale)
-    if case.tells_noise:
+    if case.states_noise:
         head["sensor_noise_sigma_m"] = repr(sigma)
     if resolution > 0:
         head["sensor_resolution_m"] = repr(resolution)
-    if case.crank_angle and case.rig and case.tells_noise:
+    if case.crank_angle and case.rig and case.states_noise:
         head["phi_noise_sigma_rad"] = repr(case.rig["crank_noise"])
     if not case.crank_angle:
         head["phase"] = f"{experiment.phase + phase_error:.4f}"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many standard errors large an effect is, and how much of it no other effect can imitate.
+"""Size of an effect in standard errors, and the part of it that no other effect can imitate.
 
 The records are cut into segments of half a drive period whose starts are free. The columns of
 derivatives are finite differences at the true machine. d' is the size of the effect over its standard
@@ -42,8 +42,8 @@ IMITATORS = {
 }
 """Effects that have a derivative where they are absent, and their parameters."""
 AT_ALL = {"lower": -NOWHERE, "static_excess": 0.0}
-"""Parameters whose effect is what they change at all, and their values where they are absent. How much longer
-a stick lasts goes with the square of what holds it, or jumps: the derivative says little of it."""
+"""Parameters whose effect is their whole change of the motion, and their values where they are absent. The
+extra duration of a stick is quadratic in the holding force or jumps, which the derivative does not show."""
 
 
 @dataclass
@@ -98,16 +98,16 @@ class Segments:
 
     def _mask_grazing(self) -> None:
         """Leave out segments whose impacts another start within the noise would change."""
-        for place, sigma in zip((X, V), self.noise.sigma, strict=True):
+        for column, sigma in zip((X, V), self.noise.sigma, strict=True):
             move = np.zeros_like(self.starts)
-            move[:, place] = GRAZING * sigma
+            move[:, column] = GRAZING * sigma
             self._difference((self.driven, self.starts + move), (self.driven, self.starts - move))
 
     def _start_basis(self) -> np.ndarray:
         columns = []
-        for place, shift in zip((X, V), SHIFTS, strict=True):
+        for column, shift in zip((X, V), SHIFTS, strict=True):
             move = np.zeros_like(self.starts)
-            move[:, place] = shift
+            move[:, column] = shift
             change = self._difference((self.driven, self.starts + move), (self.driven, self.starts - move))
             columns.append(self.noise.whitened(change / (2 * shift)))
         return np.linalg.qr(np.stack(columns, axis=-1))[0]

@@ -23,14 +23,14 @@ def cantilever(elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Return M and K of a clamped-free Euler beam, all of its measures one: (w, w') of each node."""
     h, size = 1 / elements, 2 * (elements + 1)
     bend = [[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]
-    swing = [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
+    inertia = [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
     length = np.outer([1, h, 1, h], [1, h, 1, h])
-    k, m = np.array(bend) * length / h**3, np.array(swing) * length * h / 420
+    k, m = np.array(bend) * length / h**3, np.array(inertia) * length * h / 420
     mass, stiffness = np.zeros((size, size)), np.zeros((size, size))
     for element in range(elements):
-        place = slice(2 * element, 2 * element + 4)
-        mass[place, place] += m
-        stiffness[place, place] += k
+        rows = slice(2 * element, 2 * element + 4)
+        mass[rows, rows] += m
+        stiffness[rows, rows] += k
     return mass[2:, 2:], stiffness[2:, 2:]
 
 

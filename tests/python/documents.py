@@ -27,7 +27,7 @@ def blocks(page: Path) -> list[tuple[str, str]]:
 
 
 def run_page(page: Path, folder: Path, programs: list[Path]) -> None:
-    """Run a page in `folder`; an AssertionError tells what is not as it says."""
+    """Run a page in `folder`; an AssertionError names what differs from it."""
     names: dict[str, object] = {"__name__": "__main__"}
     path = os.pathsep.join([*map(str, programs), os.environ["PATH"]])
     for language, text in blocks(page):
@@ -42,13 +42,13 @@ def run_page(page: Path, folder: Path, programs: list[Path]) -> None:
 
 
 def _python(text: str, page: Path, names: dict[str, object]) -> None:
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
         exec(compile(text, str(page), "exec"), names)
     wanted = re.findall(r"^ *print\(.*\)  +# (.*)$", text, re.MULTILINE)
     for line in wanted:
-        assert line.strip() in said.getvalue().splitlines(), (
-            f"{page.name}: {line!r}, printed {said.getvalue()!r}"
+        assert line.strip() in output.getvalue().splitlines(), (
+            f"{page.name}: {line!r}, printed {output.getvalue()!r}"
         )
 
 
@@ -61,8 +61,8 @@ def _console(text: str, page: Path, folder: Path, environment: dict[str, str]) -
         done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
         expected = [line for line in wanted.splitlines() if line.strip()]
         refused = any(line.startswith("separatrix: ") for line in expected)
-        said = f"{done.returncode}\n{done.stdout}{done.stderr}"
-        assert (done.returncode == 0) != refused, f"{page.name}: {command}: {said}"
+        outcome = f"{done.returncode}\n{done.stdout}{done.stderr}"
+        assert (done.returncode == 0) != refused, f"{page.name}: {command}: {outcome}"
         if expected:
             # progress goes to stderr, and how much of it hangs on how busy the machine is
             printed = done.stderr if refused else done.stdout

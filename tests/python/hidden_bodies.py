@@ -43,7 +43,7 @@ class Sprung:
     row: Sequence[float]
     stiffness: float
     level: float
-    # +1 or -1: it slides so at the start; 0: its spring has no stretch
+    # +1 or -1: it slides so at the start; 0: its spring has no extension
     slides: int = 0
 
     @property
@@ -52,7 +52,7 @@ class Sprung:
         return len(self.mass)
 
     def along(self, q: Sequence[float], v: Sequence[float], times: np.ndarray) -> np.ndarray:
-        """Places, then velocities (times, 2 n) of a motion from its start at the first of the times."""
+        """Positions, then velocities (times, 2 n) of a motion from its start at the first of the times."""
         n, row = self.n, np.asarray(self.row, float)
         longest = self.level / self.stiffness
 
@@ -85,7 +85,7 @@ class Sprung:
 
 
 def flown(machine: Structure, q: Sequence[float], v: Sequence[float], times: np.ndarray) -> np.ndarray:
-    """Places, then velocities (times, 2 n) of a motion from its start at the first of the times."""
+    """Positions, then velocities (times, 2 n) of a motion from its start at the first of the times."""
     ways = []
     solve = structures.solve_ivp
 

@@ -120,7 +120,7 @@ KINDS = {
 PROVENANCE = ("provenance", "tiles")
 TIMES = ("history", "date_created")
 PROGRESS = ", ETA |^following branch "
-"""What a run says where it takes longer, as beside others."""
+"""Progress of a run, printed where it takes longer, as beside others."""
 
 
 @dataclass
@@ -155,10 +155,10 @@ def run(program: Path, *arguments: object, folder: Path, ranks: int = 0, timeout
 
 
 def succeed(program: Path, *arguments: object, folder: Path, ranks: int = 0, timeout: float = 60) -> Outcome:
-    """As `run`; the run must end with code 0 and say nothing on stderr but its progress."""
+    """As `run`; the run must end with code 0 and print nothing on stderr but its progress."""
     outcome = run(program, *arguments, folder=folder, ranks=ranks, timeout=timeout)
-    said = [line for line in outcome.err.splitlines() if not re.search(PROGRESS, line)]
-    assert (outcome.code, said) == (0, []), outcome
+    lines = [line for line in outcome.err.splitlines() if not re.search(PROGRESS, line)]
+    assert (outcome.code, lines) == (0, []), outcome
     return outcome
 
 

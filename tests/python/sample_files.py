@@ -271,11 +271,11 @@ def _variable(
 
 def _catalogue(file: h5py.File, slices: int, regime_of: tuple[int, ...]) -> None:
     group = file.create_group("catalogue")
-    rows = [(place, identity) for place in range(slices) for identity in range(1, len(regime_of))]
+    rows = [(index, identity) for index in range(slices) for identity in range(1, len(regime_of))]
     _scale(group, "entry", np.arange(len(rows), dtype="i4"), "1", "entry")
     regime = np.array([regime_of[identity] for _, identity in rows])
     columns = {
-        "slice": [place for place, _ in rows], "attractor": [identity for _, identity in rows],
+        "slice": [index for index, _ in rows], "attractor": [identity for _, identity in rows],
         "regime": regime, "period": np.ones(len(rows)),
         "event_word": np.where(regime == 2, WORD_IMPACT, WORD_QUIET),
     }  # fmt: skip

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad input: the right exit code, a message that says what and where, and nothing written."""
+"""Bad input: the right exit code, a message that names what and where, and nothing written."""
 
 import re
 import time
@@ -81,8 +81,8 @@ def test_a_bad_case_is_refused(separatrix, tmp_path, name):
     outcome = run(separatrix, "basin", "case.toml", folder=tmp_path)
     assert outcome.code == 65
     assert outcome.out == ""
-    place = re.match(r"separatrix: case\.toml:(\d+)(:\d+)?: \S", outcome.err)
-    assert 1 <= int(place[1]) <= CASE.count("\n") + 8
+    position = re.match(r"separatrix: case\.toml:(\d+)(:\d+)?: \S", outcome.err)
+    assert 1 <= int(position[1]) <= CASE.count("\n") + 8
     for word in words:
         assert word in outcome.err
     assert listing(tmp_path) == before
@@ -356,8 +356,8 @@ def test_errors_are_printed_once_whatever_the_number_of_ranks(
     assert listing(tmp_path) == before
 
 
-def test_all_problems_are_told_at_once_where_one_is_a_wrong_law(separatrix, tmp_path):
-    """What can be judged without the law is judged; what cannot is no problem."""
+def test_all_problems_are_reported_at_once_where_one_is_a_wrong_law(separatrix, tmp_path):
+    """What can be checked without the law is checked; the rest is no problem."""
     case = CASE.replace('law = "coulomb"', 'law = "columb"').replace(
         "sine = [0.0, 0.02849, -0.02686]", "sine = [0.0]"
     )
@@ -393,7 +393,7 @@ def test_a_map_needs_nothing_that_only_a_sweep_does(separatrix, tmp_path):
 
 
 def test_the_driving_body_of_a_pair_moves_its_stops(separatrix, source_dir, tmp_path):
-    """A start is within the stops for every place of the driving body, along an axis too."""
+    """A start is within the stops for every position of the driving body, along an axis too."""
     axes = "".join(
         f'\n[[axis]]\nname = "{name}"\nfrom = {low}\nto = {high}\ncount = 3\n'
         for name, low, high in (("body.driver_x0", -0.04, 0.1), ("v0", 0, 1))

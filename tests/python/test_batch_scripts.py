@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The batch scripts with commands of the test in the place of SLURM's; test_slurm.py has a real one."""
+"""The batch scripts with commands of the test in place of SLURM's; test_slurm.py has a real one."""
 
 import json
 import os

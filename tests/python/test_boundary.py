@@ -117,7 +117,7 @@ def test_a_stopped_run_goes_on_to_the_same_curves_with_any_ranks(run, coulomb, c
     assert run("boundary", coulomb, "-o", out).returncode == 73
     other = run("boundary", coulomb, "-o", out, "--resume", "--grow", 2)
     assert other.returncode == 76 and "belongs to another map" in other.stderr
-    # the same labels, on a grid that is a little narrower: places on its edges are others
+    # the same labels, on a grid that is a little narrower: points on its edges are others
     narrow = coulomb.with_name("narrow.h5")
     case = coulomb.with_name("coulomb.toml")
     assert run("basin", case, "-o", narrow, "--set", "axis[1].to=1.099999").returncode == 0
@@ -267,7 +267,7 @@ def test_what_has_no_planes_of_starts_is_refused(run, source_dir, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("how", "code", "said"),
+    ("how", "code", "message"),
     [
         ("damaged", 74, "is damaged"),
         ("missing", 66, "there is no file"),
@@ -275,20 +275,20 @@ def test_what_has_no_planes_of_starts_is_refused(run, source_dir, tmp_path):
         ("case", 65, "is a text"),
     ],
 )
-def test_what_is_no_sound_map_is_refused(run, coulomb, curves, tmp_path, how, code, said):
+def test_what_is_no_sound_map_is_refused(run, coulomb, curves, tmp_path, how, code, message):
     path = tmp_path / "map.h5"
     if how == "damaged":
         path.write_bytes(coulomb.read_bytes())
         with h5py.File(path, "r+") as file:
             file["attractor"][3, 4] = 7 - file["attractor"][3, 4]
-        said = "attractor"
+        message = "attractor"
     elif how == "other":
         path = curves
     elif how == "case":
         path = coulomb.with_name("coulomb.toml")
     ended = run("boundary", path, "-o", tmp_path / "out.h5")
     assert ended.returncode == code, ended.stderr
-    assert said in ended.stderr
+    assert message in ended.stderr
     assert not (tmp_path / "out.h5").exists()
 
 
@@ -321,14 +321,14 @@ def test_nothing_is_replaced_without_force(run, coulomb, curves):
 
 
 def test_verify_runs_starts_on_both_sides_again(run, curves):
-    told = run("verify", curves, "--sample", 40)
-    assert told.returncode == 0, told.stderr
-    assert "40 points run again: 0 differ from the file" in told.stdout
-    assert "against quadruple precision: 0 label flips\n" in told.stdout
+    ended = run("verify", curves, "--sample", 40)
+    assert ended.returncode == 0, ended.stderr
+    assert "40 points run again: 0 differ from the file" in ended.stdout
+    assert "against quadruple precision: 0 label flips\n" in ended.stdout
 
 
 @pytest.mark.parametrize(
-    ("name", "place", "value", "said"),
+    ("name", "index", "value", "message"),
     [
         ("x0", 20, 0.9, "points rerun differ from the file"),
         ("label_one", 0, 7, "point 0: has not the labels of its piece"),
@@ -337,12 +337,12 @@ def test_verify_runs_starts_on_both_sides_again(run, curves):
         ("saddles/multipliers", (0, 1), 1.5, "saddle 1: its multipliers are not those of a saddle"),
     ],
 )
-def test_verify_tells_what_is_wrong_in_a_boundary(run, curves, tmp_path, name, place, value, said):
+def test_verify_reports_what_is_wrong_in_a_boundary(run, curves, tmp_path, name, index, value, message):
     path = tmp_path / "wrong.h5"
     path.write_bytes(curves.read_bytes())
     with h5py.File(path, "r+") as file:
-        file[name][place] = value
+        file[name][index] = value
         file[name].attrs.modify("checksum", np.uint32(zlib.crc32(file[name][()].tobytes())))
-    told = run("verify", path)
-    assert told.returncode == 74
-    assert said in told.stderr
+    ended = run("verify", path)
+    assert ended.returncode == 74
+    assert message in ended.stderr

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command `boundary` where five basins are interwoven: all places known, no pairs mixed."""
+"""The command `boundary` where five basins are interwoven: all points known, no pairs mixed."""
 
 import subprocess
 from pathlib import Path
@@ -45,7 +45,7 @@ def woven(separatrix: Path, tmp_path_factory) -> Path:
     return out
 
 
-def test_every_place_is_known_to_1e_10_and_has_the_labels_of_its_piece(separatrix, woven):
+def test_every_point_is_known_to_1e_10_and_has_the_labels_of_its_piece(separatrix, woven):
     with open_result(woven) as result:
         across, error = result["across"].values, result["error"].values
         for axis, width in ((0, 6), (1, 12)):
@@ -58,10 +58,10 @@ def test_every_place_is_known_to_1e_10_and_has_the_labels_of_its_piece(separatri
         )
         assert len(pairs) > 5 and len({one for pair in pairs for one in pair}) > 3
     # labels on both sides run again, to the bit
-    told = subprocess.run(
+    ended = subprocess.run(
         [separatrix, "verify", woven, "--sample", "30"], capture_output=True, text=True, check=False
     )
-    assert "30 points run again: 0 differ from the file" in told.stdout, told.stderr
+    assert "30 points run again: 0 differ from the file" in ended.stdout, ended.stderr
 
 
 def test_a_motion_from_a_named_point_comes_to_its_saddle(woven):
@@ -102,9 +102,9 @@ def test_no_two_saddles_look_alike():
         "first": ("piece", np.arange(0, 16, 2)),
         "points": ("piece", np.full(8, 2)),
     }
-    places = {name: ("point", np.arange(16.0), {"units": "1"}) for name in ("a", "b")}
+    coordinates = {name: ("point", np.arange(16.0), {"units": "1"}) for name in ("a", "b")}
     ax = Figure().add_subplot()
-    handles = boundary.draw(ax, xr.Dataset(pieces | places), "a", "b", DEFAULT, {})
+    handles = boundary.draw(ax, xr.Dataset(pieces | coordinates), "a", "b", DEFAULT, {})
     texts = [handle.get_label() for handle in handles]
     assert texts == [
         *(f"boundary: stable set of saddle {k}" for k in range(1, 8)),

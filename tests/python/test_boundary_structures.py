@@ -27,7 +27,7 @@ def closed_form(source_dir):
     orbits = importlib.import_module("validation_structures").orbits
     sys.path.remove(str(source_dir / "scripts"))
     damping, force = 0.04 * COUPLED, np.array([1.0, 0.0])
-    speed, phase, place, velocity = min(
+    speed, phase, position, velocity = min(
         orbits(FREQUENCY, np.eye(2), damping, COUPLED, force, [0, 1], 1, LOSS), key=lambda found: found[0]
     )
     system = np.block([[np.zeros((2, 2)), np.eye(2)], [-COUPLED, -damping]])
@@ -37,7 +37,7 @@ def closed_form(source_dir):
         turned = response * np.exp(1j * angle)
         return np.concatenate([turned.real, (1j * FREQUENCY * turned).real])
 
-    after = np.concatenate([place, velocity])
+    after = np.concatenate([position, velocity])
     left = (2 * np.pi - phase) / FREQUENCY
     point = steady(0) + expm(system * left) @ (after - steady(phase))
     # saltation: the impact comes later by dt = -dx/speed

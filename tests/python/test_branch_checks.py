@@ -27,14 +27,14 @@ def test_what_must_hold_on_branches_holds(checks, separatrix, tmp_path, name):
     gaps, both, _ = checks.apart(case, one, other)
     assert both > 0 and max(gaps) < 1e-10
     # and is seen where it does not
-    moved = replace(one, places={key: values + 1e-9 for key, values in one.places.items()})
+    moved = replace(one, labelled={key: values + 1e-9 for key, values in one.labelled.items()})
     assert any("apart" in item for item in checks.row(case, moved, other)[1])
     off = replace(one, multipliers=one.multipliers * (1 + 1e-6))
     assert any("a multiplier" in item for item in checks.row(case, off, other)[1])
     assert any("product" in item for item in checks.row(case, off, other)[1])
-    # labels of mirror images are one place to rounding, in one run or in the other
-    key, values = next((key, values) for key, values in one.places.items() if values.size)
-    doubled = replace(one, places={**one.places, key: np.append(values, values + 1e-15)})
+    # labels of mirror images are one value to rounding, in one run or in the other
+    key, values = next((key, values) for key, values in one.labelled.items() if values.size)
+    doubled = replace(one, labelled={**one.labelled, key: np.append(values, values + 1e-15)})
     assert checks.apart(case, doubled, one)[1:] == (both_of(checks, case, one) + values.size, 0)
     assert checks.apart(case, one, doubled)[1:] == (both_of(checks, case, one), 0)
 
@@ -51,7 +51,7 @@ def test_every_example_without_a_measured_drive_is_followed_or_refused_in_words(
     assert wrong == []
     assert len(lines) == len(checks.REFUSED)
     # the page that they are written to names no folder of a machine
-    assert not any(str(source_dir) in said for _, said in lines)
+    assert not any(str(source_dir) in message for _, message in lines)
     known = {case.path for case in checks.CASES} | checks.REFUSED.keys() | checks.SAME_MACHINE
     there = {path.stem for path in (source_dir / "examples").glob("*.toml")}
     assert there <= known

@@ -182,7 +182,7 @@ def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
 
 
 @pytest.mark.parametrize(
-    ("options", "code", "said"),
+    ("options", "code", "message"),
     [
         ((), 64, "--parameter NAME is missing"),
         (("--parameter", "drive.ration", "--from", "1", "--to", "2"), 65, "drive.ratio"),
@@ -200,10 +200,10 @@ def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
         ((*AMPLITUDE, "--free-from", "2"), 64, "--free NAME, which is missing"),
     ],
 )
-def test_what_makes_no_sense_is_refused(run, options, code, said):
+def test_what_makes_no_sense_is_refused(run, options, code, message):
     out, ended = run("impact_coco", *options)
     assert ended.returncode == code
-    assert said in ended.stderr
+    assert message in ended.stderr
     assert not out.exists()
 
 
@@ -259,8 +259,8 @@ def test_what_stays_on_the_unit_circle_does_not_pass_it(separatrix: Path, tmp_pa
     """Without losses the product of the multipliers is 1 but for rounding; gravity moves nothing."""
     (tmp_path / "case.toml").write_text(LOSSLESS)
     words = ("--parameter", "body.gravity", "--from", "0.5", "--to", "2", "--searches", "3", "-o", "out.h5")
-    said = succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path).out
-    assert "body.gravity has no effect" in said
+    output = succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path).out
+    assert "body.gravity has no effect" in output
     with open_result(tmp_path / "out.h5") as result:
         assert set(decode_flags(result["label"]).values) == {"none", "end_of_range"}
 
@@ -280,13 +280,13 @@ def test_a_parameter_may_have_its_effect_further_on(separatrix: Path, tmp_path: 
         "-o",
         "out.h5",
     )
-    said = succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path).out
-    assert "GR at contact.upper" in said
-    assert "no effect" not in said
+    output = succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path).out
+    assert "GR at contact.upper" in output
+    assert "no effect" not in output
 
 
 @pytest.mark.parametrize("one", [BETWEEN_STOPS_OF_ONE, BETWEEN_STOPS_OF_A_STRUCTURE])
-def test_a_range_in_which_stops_change_places_is_refused(separatrix: Path, tmp_path: Path, one: str):
+def test_a_range_in_which_stops_change_sides_is_refused(separatrix: Path, tmp_path: Path, one: str):
     (tmp_path / "case.toml").write_text(one)
     name = "contact.upper" if one == BETWEEN_STOPS_OF_ONE else "contact.wall.upper"
     words = ("--parameter", name, "--from", "-2", "--to", "1", "-o", "out.h5")
@@ -304,15 +304,15 @@ def test_a_range_in_which_stops_change_places_is_refused(separatrix: Path, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("case", "said"),
+    ("case", "message"),
     [
         ("../measured_pendulum", "drive.law: one body without a drive has no section"),
         ("../measured_platform", "drive.law: the variations of a body under a measured force"),
     ],
 )
-def test_a_refusal_names_what_the_case_has(run, case, said):
+def test_a_refusal_names_what_the_case_has(run, case, message):
     out, ended = run(case, "--parameter", "body.mass", "--from", "1", "--to", "2")
-    assert ended.returncode == 65 and said in ended.stderr
+    assert ended.returncode == 65 and message in ended.stderr
     assert not out.exists()
 
 
@@ -467,10 +467,10 @@ def test_every_turn_has_one_label(separatrix: Path, tmp_path: Path):
             for k in np.flatnonzero((rises[:-1] * rises[1:] < 0) & (abs(rises[1:]) > 1e-11)):
                 turns += 1
                 assert set(label[k : k + 3]) & {"SN", "BP", "GR-fold", "not_known"}
-            places = [
+            events = [
                 (name, round(at, 9), round(speed, 5))
                 for name, at, speed in zip(label, parameter[chosen], speeds[chosen], strict=True)
                 if name in {"SN", "PD"}
             ]
-            assert len(places) == len(set(places))
+            assert len(events) == len(set(events))
     assert turns > 5

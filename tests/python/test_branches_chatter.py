@@ -92,8 +92,8 @@ def test_both_sides_of_the_onset_of_a_chatter_meet(
     assert parameter[labels == "many_impacts"] == pytest.approx([low], abs=3e-6)
     grazes = parameter[labels == "GR-fold"]
     folds = parameter[labels == "SN"]
-    for places in (grazes, folds):
-        above = np.sort(places[(places > low) & (places < 0.1495)])[::-1] - low
+    for values in (grazes, folds):
+        above = np.sort(values[(values > low) & (values < 0.1495)])[::-1] - low
         # a deviation from the chatter grows eightfold with each bounce
         assert len(above) >= 2
         assert (above[1:] / above[:-1] < 0.16).all()

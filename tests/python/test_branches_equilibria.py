@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Equilibria of a machine without a clock in what `branches` says, in its file and its figure."""
+"""Equilibria of a machine without a clock in the output of `branches`, in its file and its figure."""
 
 import json
 import math
@@ -34,8 +34,8 @@ def test_a_body_comes_to_lie_against_its_stop(separatrix: Path, tmp_path: Path) 
     """F = k x until the stop is reached, where nothing is free to move; no orbit but these."""
     (tmp_path / "case.toml").write_text(BODY)
     words = ("--parameter", "body.block.load", "--from", "0", "--to", "3", "--searches", "1", "-o", "out.h5")
-    said = succeed(separatrix, "branches", "case.toml", *words, "--json", folder=tmp_path).out
-    lines = [json.loads(line) for line in said.splitlines()]
+    output = succeed(separatrix, "branches", "case.toml", *words, "--json", folder=tmp_path).out
+    lines = [json.loads(line) for line in output.splitlines()]
     points = [line for line in lines if line["event"] == "equilibrium"]
     stops = [point for point in points if point["label"] == "BE"]
     assert [point["parameter"] for point in stops] == pytest.approx([2, 2], abs=1e-11)
@@ -45,9 +45,9 @@ def test_a_body_comes_to_lie_against_its_stop(separatrix: Path, tmp_path: Path) 
     with open_result(tmp_path / "out.h5") as result:
         assert "branch" not in result
         free = result["equilibrium_pressed"].values == 0
-        load, place = result["equilibrium_parameter"].values, result["equilibrium_x"].values
-        assert place[free] == pytest.approx(load[free] / 2, abs=1e-12)
-        assert place[~free] == pytest.approx(1, abs=1e-12)
+        load, position = result["equilibrium_parameter"].values, result["equilibrium_x"].values
+        assert position[free] == pytest.approx(load[free] / 2, abs=1e-12)
+        assert position[~free] == pytest.approx(1, abs=1e-12)
         assert result["eigenvalue_real"].values[free] == pytest.approx(-0.2, abs=1e-12)
         assert result["eigenvalue_imag"].values[free, 0] == pytest.approx((2 - 0.04) ** 0.5, abs=1e-12)
         assert (decode_flags(result["equilibrium_stable"]).values == "stable").all()
@@ -74,7 +74,7 @@ WALL = 'contact.wall = { between = ["block"], law = "newton", restitution = 0.5,
 
 
 @pytest.mark.parametrize("stop", ["", WALL], ids=["free", "wall"])
-def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp_path, stop):
+def test_where_friction_holds_the_positions_of_rest_are_an_interval(separatrix, tmp_path, stop):
     """2 x = 1 + h: the belt pulls with 1 N, the floor holds with |h| <= 0.8 N, stops are not asked."""
     (tmp_path / "rest.toml").write_text(RESTING + stop)
     words = (
@@ -89,12 +89,12 @@ def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp
         "-o",
         "rest.h5",
     )
-    said = succeed(separatrix, "branches", "rest.toml", *words, folder=tmp_path).out
+    output = succeed(separatrix, "branches", "rest.toml", *words, folder=tmp_path).out
     assert (
-        "dry friction holds friction.floor: places of rest are a family, not followed; x from 0.1000000000"
-        in said
+        "dry friction holds friction.floor: positions of rest are a family, not followed; x from 0.1000000000"
+        in output
     )
-    assert "to 0.9000000000 as far as no stop is in the way" in said
+    assert "to 0.9000000000 as far as no stop is in the way" in output
     with open_result(tmp_path / "rest.h5") as result:
         assert result.attrs["rest_joints"] == "friction.floor; friction.floor"
         assert result["rest_parameter"].values == pytest.approx([0.475, 0.825], abs=1e-12)
@@ -104,7 +104,7 @@ def test_where_friction_holds_the_places_of_rest_are_an_interval(separatrix, tmp
         assert "as far as no stop is in the way" in result["rest_x_high"].attrs["long_name"]
         unknown = {name: result[name] * math.nan for name in ("rest_x_low", "rest_x_high")}
         texts = figures(result.assign(unknown), "")["branches"].axes[0].texts
-        assert [text.get_text() for text in texts] == ["between which places is not known"]
+        assert [text.get_text() for text in texts] == ["between which positions is not known"]
         drawn = figures(result, "")["branches"].axes[0]
         assert not drawn.texts
         assert drawn.get_ylabel().startswith("position at rest")
@@ -122,9 +122,9 @@ run = { duration = 300 }
 """
 
 
-def test_a_motion_that_comes_to_rest_is_said_to(separatrix: Path, tmp_path: Path) -> None:
+def test_a_motion_that_comes_to_rest_is_reported_so(separatrix: Path, tmp_path: Path) -> None:
     """It has no section any more: its exponents are the eigenvalues of an equilibrium."""
     (tmp_path / "case.toml").write_text(COMES_TO_REST)
-    said = succeed(separatrix, "stability", "case.toml", folder=tmp_path).out
-    assert "not known: the motion comes to rest: after" in said
-    assert "the eigenvalues of an equilibrium are those that `separatrix branches` gives" in said
+    output = succeed(separatrix, "stability", "case.toml", folder=tmp_path).out
+    assert "not known: the motion comes to rest: after" in output
+    assert "the eigenvalues of an equilibrium are those that `separatrix branches` gives" in output

@@ -68,8 +68,8 @@ def test_stable_orbits_are_the_attractors_of_a_map(separatrix: Path, tmp_path: P
         assert here.any()
         # one begins its section in the pressed contact: its mirror image was found, it was not
         assert (result["attractor"].values > 0).all()
-        for place, multipliers in zip(found.T, of_branches, strict=True):
-            distance = abs(own - place[:, np.newaxis]).max(axis=0)
+        for orbit, multipliers in zip(found.T, of_branches, strict=True):
+            distance = abs(own - orbit[:, np.newaxis]).max(axis=0)
             assert distance.min() < 1e-8
             # those of the map are differences of flights
             expected = in_order(of_map[distance.argmin()])
@@ -89,7 +89,7 @@ def test_multipliers_of_a_motion_that_chatters_and_sticks(separatrix: Path, tmp_
         assert [branches[name].values[here] for name in ("x", "v")] == pytest.approx([x, v], abs=1e-8)
         pair = (branches["multiplier_real"].values + 1j * branches["multiplier_imag"].values)[here]
         assert abs(pair[2:]).max() < 1e-12
-    places = []
+    positions = []
     for k, there in enumerate((driver_x, driver_x + 1e-4)):
         values = {"start.x0": x, "start.v0": v, "body.driver_x0": there, "body.driver_v0": driver_v}
         values |= {"run.duration": 20, "run.window": 5, "trajectory.samples_per_period": 64}
@@ -97,8 +97,8 @@ def test_multipliers_of_a_motion_that_chatters_and_sticks(separatrix: Path, tmp_
         settings = [word.replace("np.float64(", "").replace(")", "") for word in settings]
         succeed(separatrix, "trajectory", "pair.toml", *settings, "-o", f"{k}.h5", folder=tmp_path)
         with open_result(tmp_path / f"{k}.h5") as result:
-            places.append(result["driver_x"].values[64:256:64])
-    apart = places[1] - places[0]
+            positions.append(result["driver_x"].values[64:256:64])
+    apart = positions[1] - positions[0]
     predicted = (pair[0] + pair[1]).real * apart[1] - (pair[0] * pair[1]).real * apart[0]
     assert apart[2] == pytest.approx(predicted, rel=1e-2)
 
@@ -109,8 +109,8 @@ def test_stick_and_slip_on_a_shaken_platform_begin_where_the_closed_form_has_the
     """Friction by mass and acceleration: 2/sqrt(4 + pi^2) where sticking begins, 1 where slipping ends."""
     case = source_dir / "examples" / "sweep_pair_kappa.toml"
     words = ("--parameter", "body.friction", "--from", 0.3, "--to", 1.3, "--searches", 4, "--json")
-    said = succeed(separatrix, "branches", case, *words, "-o", "out.h5", folder=tmp_path).out
-    points = [line for line in map(json.loads, said.splitlines()) if line["event"] == "point"]
+    output = succeed(separatrix, "branches", case, *words, "-o", "out.h5", folder=tmp_path).out
+    points = [line for line in map(json.loads, output.splitlines()) if line["event"] == "point"]
     onsets = sorted(point["parameter"] for point in points if point["label"] == "stick_onset")
     assert onsets == pytest.approx([2 / math.sqrt(4 + math.pi**2), 1], abs=1e-9)
 
@@ -132,10 +132,10 @@ def test_boundary_of_backlash(separatrix: Path, source_dir: Path, tmp_path: Path
 def test_exponents_are_the_logarithms_of_the_multipliers(separatrix: Path, tmp_path: Path):
     (tmp_path / "pair.toml").write_text(CARRIED)
     settings = ("--set", "body.driver_x0=-0.4", "--set", "body.driver_v0=0.5", "--set", "start.x0=-0.45")
-    said = succeed(
+    output = succeed(
         separatrix, "stability", "pair.toml", *settings, "--periods", 400, "--json", folder=tmp_path
     ).out
-    lines = list(map(json.loads, said.splitlines()))
+    lines = list(map(json.loads, output.splitlines()))
     found = [line["value"] for line in lines if line["event"] == "exponent" and line["value"] is not None]
     # of the orbit that the maps above find
     multipliers = [0.9043218, 0.9043218, 0.4591962]
@@ -144,22 +144,22 @@ def test_exponents_are_the_logarithms_of_the_multipliers(separatrix: Path, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("case", "said"),
+    ("case", "message"),
     [
         ("pair_free", "drive.law: found two bodies without a periodic drive, allowed force, sine"),
         ("pair_platform", "drive.law: found two bodies without a periodic drive, allowed force, sine"),
     ],
 )
-def test_what_has_no_variations_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path, case, said):
+def test_what_has_no_variations_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path, case, message):
     path = source_dir / "examples" / f"{case}.toml"
     words = ("--parameter", "body.friction", "--from", 0.1, "--to", 0.2)
     ended = run(separatrix, "branches", path, *words, folder=tmp_path)
-    assert ended.code == 65 and said in ended.err
+    assert ended.code == 65 and message in ended.err
     assert not list(tmp_path.glob("*.h5"))
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "message"),
     [
         (("body.impulse=1",), "body.impulse: found an impulse"),
         (
@@ -169,9 +169,9 @@ def test_what_has_no_variations_is_refused(separatrix: Path, source_dir: Path, t
     ],
 )
 def test_laws_that_a_structure_lacks_are_named(
-    separatrix: Path, source_dir: Path, tmp_path: Path, settings, said
+    separatrix: Path, source_dir: Path, tmp_path: Path, settings, message
 ):
     path = source_dir / "examples" / "sweep_pair_kappa.toml"
     words = [word for one in settings for word in ("--set", one)]
     ended = run(separatrix, "stability", path, *words, folder=tmp_path)
-    assert ended.code == 65 and said in ended.err
+    assert ended.code == 65 and message in ended.err

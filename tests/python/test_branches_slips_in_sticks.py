@@ -91,7 +91,7 @@ class Oscillator:
         return end, steady.force(w, end) - self.sliding + (free * np.exp(rate * (end - release))).real
 
     def stick(self, w: float) -> tuple[float, float, float]:
-        """Place, beginning and end of the stick after the slip upwards, with one slip each way."""
+        """Position, beginning and end of the stick after the slip upwards, with one slip each way."""
         x, begin, half = -0.6, -0.4 * np.pi / w, np.pi / w
         for _ in range(60):
             release = first_zero(lambda t, x=x: self.force(w, t) - x - self.holding, begin, begin + 2 * half)

@@ -122,8 +122,8 @@ def test_slips_within_sticks_end_no_branch(separatrix: Path, source_dir: Path, t
 
 
 @pytest.mark.long
-def test_equations_that_tell_little_end_no_branch(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
-    """Where the capsule's cycle of two periods is told to 1e-9 only it goes on from its doubling."""
+def test_ill_conditioned_equations_end_no_branch(separatrix: Path, source_dir: Path, tmp_path: Path) -> None:
+    """The capsule's cycle of two periods, determined to 1e-9 only, continues from its doubling."""
     case = source_dir / "examples" / "structure_capsule.toml"
     over = ("--parameter", "drive.inner.frequency", "--from", 0.9, "--to", 1.0, "--searches", 3, "--quiet")
     succeed(separatrix, "branches", case, *over, "-o", "out.h5", folder=tmp_path)

@@ -20,15 +20,15 @@ def follow(separatrix: Path, source_dir: Path, tmp_path: Path):
     def follow_it(case: str, name: str, start: float, end: float, *more: str) -> tuple[list[dict], Path]:
         out = tmp_path / "out.h5"
         words = ("--parameter", name, "--from", start, "--to", end, "--json", "-o", out, *more)
-        said = succeed(separatrix, "branches", source_dir / "examples" / case, *words, folder=tmp_path).out
-        lines = map(json.loads, said.splitlines())
+        output = succeed(separatrix, "branches", source_dir / "examples" / case, *words, folder=tmp_path).out
+        lines = map(json.loads, output.splitlines())
         return [line for line in lines if line["event"] == "point"], out
 
     return follow_it
 
 
 def amplitude(frequency: float) -> float:
-    """Largest place of the second of two masses without the stop."""
+    """Largest position of the second of two masses without the stop."""
     coupled = np.array([[2.0, -1.0], [-1.0, 1.0]])
     system = coupled - frequency**2 * np.eye(2) + 0.04j * frequency * coupled
     return abs(np.linalg.solve(system, [1, 0])[1])
@@ -96,7 +96,7 @@ def test_a_graze_that_is_met_from_the_side_of_the_impact_has_its_name(follow, tm
 
 
 def labelled(out: Path) -> list[tuple[int, str, float, float]]:
-    """Branch, label, parameter and place of every labelled point."""
+    """Branch, label, parameter and position of every labelled point."""
     with open_result(out) as result:
         labels = decode_flags(result["label"]).values
         named = labels != "none"
@@ -109,7 +109,7 @@ def labelled(out: Path) -> list[tuple[int, str, float, float]]:
     [pytest.param(0.65, marks=pytest.mark.long), 0.7, pytest.param(0.75, marks=pytest.mark.long)],
 )
 def test_no_branch_is_run_through_twice(follow, tmp_path: Path, restitution: float):
-    """A branch that has turned back at a graze, or whose instants pass the section, was said to be closed."""
+    """A branch that has turned back at a graze, or whose instants pass the section, seemed closed."""
     case = tmp_path / "two.toml"
     case.write_text(MANY_GRAZES)
     points, out = follow(
@@ -195,7 +195,7 @@ def test_an_impact_that_turns_a_slide_round_is_lost_in_a_graze(follow, tmp_path:
 
 
 def test_a_contact_that_opens_as_friction_turns_is_no_graze(follow, tmp_path: Path):
-    """The two events change places; the branch ended there, and was followed three times."""
+    """The two events change their order; the branch ended there, and was followed three times."""
     case = tmp_path / "soft.toml"
     case.write_text(SOFT_AND_RUBBING)
     points, _ = follow(case, "drive.d.frequency", 1.369, 2.374, "--searches", "5")
@@ -218,16 +218,16 @@ axis = [ { name = "x0", from = -2, to = 0.8, count = 21 }, { name = "v0", from =
 
 
 def test_multipliers_beside_a_graze_are_finite_but_for_one(follow, tmp_path: Path):
-    """Mirror images of one motion graze at one place: one multiplier has no bound, the rest are the same."""
+    """Mirror images of one motion graze at one value: one multiplier has no bound, the rest are the same."""
     case = tmp_path / "three.toml"
     case.write_text(BETWEEN_STOPS)
     points, _ = follow(case, "drive.d.frequency", 2.2, 2.3, "--searches", "2")
     grazes = [point for point in points if point["label"].startswith("GR") and point["word"] in {"L.", "R."}]
-    told = [
+    unbounded = [
         np.reshape(point["multipliers"], (-1, 2)) for point in grazes if abs(point["multipliers"][0]) > 1e7
     ]
-    assert len(told) >= 2
-    sizes = [np.sort(np.hypot(*values[1:].T)) for values in told]
+    assert len(unbounded) >= 2
+    sizes = [np.sort(np.hypot(*values[1:].T)) for values in unbounded]
     assert sizes[0] == pytest.approx(sizes[1], abs=1e-6)
     assert (sizes[0] < 1).all()
 
@@ -361,8 +361,8 @@ def test_stick_slip_ends_where_the_slide_just_comes_back(follow):
 def test_spectrum_of_an_impact_damper(separatrix: Path, source_dir: Path, tmp_path: Path):
     """Four exponents, whose sum is exact; those of a cycle come in pairs."""
     case = source_dir / "examples" / "structure_impact_damper.toml"
-    said = succeed(separatrix, "stability", case, "--periods", 1000, "--json", folder=tmp_path).out
-    lines = [json.loads(line) for line in said.splitlines()]
+    output = succeed(separatrix, "stability", case, "--periods", 1000, "--json", folder=tmp_path).out
+    lines = [json.loads(line) for line in output.splitlines()]
     values = [line["value"] for line in lines if line["event"] == "exponent"]
     total = next(line for line in lines if line["event"] == "sum")
     assert len(values) == 4
@@ -483,10 +483,10 @@ drive = { law = "harmonic", amplitude = 0.5, ratio = 3 }
 }
 
 
-@pytest.mark.parametrize(("kind", "place"), [
+@pytest.mark.parametrize(("kind", "largest"), [
     ("structure", 3.00972484), pytest.param("one body", 4.098403, marks=pytest.mark.long),
 ])  # fmt: skip
-def test_the_start_of_the_case_is_at_its_crank_angle(separatrix: Path, tmp_path: Path, kind, place):
+def test_the_start_of_the_case_is_at_its_crank_angle(separatrix: Path, tmp_path: Path, kind, largest):
     """Near the resonant orbit of a hardening spring, beyond what is searched, a quarter of a period later."""
     (tmp_path / "case.toml").write_text(HARDENING[kind])
     words = ["--parameter", "drive.force.frequency" if kind == "structure" else "drive.ratio"]
@@ -495,4 +495,4 @@ def test_the_start_of_the_case_is_at_its_crank_angle(separatrix: Path, tmp_path:
         words += ["--set", f"start.{item}"]
     succeed(separatrix, "branches", "case.toml", *words, folder=tmp_path)
     with open_result(tmp_path / "out.h5") as result:
-        assert result["x"].values.max() == pytest.approx(place, abs=1e-3)
+        assert result["x"].values.max() == pytest.approx(largest, abs=1e-3)

@@ -96,21 +96,21 @@ def test_a_dry_run_counts_the_points(separatrix, tmp_path, kind, plan):
 
 def test_a_dry_run_of_a_sweep_counts_all_that_is_written(separatrix, tmp_path):
     write_case(tmp_path)
-    for way, said, holds in (("both", "up and down", 14), ("down", "down", 7)):
+    for way, directions, holds in (("both", "up and down", 14), ("down", "down", 7)):
         words = [*KINDS["sweep"], "--set", f"sweep.directions='{way}'", "--set", "sweep.starts=[0, 0]"]
         plan = succeed(separatrix, *words, "--dry-run", folder=tmp_path).out
-        told = re.fullmatch(r"7 values of drive.ratio, (.*): (\d+) holds, (\d+) bytes; about (.*)\n", plan)
-        assert told
-        assert told.groups()[:2] == (said, str(holds))
-        assert told[4].endswith("; no many starts")
+        match = re.fullmatch(r"7 values of drive.ratio, (.*): (\d+) holds, (\d+) bytes; about (.*)\n", plan)
+        assert match
+        assert match.groups()[:2] == (directions, str(holds))
+        assert match[4].endswith("; no many starts")
         assert (
-            f"running drive.ratio {said} over"
+            f"running drive.ratio {directions} over"
             in succeed(separatrix, *words, "-o", f"{way}.h5", folder=tmp_path).out
         )
         with h5py.File(tmp_path / f"{way}.h5") as file:
             names = ["drive_ratio", *(key for key, item in file.items() if getattr(item, "ndim", 0) > 1)]
             written = sum(file[key].nbytes for key in names)
-        assert int(told[3]) == written
+        assert int(match[3]) == written
     whole = succeed(separatrix, *KINDS["sweep"], "--dry-run", folder=tmp_path).out
     assert "14 holds" in whole
     assert "many starts: 7 x 6 = 42 points" in whole
@@ -194,7 +194,7 @@ def test_the_log_in_json(separatrix, results, tmp_path, kind):
 
 @pytest.mark.parametrize("option", ["-q", "--quiet"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_quiet_says_nothing(separatrix, results, tmp_path, kind, option):
+def test_quiet_prints_nothing(separatrix, results, tmp_path, kind, option):
     folder = results["map"].parent
     outcome = succeed(separatrix, *KINDS[kind], option, "-o", tmp_path / "o.h5", folder=folder)
     assert outcome.out == ""
@@ -264,26 +264,26 @@ def test_verify(separatrix, results, kind):
         assert facts["x_deviation"] < 1e-6
 
 
-def test_verify_says_that_no_point_had_settled(separatrix, tmp_path):
+def test_verify_reports_that_no_point_had_settled(separatrix, tmp_path):
     """A deviation of 0 m would be one that nobody has looked at."""
     write_case(tmp_path)
-    small = [word for place in (1, 2) for word in ("--set", f"axis[{place}].count=2")]
+    small = [word for number in (1, 2) for word in ("--set", f"axis[{number}].count=2")]
     keys = ("contact.restitution=1", "friction.kinetic_coefficient=0", "friction.static_coefficient=0")
     lossless = [word for key in (*keys, "run.duration=27", "run.extension=1") for word in ("--set", key)]
     succeed(separatrix, "basin", "case.toml", "-o", "map.h5", *small, *lossless, folder=tmp_path)
-    said = succeed(separatrix, "verify", "map.h5", folder=tmp_path).out
-    assert "none had settled: impact counts and states are not compared" in said
+    output = succeed(separatrix, "verify", "map.h5", folder=tmp_path).out
+    assert "none had settled: impact counts and states are not compared" in output
     facts = json.loads(succeed(separatrix, "verify", "map.h5", "--json", folder=tmp_path).out)
     assert facts["compared"] == 0
 
 
 def test_verify_runs_each_point_of_a_small_map_once(separatrix, tmp_path):
     write_case(tmp_path)
-    small = [word for place in (1, 2) for word in ("--set", f"axis[{place}].count=3")]
+    small = [word for number in (1, 2) for word in ("--set", f"axis[{number}].count=3")]
     succeed(separatrix, "basin", "case.toml", "-o", "map.h5", *small, folder=tmp_path)
-    for sample, said in ((200, "  all 9 points"), (9, "  all 9 points"), (8, "  8 points")):
+    for sample, points in ((200, "  all 9 points"), (9, "  all 9 points"), (8, "  8 points")):
         text = succeed(separatrix, "verify", "map.h5", "--sample", sample, folder=tmp_path).out
-        assert f"{said} run again: 0 differ" in text
+        assert f"{points} run again: 0 differ" in text
         assert ("95 % confidence" in text) == (sample == 8)
 
 
@@ -364,17 +364,17 @@ def test_the_events_of_a_trajectory_as_a_table(separatrix, tmp_path):
             assert [float(row[name]) for row in rows] == file[f"event_{name}"][()].tolist()
 
 
-def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
+def test_a_sweep_reports_what_it_gave_up(separatrix, tmp_path):
     """A trajectory that ran out of events is neither a motion with impacts nor one without."""
     write_case(tmp_path)
     more = ["--set", "integrator.event_budget=3", "--set", "attractors.sample=1", "-o", "out.h5"]
-    said = succeed(separatrix, *KINDS["sweep"], *more, "--partial", folder=tmp_path).out
-    assert "given up: 56 of 56 holds and starts" in said
-    assert "run up: given up from 0.800000 to 1.40000 as event_budget" in said
-    assert "run down: given up from 0.800000 to 1.40000 as event_budget" in said
-    assert "ended as event_budget: 42 points" in said
-    assert "many starts" not in said
-    assert "neither start nor stop" not in said
+    output = succeed(separatrix, *KINDS["sweep"], *more, "--partial", folder=tmp_path).out
+    assert "given up: 56 of 56 holds and starts" in output
+    assert "run up: given up from 0.800000 to 1.40000 as event_budget" in output
+    assert "run down: given up from 0.800000 to 1.40000 as event_budget" in output
+    assert "ended as event_budget: 42 points" in output
+    assert "many starts" not in output
+    assert "neither start nor stop" not in output
     plain = succeed(separatrix, *KINDS["sweep"], "-o", "plain.h5", folder=tmp_path).out
     assert "given up" not in plain
     assert "many starts" in plain
@@ -382,7 +382,7 @@ def test_a_sweep_tells_what_it_gave_up(separatrix, tmp_path):
 
 
 def test_a_sweep_without_a_contact_speaks_of_no_impacts_only(separatrix, tmp_path):
-    """Without impacts is not `non_impact`: on a belt the body also sticks, as the regimes say."""
+    """Without impacts is not `non_impact`: on a belt the body also sticks, as the regimes show."""
     case = """
         body.m = {mass = 2}
         spring.k = {between = ["m"], stiffness = 50, damping = 0.2}
@@ -393,11 +393,11 @@ def test_a_sweep_without_a_contact_speaks_of_no_impacts_only(separatrix, tmp_pat
         axis = [{name = "x0", from = -0.3, to = 0.3, count = 2}, {name = "v0", from = -1, to = 1, count = 2}]
     """
     (tmp_path / "belt.toml").write_text(case)
-    said = succeed(separatrix, "sweep", "belt.toml", "-o", "belt.h5", folder=tmp_path).out
-    assert "no impacts throughout" in said
-    assert "many starts: without impacts from 0.100000 to 0.300000" in said
-    assert "neither start nor stop" not in said
-    assert "non-impact" not in said
+    output = succeed(separatrix, "sweep", "belt.toml", "-o", "belt.h5", folder=tmp_path).out
+    assert "no impacts throughout" in output
+    assert "many starts: without impacts from 0.100000 to 0.300000" in output
+    assert "neither start nor stop" not in output
+    assert "non-impact" not in output
 
 
 def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
@@ -417,15 +417,15 @@ def boundary(separatrix, folder):
     """The x0 at v0 = 0 between 0.4 and 0.8 m up to which a start leads to impacts, to the last bit."""
     low, high = 0.4, 0.8
     while high - low > 4e-16:
-        places = np.unique(np.linspace(low, high, 300))
-        rows = [f"{float(place)!r},0" for place in places]
+        values = np.unique(np.linspace(low, high, 300))
+        rows = [f"{float(value)!r},0" for value in values]
         (folder / "line.csv").write_text("\n".join(["x0,v0", *rows]))
         arguments = ["points", "case.toml", "--list", "line.csv", "--force", "-o", "line.h5"]
         succeed(separatrix, *arguments, folder=folder)
         with h5py.File(folder / "line.h5") as file:
             first = int(np.argmax(file["regime"][:] == 1))
-        low, high = float(places[first - 1]), float(places[first])
-        if places.size < 300:
+        low, high = float(values[first - 1]), float(values[first])
+        if values.size < 300:
             break
     return high
 
@@ -434,17 +434,17 @@ def boundary(separatrix, folder):
 def test_verify_fails_where_labels_would_change(separatrix, tmp_path):
     """Starts on both sides of a basin boundary, nearer to it than rounding carries."""
     write_case(tmp_path)
-    place = boundary(separatrix, tmp_path)
-    near = [place + k * float(np.spacing(place)) for k in range(-40, 41)]
+    edge = boundary(separatrix, tmp_path)
+    near = [edge + k * float(np.spacing(edge)) for k in range(-40, 41)]
     line = ["--set", f"axis[1]={{name='x0', values={near!r}}}", "--set", "axis[2]={name='v0', values=[0]}"]
     succeed(separatrix, "basin", "case.toml", *line, "-o", "near.h5", folder=tmp_path)
     outcome = run(separatrix, "verify", "near.h5", "--json", folder=tmp_path)
     facts = json.loads(outcome.out)
     assert facts["labels_changing"] == facts["label_flips"] > 0.01 * facts["rerun"]
     assert outcome.code == 77
-    said = f"{facts['label_flips']} of {facts['rerun']} labels rerun would change"
+    flips = f"{facts['label_flips']} of {facts['rerun']} labels rerun would change"
     assert len(outcome.messages) == 1
-    assert all(part in outcome.messages[0] for part in ("warning", "near.h5", said, "--max-changes"))
+    assert all(part in outcome.messages[0] for part in ("warning", "near.h5", flips, "--max-changes"))
     succeed(separatrix, "verify", "near.h5", "--max-changes", "100", folder=tmp_path)
     share = 100 * facts["label_flips"] / facts["rerun"]
     succeed(separatrix, "verify", "near.h5", "--max-changes", share + 0.01, folder=tmp_path)

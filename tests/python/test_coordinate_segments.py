@@ -114,11 +114,12 @@ def test_derivatives_are_those_of_another_step() -> None:
 
 
 @pytest.mark.usefixtures("library")
-def test_what_starts_cannot_say_is_refused(source_dir) -> None:
+def test_what_starts_cannot_express_is_refused(source_dir) -> None:
     one_body = Model.read(source_dir / "examples" / "trajectory_viscous_0.8.toml")
     assert one_body.coordinates == ()
     with pytest.raises(CaseError, match="allowed for segments of coordinates structure"):
         one_body.coordinate_segments([], np.zeros(0), np.zeros((1, 1)), np.array([0, 0]), np.zeros(0))
-    struck = Model.from_text(CASE + '[drive.impulse]\nlaw = "impulse"\nbody = "first"\nimpulse = 1\ntime = 2\n')
+    impulse = '[drive.impulse]\nlaw = "impulse"\nbody = "first"\nimpulse = 1\ntime = 2\n'
+    struck = Model.from_text(CASE + impulse)
     with pytest.raises(CaseError, match="impulses, or samples of a controller"):
         struck.coordinate_segments([], np.zeros(0), np.zeros((1, 5)), np.array([0, 0]), np.zeros(0))

@@ -31,7 +31,7 @@ def machine(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_effect_is_in_the_case_that_comes_back(machine: Path, tmp_path: Path) -> None:
-    told: list[tuple] = []
+    reported: list[tuple] = []
     base = sx.load(machine / "base.toml")
     found = sx.discover(
         base,
@@ -40,7 +40,7 @@ def test_the_effect_is_in_the_case_that_comes_back(machine: Path, tmp_path: Path
         effects=EFFECTS,
         out=tmp_path / "found",
         quick=True,
-        progress=lambda *what: told.append(what),
+        progress=lambda *what: reported.append(what),
     )
     assert (found.outcome, found.effects) == ("named", ("viscous",))
     assert "viscous" in str(found)
@@ -54,8 +54,8 @@ def test_the_effect_is_in_the_case_that_comes_back(machine: Path, tmp_path: Path
     assert written["parameters"]["effect.viscous.damping"] == size
     assert (written["outcome"], tuple(written["effects"])) == (found.outcome, found.effects)
     assert sx.load(found.files["extended.toml"]).parameters["effect.viscous.damping"].value == size["value"]
-    done = [number for _, number, _ in told]
-    assert done == sorted(done) and told[-1][1:] == (1000, 1000)
+    done = [number for _, number, _ in reported]
+    assert done == sorted(done) and reported[-1][1:] == (1000, 1000)
 
 
 def test_without_a_gap_there_is_no_case(machine: Path) -> None:
@@ -69,7 +69,7 @@ def test_without_a_gap_there_is_no_case(machine: Path) -> None:
 
 def test_what_makes_no_sense_is_refused(machine: Path, tmp_path: Path) -> None:
     case, record = machine / "base.toml", machine / "first.csv"
-    for wrong, said in (
+    for wrong, message in (
         ({"records": tmp_path / "none.csv"}, r"none\.csv"),
         ({"records": record, "hold_out": record}, r"first\.csv"),
         ({"records": record, "effects": ["viscos"]}, "^effects: found viscos, allowed"),
@@ -77,7 +77,7 @@ def test_what_makes_no_sense_is_refused(machine: Path, tmp_path: Path) -> None:
         ({"records": record, "compare": "forces"}, "^compare: found 'forces', allowed motion and force"),
         ({"records": []}, "record"),
     ):
-        with pytest.raises(sx.SeparatrixError, match=said):
+        with pytest.raises(sx.SeparatrixError, match=message):
             sx.discover(case, **wrong)
     with pytest.raises(sx.CaseError, match="cannot be read"):
         sx.discover(tmp_path / "none.toml", record)

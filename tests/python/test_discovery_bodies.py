@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Machines of several bodies as base: hidden effects are named with their place, from any sensors."""
+"""Machines of several bodies as base: hidden effects are named with their location, from any sensors."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -136,18 +136,18 @@ def one(w: float, extra=lambda q, v: np.zeros(1)) -> Structure:
     return Structure([1], force, soft=[buffer], tolerance=1e-10)
 
 
-def places(*names: str) -> Callable[[np.ndarray], Mapping[str, np.ndarray]]:
+def positions(*names: str) -> Callable[[np.ndarray], Mapping[str, np.ndarray]]:
     return lambda motion: {f"x.{name}": motion[:, i] for i, name in enumerate(names) if name}
 
 
-def place_and_forces(motion: np.ndarray) -> dict[str, np.ndarray]:
-    """Of the slide: place, force of its spring and of its buffer."""
+def position_and_forces(motion: np.ndarray) -> dict[str, np.ndarray]:
+    """Of the slide: position, force of its spring and of its buffer."""
     x, v = motion.T
     push = np.maximum(0.0, 900 * (x - 0.08) + 2 * v) * (x > 0.08)
     return {"x.slide": x, "F.frame": 40 * x + 0.5 * v, "F.buffer": push}
 
 
-def place_and_speed(motion: np.ndarray) -> dict[str, np.ndarray]:
+def position_and_speed(motion: np.ndarray) -> dict[str, np.ndarray]:
     return {"x.second": motion[:, 1], "v.first": motion[:, 2]}
 
 
@@ -184,28 +184,28 @@ class Hidden:
 
 
 CASES = {
-    "one place and another speed": Hidden(
-        TWO, lambda w: two(w, lambda q, v: np.array([0, -0.6 * v[1] * abs(v[1])])), place_and_speed,
+    "one position and another speed": Hidden(
+        TWO, lambda w: two(w, lambda q, v: np.array([0, -0.6 * v[1] * abs(v[1])])), position_and_speed,
         "quadratic_drag@second", {"drag": 0.6}, noise=5e-3,
     ),
     "a stop": Hidden(
-        TWO, lambda w: two(w, restitution=lambda u: 0.75 * max(u, 0.1) ** -0.2), places("first", "second"),
+        TWO, lambda w: two(w, restitution=lambda u: 0.75 * max(u, 0.1) ** -0.2), positions("first", "second"),
         "restitution_falloff@contact.stop", {"falloff": 0.2}, ("restitution_falloff", "viscous"),
         others={"body.second.mass": 0.8, "spring.coupling.stiffness": 60, "contact.stop.upper": 0.12},
     ),
     "a play": Hidden(
-        TWO, played, places("first", "second"), "backlash@spring.coupling",
+        TWO, played, positions("first", "second"), "backlash@spring.coupling",
         {"upper": 0.002, "lower": -0.002}, ("backlash", "cubic_spring", "viscous"), noise=5e-3,
         others={"contact.added_2.stiffness": 60, "spring.coupling.damping": 0.2},
     ),
     "friction with a spring": Hidden(
-        RAIL, sprung, places("first", "second"), "dahl@friction.rail",
+        RAIL, sprung, positions("first", "second"), "dahl@friction.rail",
         {"stiffness": 100, "force": 0.9}, ("dahl", "stribeck", "viscous", "linear_spring"),
         noise=5e-4, frequencies=(5.0, 5.5, 6.0), others={"spring.frame.stiffness": 40},
     ),
     "a pair": Hidden(
         PAIR, lambda w: pair(w, lambda u: 0.4 + 0.2 * np.exp(-((u / 0.3) ** 2)), 0.6),
-        places("driving", "driven"), "stribeck@driving-driven",
+        positions("driving", "driven"), "stribeck@driving-driven",
         {"static_force": 0.2, "stribeck_velocity": 0.3}, ("stribeck", "viscous"),
         frequencies=(7.0, 9.0, 10.5),
     ),
@@ -213,14 +213,14 @@ CASES = {
         CHAIN, lambda w: chain(w, lambda q, v: drag_of_chain(v) * np.array([0, 1, -1])), three_kinds,
         "quadratic_drag@b-c", {"drag": 0.3}, noise=5e-3, frequencies=(4.0, 6.5, 8.0),
     ),
-    # masses and forces are told by their ratio alone
+    # only the ratio of masses and forces is determined
     "a speed alone": Hidden(
         ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), speed, "quadratic_drag@slide",
         {"drag": 0.408}, noise=1e-3,
         others={"spring.frame.stiffness": 40.8, "contact.buffer.upper": 0.08},
     ),
-    "place and forces": Hidden(
-        ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), place_and_forces,
+    "position and forces": Hidden(
+        ONE, lambda w: one(w, lambda q, v: -0.4 * v * np.abs(v)), position_and_forces,
         "quadratic_drag@slide", {"drag": 0.4}, ("backlash", "quadratic_drag", "cubic_spring"),
         not_tested=("backlash@spring.frame",), others={"body.slide.mass": 1, "spring.frame.stiffness": 40},
     ),
@@ -228,11 +228,11 @@ CASES = {
 
 REPEATED = {
     "a speed alone",
-    "place and forces",
+    "position and forces",
     "a stop",
     "a pair",
     "friction with a spring",
-    "one place and another speed",
+    "one position and another speed",
     "a chain with three kinds of sensors",
 }
 """The longest, each of parts that the others have too."""
@@ -254,14 +254,14 @@ def records(hidden: Hidden, folder: Path) -> tuple[Path, list[Path]]:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.long] if name in REPEATED else []) for name in CASES]
 )
-def test_a_hidden_effect_is_named_with_its_place(name: str, tmp_path: Path) -> None:
+def test_a_hidden_effect_is_named_with_its_location(name: str, tmp_path: Path) -> None:
     hidden = CASES[name]
     base, made = records(hidden, tmp_path)
     verdict = discover(base, made[:2], made[2:], Options(seed=1, quick=True, candidates=hidden.asked))
     assert (verdict["outcome"], verdict["effects"]) == ("named", [hidden.effect])
     assert set(hidden.not_tested) <= set(verdict["not_tested"])
-    place = hidden.effect.partition("@")[2].split(".")[-1]
-    assert place.split("-")[-1] in verdict["places"][hidden.effect]
+    location = hidden.effect.partition("@")[2].split(".")[-1]
+    assert location.split("-")[-1] in verdict["locations"][hidden.effect]
     gap = verdict["gap"]
     assert gap["training"]["after"] < 1.2 < gap["training"]["before"]
     # at another frequency errors of the parameters show as well
@@ -288,7 +288,7 @@ ELASTIC = RAIL.replace("force = 0.85", 'law = "elastic_coulomb"\nforce = 0.85\ns
 ])  # fmt: skip
 def test_where_nothing_is_hidden_nothing_is_found(case, machine, frequencies, tmp_path: Path) -> None:
     asked = ("viscous", "quadratic_drag", "offset_force", "backlash", "dahl")
-    shown = places("", "second") if case == TWO else places("first", "second")
+    shown = positions("", "second") if case == TWO else positions("first", "second")
     hidden = Hidden(case, machine, shown, "", {}, noise=5e-3, frequencies=frequencies)
     base, made = records(hidden, tmp_path)
     verdict = discover(base, made[:2], made[2:], Options(seed=1, quick=True, candidates=asked))
@@ -297,7 +297,7 @@ def test_where_nothing_is_hidden_nothing_is_found(case, machine, frequencies, tm
 
 @pytest.mark.usefixtures("library")
 def test_a_gap_that_no_effect_asked_for_closes_gets_no_name(tmp_path: Path) -> None:
-    hidden = Hidden(TWO, lambda w: played(w, 0.01), places("first", "second"), "", {}, noise=5e-3)
+    hidden = Hidden(TWO, lambda w: played(w, 0.01), positions("first", "second"), "", {}, noise=5e-3)
     base, made = records(hidden, tmp_path)
     asked = Options(seed=1, quick=True, candidates=("linear_spring", "viscous"))
     verdict = discover(base, made[:2], made[2:], asked)
@@ -308,18 +308,18 @@ def test_a_gap_that_no_effect_asked_for_closes_gets_no_name(tmp_path: Path) -> N
 @pytest.mark.usefixtures("library")
 @pytest.mark.parametrize(("row", "size", "depends_on"), [
     # the machine of the case moves quite otherwise
-    pytest.param([0, -1, 1], 0.6, [["stretch at b-c"]], marks=pytest.mark.long),
-    # no joint, and so no place
+    pytest.param([0, -1, 1], 0.6, [["extension at b-c"]], marks=pytest.mark.long),
+    # no joint, and so no location
     ([-1, 0, 1], 0.05, []),
 ])  # fmt: skip
-def test_a_gap_without_a_name_is_told_with_its_place_or_not_at_all(row, size, depends_on, tmp_path) -> None:
+def test_an_unnamed_gap_is_reported_with_its_location_or_not_at_all(row, size, depends_on, tmp_path) -> None:
     row = np.array(row)
 
     def waved(q: np.ndarray) -> np.ndarray:
         return -row * size * np.sin(40 * (row @ q))
 
     hidden = Hidden(
-        CHAIN, lambda w: chain(w, lambda q, v: waved(q)), places("a", "b", "c"), "", {},
+        CHAIN, lambda w: chain(w, lambda q, v: waved(q)), positions("a", "b", "c"), "", {},
         frequencies=(4.0, 6.5, 8.0),
     )  # fmt: skip
     base, made = records(hidden, tmp_path)
@@ -348,7 +348,7 @@ def test_columns_that_mean_nothing_are_refused(columns, why, tmp_path: Path) -> 
 
 
 @pytest.mark.usefixtures("library")
-def test_a_speed_alone_tells_the_machine(tmp_path: Path) -> None:
+def test_a_speed_alone_determines_the_machine(tmp_path: Path) -> None:
     """x'' + c x' + k x = f cos(w t) from x = 0 in closed form, of which the case is off."""
     base, made, random = tmp_path / "base.toml", [], np.random.default_rng(5)
     base.write_text(ONE.partition("[contact")[0].replace("mass = 1.02", "mass = 1"))
@@ -377,7 +377,7 @@ def test_a_speed_alone_tells_the_machine(tmp_path: Path) -> None:
     (TWO, "v.first", "no position for a machine with impacts \\(contact.stop\\), allowed"),
     (None, "v", "found a speed and no x, allowed where the machine is written joint by joint"),
 ])  # fmt: skip
-def test_speeds_alone_are_refused_where_they_tell_too_little(case, name, why, tmp_path: Path) -> None:
+def test_speeds_alone_are_refused_where_they_determine_too_little(case, name, why, tmp_path: Path) -> None:
     base = tmp_path / "base.toml"
     base.write_text(case or (Path(__file__).parents[2] / "examples/measured_pendulum.toml").read_text())
     t = np.linspace(0, 20, 1001)

@@ -49,7 +49,7 @@ def ask(case: Path, **options) -> dict:
     return discover(case / "base.toml", training, [case / "held_out.csv"], Options(quick=True, **options))
 
 
-@pytest.mark.parametrize(("evidence", "beside", "imperfections", "best_of", "outcome"), [
+@pytest.mark.parametrize(("evidence", "beside", "imperfections", "likeliest", "outcome"), [
     (106.5, 6.5, 0.0, "memory", "characterised"),
     # as far ahead as one of several names has to be
     (105.5, 6.5, 0.0, "memory", "named"),
@@ -62,7 +62,7 @@ def ask(case: Path, **options) -> dict:
     (106.5, 6.5, 0.0, "speed", "named"),
 ])  # fmt: skip
 def test_a_name_has_to_hold_against_a_hidden_state(
-    monkeypatch, evidence, beside, imperfections, best_of, outcome
+    monkeypatch, evidence, beside, imperfections, likeliest, outcome
 ):
     def one(variable: str, evidence: float = evidence) -> SimpleNamespace:
         return SimpleNamespace(hypothesis=SimpleNamespace(depends_on=(variable,)), evidence=evidence)
@@ -72,7 +72,7 @@ def test_a_name_has_to_hold_against_a_hidden_state(
     name = SimpleNamespace(fitted=fitted, own_evidence=100.0, prediction=SimpleNamespace())
     first = SimpleNamespace(base=SimpleNamespace(problem=None))
     decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
-    monkeypatch.setattr(characterise, "_motions", lambda _, machine, told: (machine is fitted, None))
+    monkeypatch.setattr(characterise, "_motions", lambda _, machine, prediction: (machine is fitted, None))
     monkeypatch.setattr(characterise, "memories", lambda _: ["memory"])
     monkeypatch.setattr(characterise, "evidence_of_imperfections", lambda *_: imperfections)
     monkeypatch.setattr(
@@ -83,7 +83,7 @@ def test_a_name_has_to_hold_against_a_hidden_state(
 
     def characterised(context, gap):
         assert (gap.outcome, gap.accepted) == ("not-in-catalogue", [])
-        return Decision("characterised", [], [], [], [first], None, None, characters=[one(best_of)])
+        return Decision("characterised", [], [], [], [first], None, None, characters=[one(likeliest)])
 
     monkeypatch.setattr(characterise, "characterised", characterised)
     found = characterise.hidden_state_tested(SimpleNamespace(options=Options()), decision)
@@ -94,7 +94,7 @@ def test_a_name_has_to_hold_against_a_hidden_state(
 @pytest.mark.parametrize(
     "number", [pytest.param(one, marks=[pytest.mark.long] if one in (187, 229) else []) for one in CASES]
 )
-def test_what_a_force_without_a_name_depends_on_is_told(hide, number):
+def test_the_dependence_of_an_unnamed_force_is_reported(hide, number):
     name, depends_on, constant = CASES[number]
     case, truth = hide(number)
     assert truth["names"] == [name]
@@ -104,7 +104,7 @@ def test_what_a_force_without_a_name_depends_on_is_told(hide, number):
     best = verdict["character"][0]
     assert best["depends_on"] == depends_on
     assert min(best["closed"].values()) > 0.8
-    # no law of one body has a hidden state or a time of its own, and it is said
+    # no law of one body has a hidden state or a time of its own, and that is reported
     assert verdict["added"] == []
     assert f"no law of a force that depends on {' and '.join(depends_on)}" in verdict["not_added"]
     assert verdict["gap"]["training"]["after"] == verdict["gap"]["training"]["before"]
@@ -145,10 +145,10 @@ def test_a_machine_without_a_gap_has_no_character(hide):
 
 
 @pytest.mark.parametrize("seen", [True, False])
-def test_a_spring_of_a_machine_that_cannot_be_flown_is_no_variable(monkeypatch, seen):
+def test_a_spring_of_a_machine_that_cannot_be_simulated_is_no_variable(monkeypatch, seen):
     slack = np.full(motions._ANGLES.size, 0.3)
     slack[1] = 0.3 if seen else np.nan
-    monkeypatch.setattr(motions, "_slack_places", lambda *_: slack)
+    monkeypatch.setattr(motions, "_slack_positions", lambda *_: slack)
     index = np.arange(8)[None, :]
     segments = SimpleNamespace(inside=np.ones((1, 8), bool), record=np.zeros(1, int), index=index)
     problem = SimpleNamespace(
@@ -158,5 +158,5 @@ def test_a_spring_of_a_machine_that_cannot_be_flown_is_no_variable(monkeypatch, 
         crank_angle=lambda number, values, t: t,
     )
     fit = SimpleNamespace(values=None, evaluation=SimpleNamespace(x=np.full((1, 8), 0.1)))
-    found = motions.stretches(problem, fit)
+    found = motions.extensions(problem, fit)
     assert np.allclose(found, 0.2) if seen else found is None

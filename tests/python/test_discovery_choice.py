@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Candidates are chosen with small imperfections of the rig beside each of them."""
+"""Candidates are compared with small imperfections of the rig fitted beside each of them."""
 
 from types import SimpleNamespace
 
@@ -12,10 +12,8 @@ from test_discovery_scoring import COUNT, OPTIONS, contender
 
 
 @pytest.mark.parametrize(("explained", "first"), [(15.0, "viscous"), (25.0, "stribeck")])
-def test_the_better_of_two_is_so_with_faults_of_a_rig_beside_both(monkeypatch, explained, first):
-    """Two effects that leave more than noise: imperfections of the rig explain more of it beside the
-    second.
-    """
+def test_the_better_of_two_is_better_beside_imperfections_of_a_rig(monkeypatch, explained, first):
+    """Of two effects that leave more than noise, imperfections explain more of it beside the second."""
     pool = [contender("viscous", 50.0), contender("stribeck", 40.0)]
     for one in pool:
         one.fitted.fit.chi2 = np.full(COUNT, 60.0)
@@ -28,7 +26,7 @@ def test_the_better_of_two_is_so_with_faults_of_a_rig_beside_both(monkeypatch, e
 
 
 def test_one_that_joins_a_pool_late_is_weighed_as_the_others_are(monkeypatch):
-    """Else it would be held bare against those with imperfections."""
+    """Else it would be compared without imperfections with those that have them."""
     pool = [contender("viscous", 50.0), contender("stribeck", 45.0)]
     pool[0].imperfections = (20.0, 0.0)
     monkeypatch.setattr(gates, "weight_of_imperfections", lambda *_: (40.0, 0.0))
@@ -39,13 +37,15 @@ def test_one_that_joins_a_pool_late_is_weighed_as_the_others_are(monkeypatch):
 
 
 @pytest.mark.parametrize(("better", "imperfections"), [(True, 7.0), (False, 5.0)])
-def test_held_out_records_are_foretold_beside_faults_where_that_is_better(monkeypatch, better, imperfections):
+def test_held_out_records_are_predicted_beside_imperfections_if_that_is_better(
+    monkeypatch, better, imperfections
+):
     one = contender("viscous", 50.0)
     plain, beside = SimpleNamespace(), SimpleNamespace()
     one.prediction, one.held_out, one.held_out_parts = plain, 3.0, np.full(3, 1.0)
     monkeypatch.setattr(gates, "gained_together", lambda *_: np.full(3, 2.0 if better else 0.5))
     monkeypatch.setattr(
-        gates, "weight_of_imperfections", lambda _, told: (9.0, 7.0 if told is beside else 5.0)
+        gates, "weight_of_imperfections", lambda _, prediction: (9.0, 7.0 if prediction is beside else 5.0)
     )
     context = SimpleNamespace(predict_with_imperfections=lambda *_: beside)
     gates.weigh_imperfections(context, one)
@@ -59,7 +59,7 @@ def test_held_out_records_are_foretold_beside_faults_where_that_is_better(monkey
 @pytest.mark.parametrize(
     ("weights", "clear"), [((0.0, 0.0), False), ((400.0, 0.0), False), ((2000.0, 0.0), True)]
 )
-def test_held_out_records_may_contradict_as_far_as_faults_are_linear(monkeypatch, weights, clear):
+def test_held_out_records_may_contradict_within_the_error_of_imperfections(monkeypatch, weights, clear):
     """A name that is 1150 ahead where it was fitted and 150 behind where it was predicted."""
     monkeypatch.setattr(scoring, "ahead", lambda one, other: -150.0)
     monkeypatch.setattr(scoring, "share_with_imperfections", lambda *_: 1.0)
@@ -70,22 +70,20 @@ def test_held_out_records_may_contradict_as_far_as_faults_are_linear(monkeypatch
 
 
 def test_a_part_that_follows_a_set_is_weighed_where_the_part_was(monkeypatch):
-    """Faults imitate what a part in a wrong minimum misses: without its own the better one would go."""
-    one, warm_started = contender("viscous", 100.0), contender("viscous", 200.0)
+    """Imperfections imitate the misfit of a wrong minimum: the better fit would lose without its own."""
+    one, better = contender("viscous", 100.0), contender("viscous", 200.0)
     one.imperfections = (150.0, 0.0)
-    monkeypatch.setattr(several, "warm_started_by", lambda *_: warm_started.fitted)
-    monkeypatch.setattr(several, "scored", lambda *_: warm_started)
+    monkeypatch.setattr(several, "warm_started_by", lambda *_: better.fitted)
+    monkeypatch.setattr(several, "scored", lambda *_: better)
     monkeypatch.setattr(gates, "weight_of_imperfections", lambda *_: (80.0, 0.0))
     context = SimpleNamespace(training=None, predict=lambda *_: None)
     first = SimpleNamespace(base=None, predicted=None)
-    assert (
-        several._followed(context, first, SimpleNamespace(fitted=None, prediction=None), one) is warm_started
-    )
+    assert several._followed(context, first, SimpleNamespace(fitted=None, prediction=None), one) is better
 
 
 @pytest.mark.parametrize(("own", "within"), [(0.05, True), (0.2, False)])
-def test_what_is_left_of_a_gain_beside_faults_is_more_than_their_errors(own, within):
-    """A imperfection is known as far as the motion is linear in it, to a tenth."""
+def test_the_rest_of_a_gain_beside_imperfections_exceeds_their_errors(own, within):
+    """An imperfection is known within the linearisation of the motion, a tenth."""
     one = contender("viscous", 200.0)
     one.own = own
     assert gates._within_imperfections(one) == within

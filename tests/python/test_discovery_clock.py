@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lost samples among stamps that scatter: as their definition says, in time that grows as the record does."""
+"""Lost samples among scattered stamps: by their definition, in time proportional to the record."""
 
 import time
 

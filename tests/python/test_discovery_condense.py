@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Condensed records say what their samples say: same least squares, same noise, and memory in proportion."""
+"""Condensed records keep the information of the samples: least squares and noise, in proportional memory."""
 
 import tracemalloc
 
@@ -12,7 +12,7 @@ from separatrix.discovery.measured import tables
 from separatrix.discovery.measured.condense import (
     NODES,
     _basis,
-    _stretch_noise,
+    _block_noise,
     condense,
     expected_left,
     stride,
@@ -26,7 +26,7 @@ KINK = 5.00037
 
 
 def moving(seconds: float = 7.0, sigma: float = SIGMA, seed: int = 0):
-    """A swing with a second harmonic, sampled far faster than it moves."""
+    """An oscillation with a second harmonic, sampled far faster than it moves."""
     t = np.arange(int(seconds * RATE)) / RATE
     x = 0.2 * np.sin(2 * np.pi * t / PERIOD) + 0.02 * np.cos(4 * np.pi * t / PERIOD + 1)
     x = x + sigma * np.random.default_rng(seed).standard_normal(t.size)
@@ -40,11 +40,11 @@ def condensed(record, sigma: float = SIGMA, kept=None, slow=None):
 
 
 @pytest.mark.parametrize("size", [16, 64, 256])
-def test_values_of_a_stretch_have_independent_errors_and_follow_their_degree(size):
+def test_values_of_a_block_have_independent_errors_and_follow_their_degree(size):
     q, nodes, values = _basis(size)
     weights = values @ q[:, :NODES].T
     covariance = weights @ weights.T
-    assert np.allclose(covariance, np.diag(_stretch_noise(size, 0.0)[0] ** 2), atol=1e-12)
+    assert np.allclose(covariance, np.diag(_block_noise(size, 0.0)[0] ** 2), atol=1e-12)
     for degree in range(NODES + 1):
         # one degree more than the polynomial has
         assert np.allclose(weights @ np.arange(size) ** float(degree), nodes**degree, rtol=1e-9)
@@ -57,7 +57,7 @@ def test_noise_with_memory_spreads_the_values_and_leaves_what_is_expected(memory
     drawn = random.standard_normal((20_000, size)) @ np.linalg.cholesky(memory**lags).T
     q, _, values = _basis(size)
     terms = drawn @ q[:, :NODES]
-    assert np.allclose(np.std(terms @ values.T, axis=0), _stretch_noise(size, memory)[0], rtol=0.03)
+    assert np.allclose(np.std(terms @ values.T, axis=0), _block_noise(size, memory)[0], rtol=0.03)
     rest = drawn - terms @ q[:, :NODES].T
     power, product = expected_left(size, memory)
     assert np.isclose(np.mean(np.sum(rest**2, axis=1)), power, rtol=0.02)
@@ -74,18 +74,18 @@ def test_rows_are_linked_as_the_noise_of_their_samples(memory):
     count = rows.size.size
     assert len(rows.lengths) > 1
     assert np.any(rows.size == 1)
-    places, weights = [], []
+    spans, weights = [], []
     for k in range(count):
         size, node = int(rows.size[k]), int(rows.node[k])
         if size == 1:
-            places.append((round(rows.place[k]), 1))
+            spans.append((round(rows.offset[k]), 1))
             weights.append(np.ones(1))
         else:
             q, nodes, values = _basis(size)
-            places.append((round(rows.place[k] - nodes[node]), size))
+            spans.append((round(rows.offset[k] - nodes[node]), size))
             weights.append((values @ q[:, :NODES].T)[node])
-    design = np.zeros((count, max(first + size for first, size in places)))
-    for k, ((first, size), weight) in enumerate(zip(places, weights, strict=True)):
+    design = np.zeros((count, max(first + size for first, size in spans)))
+    for k, ((first, size), weight) in enumerate(zip(spans, weights, strict=True)):
         design[k, first : first + size] = weight
     lags = np.abs(np.subtract.outer(np.arange(design.shape[1]), np.arange(design.shape[1])))
     covariance = design @ (memory**lags) @ design.T
@@ -113,7 +113,7 @@ def test_a_fit_to_the_rows_is_the_fit_to_the_samples():
     assert np.all(np.abs(few - every) < 0.05 * error)
 
 
-def test_what_stretches_leave_over_is_the_noise():
+def test_the_residual_of_blocks_is_the_noise():
     record = moving()
     rows = condensed(record)
     assert np.isclose(np.sqrt(rows.left.sum() / rows.freedom.sum()), SIGMA, rtol=0.01)
@@ -128,9 +128,9 @@ def test_samples_stay_around_events_and_where_a_kink_shows():
     record.x = record.x + np.where(record.t > KINK, 0.5 * (record.t - KINK), 0.0)
     rows = condensed(record, kept=kept, slow=slow)
     single = np.zeros(record.t.size, bool)
-    single[rows.place[rows.size == 1].astype(int)] = True
+    single[rows.offset[rows.size == 1].astype(int)] = True
     assert single[kept].all()
-    assert rows.size[(rows.place >= 30_000) & (rows.place < 30_100)].max() <= 16
+    assert rows.size[(rows.offset >= 30_000) & (rows.offset < 30_100)].max() <= 16
     assert rows.size[np.abs(rows.t - KINK) < 2e-4].max() == 1
     assert np.median(rows.size[np.abs(rows.t - KINK) > 0.1]) >= 256
 
@@ -164,19 +164,19 @@ def test_records_that_cannot_be_condensed_are_refused_with_words(monkeypatch):
 
 
 @pytest.mark.parametrize(("most", "factor"), [(200_000, 1), (1500, 4)])
-def test_condensing_that_gave_way_is_told(monkeypatch, most, factor):
-    """Where too many rows would stay, stretches need not be smooth within the noise any more."""
+def test_condensing_beyond_the_noise_is_reported(monkeypatch, most, factor):
+    """If too many rows would stay, blocks need not be smooth within the noise."""
     monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", most)
     prepared = Prepared(moving(), SIGMA, np.inf, 0.0)
     gather([prepared], 1.0, None)
     count = prepared.samples.t.size
     assert count <= most
     assert prepared.samples.factor == factor
-    (said,) = (note for note in prepared.notes if "condensed" in note)
+    (text,) = (note for note in prepared.notes if "condensed" in note)
     if factor == 1:
-        assert said.endswith(f"in which it is smooth are condensed to {count} values that say as much")
+        assert text.endswith(f"in which it is smooth are condensed to {count} values of equal information")
     else:
-        assert said.endswith(f"smooth within {factor} times the noise are condensed to {count} values")
+        assert text.endswith(f"smooth within {factor} times the noise are condensed to {count} values")
 
 
 def test_the_expected_noise_is_that_of_dense_projections():

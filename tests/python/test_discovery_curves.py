@@ -68,7 +68,7 @@ def bounces(model: Model, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
     return flown.impact.speed_before[first], flown.impact.speed_after[first]
 
 
-def test_a_curve_restores_what_its_table_says_and_smoothly():
+def test_a_curve_restores_its_table_smoothly():
     base = Model.from_text(CASE.format(contact=NEWTON))
     speeds = np.array([0.3, 0.7, 1.5, 2.5, 3.5])
     wanted = 0.2 * np.exp(-speeds) - 0.1
@@ -127,7 +127,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("error", [1e-3, 1e-2, 5e-2, 1e-1])
 @pytest.mark.parametrize("name", SHAPES)
-def test_the_band_of_a_smooth_function_has_it_on_as_much_as_it_says(name, error):
+def test_the_band_of_a_smooth_function_has_its_nominal_coverage(name, error):
     """Measured at 60 speeds with noise; the mean share of the support over 60 draws is about 95 %."""
     knots, random = np.linspace(0.3, 4, 16), np.random.default_rng(7)
     speeds = np.sort(random.uniform(0.3, 4, 60))
@@ -153,16 +153,16 @@ def test_a_straight_line_is_not_rough_and_a_cubic_is_by_its_bend():
     assert cubic @ roughness(fine) @ cubic == pytest.approx(whole, rel=0.05)
 
 
-def test_a_function_that_nothing_tells_of_is_none():
+def test_a_function_without_information_is_none():
     penalty = roughness(np.linspace(0, 1, 6))
     assert smoothed(np.zeros((6, 6)), np.zeros(6), np.zeros(6), penalty) is None
-    # one place tells nothing of the slope
+    # one point does not determine the slope
     one = np.zeros((6, 6))
     one[2, 2] = 1e4
     assert smoothed(one, np.zeros(6), np.zeros(6), penalty) is None
 
 
-def test_closed_forms_are_told_apart_by_the_values():
+def test_closed_forms_are_distinguished_by_the_values():
     at = np.linspace(0.3, 4, 8)
     rows = 1e4 * np.eye(8)
 
@@ -273,12 +273,12 @@ def test_a_closed_form_that_the_function_refutes_is_not_named():
     assert verdicts[0]["function"]["text"].endswith("as no closed form that is known")
 
 
-def test_friction_that_varies_over_the_place_as_a_sine_is_found_as_a_function():
+def test_friction_that_varies_with_position_as_a_sine_is_found_as_a_function():
     """Coefficient 0.08 (1 + 0.6 sin(9 x)): no effect has that shape, the family as a table has."""
     case = CASE.format(contact=NEWTON).replace("0.05", "0.08")
-    places = np.linspace(-0.2, 0.72, 16)
-    table = {f"place[{i}]": one for i, one in enumerate(places, start=1)}
-    table |= {f"change[{i}]": 0.6 * np.sin(9 * one) for i, one in enumerate(places, start=1)}
+    positions = np.linspace(-0.2, 0.72, 16)
+    table = {f"position[{i}]": one for i, one in enumerate(positions, start=1)}
+    table |= {f"change[{i}]": 0.6 * np.sin(9 * one) for i, one in enumerate(positions, start=1)}
     base = Model.from_text(case)
     records = records_of(base.with_effect("friction_position_curve", table), seconds=8.0)
     options = Options(quick=True, most_effects=1, candidates=("position_dependent_friction",))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A late sensor of the place beside a velocity that is not late."""
+"""A delayed position sensor beside a velocity without delay."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def late_problem(delay: float) -> tuple[Problem, np.ndarray]:
 
 
 @pytest.mark.parametrize("delay", [0.0017, 0.012, -0.0017])
-def test_only_the_place_is_late(library, delay):
+def test_only_the_position_is_delayed(library, delay):
     problem, starts = late_problem(delay)
     found = problem.evaluate(problem.values, starts)
     assert found.steady.sum() > 8
@@ -51,16 +51,16 @@ def test_only_the_place_is_late(library, delay):
 def test_derivatives_by_a_delay_are_differences(library, delay, close):
     problem, starts = late_problem(delay)
     found = problem.evaluate(problem.values, starts)
-    place = [one.path for one in problem.free].index("effect.sensor_delay.delay")
+    index = [one.path for one in problem.free].index("effect.sensor_delay.delay")
     ends = []
     for step in (1e-6, 5e-7, -5e-7, -1e-6):
         values = problem.values.copy()
-        values[place] += step
+        values[index] += step
         ends.append(problem.evaluate(values, starts, derivatives=False).residual[found.steady])
     wanted, half = (ends[3] - ends[0]) / 2e-6, (ends[2] - ends[1]) / 1e-6
     size = np.abs(wanted).max()
     # but where an impact passes a sample meanwhile
     smooth = np.abs(wanted - half) < 1e-3 * size
     assert smooth.mean() > 0.99
-    error = np.abs(found.by_parameter[found.steady][:, :, place] - wanted)[smooth]
+    error = np.abs(found.by_parameter[found.steady][:, :, index] - wanted)[smooth]
     assert error.max() < close * size

@@ -47,8 +47,8 @@ def case_of(generator, base: dict, name: str, size: float, rows: tuple, samples:
     )  # fmt: skip
 
 
-def said(generator, case, folder) -> set[str]:
-    """All that the workflow holds possible."""
+def possible(generator, case, folder) -> set[str]:
+    """All effects that the workflow considers possible."""
     from separatrix.discovery import Options, discover
 
     records = generator[2]
@@ -71,10 +71,10 @@ def test_an_asymmetry_of_dry_friction_needs_no_viscous_one(generator, tmp_path):
     }
     case = case_of(
         generator, base, "asymmetric_friction", -0.12104, ASYMMETRIC, 100, seed=[4211, 9, 0], level=0.01,
-        colour="white", velocity=False, crank_angle=False, tells_noise=True,
+        colour="white", velocity=False, crank_angle=False, states_noise=True,
         phase_error=[-0.02128, 0.01617, -0.0194],
     )  # fmt: skip
-    assert {"offset_force", "asymmetric_friction"} <= said(generator, case, tmp_path)
+    assert {"offset_force", "asymmetric_friction"} <= possible(generator, case, tmp_path)
 
 
 def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path):
@@ -88,9 +88,9 @@ def test_a_size_that_throws_a_fit_far_out_is_begun_from_zero(generator, tmp_path
     }
     case = case_of(
         generator, base, "offset_force", -0.0159245, OFFSET, 50, seed=[4211, 5, 0], level=0.005,
-        colour="quantised", velocity=True, crank_angle=True, tells_noise=True, phase_error=[0.0, 0.0, 0.0],
+        colour="quantised", velocity=True, crank_angle=True, states_noise=True, phase_error=[0.0, 0.0, 0.0],
     )  # fmt: skip
-    assert "offset_force" in said(generator, case, tmp_path)
+    assert "offset_force" in possible(generator, case, tmp_path)
 
 
 @pytest.mark.parametrize(("seed", "number", "hidden"), [
@@ -105,4 +105,4 @@ def test_names_of_one_motion_are_not_lost_in_other_minima(generator, tmp_path, s
 
     case = draw(seed, number)
     assert [one.name for one in case.hidden] == [hidden]
-    assert {"offset_force", hidden, "sensor_bias"} <= said(generator, case, tmp_path)
+    assert {"offset_force", hidden, "sensor_bias"} <= possible(generator, case, tmp_path)

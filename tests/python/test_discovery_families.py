@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Springs, forces of the place, contacts and drives as members of families; several effects at once."""
+"""Springs, forces of position, contacts and drives as members of families; several effects at once."""
 
 import json
 import subprocess
@@ -13,7 +13,7 @@ from separatrix.discovery import Options, discover
 from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.data import gather, scales_of
-from separatrix.discovery.fitting.motions import stretches
+from separatrix.discovery.fitting.motions import extensions
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.results import replacing, write_results
@@ -82,8 +82,8 @@ def magnet(x: np.ndarray) -> np.ndarray:
 
 def with_magnet(model: Model) -> Model:
     """The model with the magnet as a table of its own knots."""
-    places = np.linspace(-0.1, 1.0, 16)
-    return model.with_effect("force_curve", table("position", places, "force", magnet(places)))
+    positions = np.linspace(-0.1, 1.0, 16)
+    return model.with_effect("force_curve", table("position", positions, "force", magnet(positions)))
 
 
 def ask(true: Model, without: Model, names: tuple[str, ...], **options) -> tuple[dict, Findings]:
@@ -93,12 +93,12 @@ def ask(true: Model, without: Model, names: tuple[str, ...], **options) -> tuple
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.03])
-def test_the_stretch_of_the_spring_is_that_of_its_foot(gap: float):
+def test_the_extension_of_the_spring_follows_its_foot(gap: float):
     without = base().with_effect("backlash", {"gap": gap}) if gap else base()
     record = records_of(without)[0]
     data = gather([prepare(record, without)], 1.0, None)
     fitted = fit_base(data, without, scales_of(data, without).mass)
-    found = stretches(fitted.problem, fitted.fit)
+    found = extensions(fitted.problem, fitted.fit)
     t = data.prepared[0].samples.t[fitted.problem.segments.index]
     angle = fitted.problem.crank_angle(0, fitted.fit.values, t)
     scale = dict(zip([one.path for one in fitted.problem.free], fitted.fit.values, strict=True))
@@ -108,7 +108,7 @@ def test_the_stretch_of_the_spring_is_that_of_its_foot(gap: float):
 
 
 def test_a_force_without_a_name_is_added_as_a_table_and_the_case_runs(separatrix: Path, tmp_path: Path):
-    """Known to depend on the place, named nothing, and its basin map is computed with the table."""
+    """It depends on position, has no name, and its basin map is computed with the table."""
     without = base(upper=1.1)
     verdict, findings = ask(with_magnet(without), without, ("drive_ripple",))
     assert (verdict["outcome"], verdict["effects"]) == ("characterised", [])
@@ -118,7 +118,7 @@ def test_a_force_without_a_name_is_added_as_a_table_and_the_case_runs(separatrix
         assert gap["after"] - 1 < 0.05 * (gap["before"] - 1)
     part = verdict["function"]["parts"][0]
     at, value, band = (np.array(part[key]) for key in ("at", "value", "band_95"))
-    # what is constant or linear in the place is in free length and spring: what counts is the shape
+    # free length and spring absorb parts that are constant or linear in the position: the shape counts
     fitted = np.polyval(np.polyfit(at, value - magnet(at), 1), at)
     assert np.max(np.abs(value - magnet(at) - fitted)) < 0.1 * np.ptp(magnet(at))
     assert np.all(band[1] > band[0])
@@ -148,7 +148,7 @@ def test_free_play_in_the_spring_is_named_and_no_cubic_spring():
 
 
 @pytest.mark.long
-def test_a_soft_wall_is_told_by_its_family():
+def test_a_soft_wall_is_reported_by_its_family():
     without = base(upper=0.55, amplitude=0.2)
     true = without.with_effect("kelvin_voigt_contact", {"stiffness": 3000.0, "damping": 12.0})
     verdict, _ = ask(true, without, ("compliant_contact", "kelvin_voigt_contact", "restitution_slope"))

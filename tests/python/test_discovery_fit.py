@@ -89,7 +89,7 @@ def test_an_inverse_does_not_depend_on_the_units_and_leaves_out_what_is_not_know
     inverse = inverse_scaled(matrix, known)
     assert (inverse[1] == 0).all()
     assert (inverse[:, 1] == 0).all()
-    # of what the data tell it is the covariance: the sum of both is known, they and their sum are not apart
+    # it is the covariance of what the data determine: the sum of both is known, each by itself is not
     assert np.allclose(matrix @ inverse @ matrix, matrix)
     units = np.array([1e-9, 1.0, 1e7, 1e7, 1e7])
     other = inverse_scaled(matrix * np.outer(units, units), known)
@@ -184,7 +184,7 @@ def test_signatures_that_vanish_do_not_stop_the_screen():
     assert 1 <= tests <= 2
 
 
-def test_a_candidate_that_was_not_asked_to_foretell_is_clearly_behind():
+def test_a_candidate_without_a_prediction_is_clearly_behind():
     far = SimpleNamespace(prediction=None)
     assert partial_module._clearly(SimpleNamespace(prediction=object()), far, None)
 
@@ -205,7 +205,7 @@ class Residuals:
         return Evaluation(residual, used, no, ~no, residual, residual, [], 0, by_start, slope)
 
     def left_over(self) -> tuple[np.ndarray, np.ndarray]:
-        """No condensed stretches."""
+        """No condensed blocks."""
         return np.zeros(1), np.zeros(1)
 
 
@@ -354,7 +354,7 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
         fitted_now.append((one.names[-1], known is not None))
         return SimpleNamespace(names=one.names, fit=SimpleNamespace(converged=True), gain=1.0)
 
-    def judge_one(base, predicted, one, prediction):
+    def score_one(base, predicted, one, prediction):
         return ScoredCandidate(one, prediction, one.gain, 0.0, np.zeros(0), 0)
 
     monkeypatch.setattr(
@@ -365,9 +365,9 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     monkeypatch.setattr(rounds, "signature", lambda *_: SimpleNamespace())
     monkeypatch.setattr(rounds, "screen", lambda *_: seen)
     monkeypatch.setattr(rounds, "refit", fit_one)
-    monkeypatch.setattr(rounds, "scored", judge_one)
+    monkeypatch.setattr(rounds, "scored", score_one)
     monkeypatch.setattr(rounds, "gain_over", lambda one, other: (one.gain - other.gain, None))
-    monkeypatch.setattr(rounds, "_out_of_race", lambda *_: False)
+    monkeypatch.setattr(rounds, "_far_behind", lambda *_: False)
     monkeypatch.setattr(rounds, "_simplest", lambda context, found, one: one)
     for step in ("_carry_on", "_cross", "_fair"):
         monkeypatch.setattr(rounds, step, lambda *_: None)

@@ -160,15 +160,15 @@ def test_friction_with_a_spring_in_series_gets_no_name() -> None:
     assert "elastic_coulomb" in verdict["not_added"]
 
 
-def test_a_force_of_the_place_is_not_taken_for_friction() -> None:
+def test_a_force_of_position_is_not_taken_for_friction() -> None:
     verdict = ask("cogging", 0.005, candidates=("viscous", "quadratic_drag", "position_dependent_friction"))
     assert verdict["outcome"] in ("characterised", "not-in-catalogue")
     assert verdict["effects"] == []
 
 
 @pytest.mark.long
-def test_a_force_sensor_that_drifts_is_told_as_one() -> None:
-    """Each record by itself, as it warms up: no function of the place."""
+def test_the_drift_of_a_force_sensor_is_reported() -> None:
+    """Each record by itself, as it warms up: no function of position."""
     records = records_of("nothing", 0.005)
     for record, rate in zip(records, (0.3, -0.2, 0.5), strict=True):
         record.force = record.force + rate * (record.t - record.t[0])
@@ -196,9 +196,9 @@ def test_wrong_units_make_no_certain_name(column: str, factor: float, partial: b
     options = Options(quick=True, compare="force", partial=partial)
     verdict = discover(base(), records[:2], records[2:], options)
     assert verdict["outcome"] != "named"
-    told = [one for one in verdict["notes"] if "other units" in one]
-    assert told
-    factors = [float(found[1]) for one in told if (found := re.search(r"is ([\d.e-]+) times that", one))]
+    notes = [one for one in verdict["notes"] if "other units" in one]
+    assert notes
+    factors = [float(found[1]) for one in notes if (found := re.search(r"is ([\d.e-]+) times that", one))]
     assert factors == pytest.approx([factor if column == "force" else 1 / factor] * 2, rel=0.2)
 
 
@@ -211,9 +211,9 @@ def test_a_clipped_force_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("sigma", "notes"), [(0.5, 0), (60.0, 1)])
-def test_a_force_below_its_noise_is_told(sigma: float, notes: int) -> None:
-    said = prepare_force(record_of("viscous", *MOTIONS[0], 0.0, 1, sigma), base()).notes
-    assert sum("the force is smaller than its noise" in one for one in said) == notes
+def test_a_force_below_its_noise_is_reported(sigma: float, notes: int) -> None:
+    reported = prepare_force(record_of("viscous", *MOTIONS[0], 0.0, 1, sigma), base()).notes
+    assert sum("the force is smaller than its noise" in one for one in reported) == notes
 
 
 def test_a_force_without_noise_is_not_clipped() -> None:
@@ -226,7 +226,7 @@ def test_a_force_without_noise_is_not_clipped() -> None:
 
 
 def test_what_to_measure_next_makes_an_ambiguous_name_a_certain_one() -> None:
-    """Noise hides whether friction grows with the speed or its square; the motion that is asked for tells."""
+    """Noise hides whether friction grows with the speed or its square; the proposed motion shows it."""
     options = Options(quick=True, compare="force", candidates=("viscous", "quadratic_drag"))
     records = [record_of("viscous", 0.1, 0.5, 0.0, seed, 8.0) for seed in (1, 2)]
     verdict = discover(base("viscous"), records[:1], records[1:], options)
@@ -274,12 +274,12 @@ def test_the_force_is_that_of_the_equation_of_motion() -> None:
     }
     assert [one.path for one in problem.free] == list(wanted)
     sigma = problem.prepared[0].deviation(at)
-    for place, (value, slope) in enumerate(wanted.values()):
-        assert found.fit.values[place] == pytest.approx(value, rel=0.02)
-        assert (sigma * made.by_parameter[:, :, place])[used] == pytest.approx(slope[used], abs=2e-3)
+    for index, (value, slope) in enumerate(wanted.values()):
+        assert found.fit.values[index] == pytest.approx(value, rel=0.02)
+        assert (sigma * made.by_parameter[:, :, index])[used] == pytest.approx(slope[used], abs=2e-3)
 
 
-def test_friction_with_a_memory_that_depends_on_the_place() -> None:
+def test_friction_with_a_memory_that_depends_on_position() -> None:
     """Against Dahl's equation in small steps; the motion turns between samples."""
     machine = base().with_effect("position_dependent_friction", {"slope": 2.0})
     machine = machine.with_effect("dahl", {"stiffness": 1500.0})
@@ -384,6 +384,6 @@ def test_a_record_sampled_far_faster_than_it_moves_has_its_acceleration():
     t = np.arange(0, 6, 2e-4)
     x = 0.1 * np.sin(np.pi * t) + 1e-6 * random.standard_normal(t.size)
     true = -0.1 * np.pi**2 * np.sin(np.pi * t)
-    swing = 2 / 2e-4
-    error = smooth(t, x, 1e-6, swing, stride(swing, t.size)).state[:, 2] - true
+    period = 2 / 2e-4
+    error = smooth(t, x, 1e-6, period, stride(period, t.size)).state[:, 2] - true
     assert np.std(error) < 0.03 * np.std(true)

@@ -90,14 +90,14 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path, share):
     (tmp_path / "cut.npz").write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(SeparatrixError, match="cut"):
         read_record(tmp_path / "cut.npz")
-    # the directory is there, a member is not what it says
+    # the directory exists, but a member is damaged
     middle = len(whole) // 2
     (tmp_path / "bent.npz").write_bytes(whole[:middle] + b"\0" * 64 + whole[middle + 64 :])
     with pytest.raises(SeparatrixError, match="bent"):
         read_record(tmp_path / "bent.npz")
 
 
-def test_what_is_missing_is_told(tmp_path):
+def test_a_missing_column_is_reported(tmp_path):
     np.savez(tmp_path / "a.npz", time=T, x=X)
     with pytest.raises(SeparatrixError, match=r"found time, x; 't' is missing of t, x\[, v, force, phi\]"):
         read_record(tmp_path / "a.npz")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A named closed form held against the function that records tell of its family."""
+"""A named closed form compared with the function of its family that the records determine."""
 
 from types import SimpleNamespace
 
@@ -16,7 +16,7 @@ from separatrix.discovery.options import Options
     (-44.0, True, "restitution_slope"),
     (44.0, False, "restitution_slope"),
 ])  # fmt: skip
-def test_a_form_that_its_function_refutes_leads_only_where_it_foretells_better(
+def test_a_form_that_its_function_refutes_leads_only_where_it_predicts_better(
     monkeypatch, ahead, passes, first
 ):
     """The table is not clearly ahead: fitted and held-out records contradict each other."""
@@ -35,7 +35,7 @@ def test_a_form_that_its_function_refutes_leads_only_where_it_foretells_better(
     monkeypatch.setattr(functions, "share_with_imperfections", lambda *_: 1.0)
     found = SimpleNamespace(base=form.fitted, screened=SimpleNamespace(tests=1.0))
     decision = decide.Decision("named", [form], [], [], [found], None, None, function=function)
-    given = functions._held_against_it(SimpleNamespace(options=Options()), decision)
+    given = functions._compared_with_function(SimpleNamespace(options=Options()), decision)
     assert (given.outcome, [one.name for one in given.accepted]) == ("ambiguous", [first])
     assert [one.name for one in given.rivals] == [{form.name: table, table.name: form}[first].name]
     assert "has another form than restitution_slope" in given.reasons[-1]

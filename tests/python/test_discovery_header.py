@@ -54,7 +54,7 @@ def test_other_units_are_refused_with_an_example(units):
         ("0.5 turn @ t=1 s", np.pi, 1.0),
     ],
 )
-def test_a_phase_may_be_told_at_a_time(phase, angle, at):
+def test_a_phase_may_be_stated_at_a_time(phase, angle, at):
     """A time without a unit is in that of the column."""
     header = make_record("r", COLUMNS, {"units": "ms, m", "phase": phase}).header
     assert header["phase"] == pytest.approx(angle)
@@ -138,7 +138,7 @@ ORDERED = [as_array, as_csv, as_text]
         ("tyx", "s, furlong, mm", {"x": 1e-3}),
         ("tyx", "t s, x mm", {"x": 1e-3}),
         ("ytx", "mm, s, m", {"x": 1}),
-        # what is told stands before what is not used
+        # columns with units precede unused ones
         ("txy", "s, mm", {"x": 1e-3}),
         ("txyv", "s, mm", {"x": 1e-3, "v": 1}),
         ("txyv", "s, m, m, mm/s", {"x": 1, "v": 1e-3}),
@@ -155,7 +155,9 @@ def test_units_in_order_count_columns_that_are_not_used(written, names, units, s
 @pytest.mark.parametrize(("names", "units"), [("tyx", "s, mm"), ("ytx", "s, mm"), ("txyv", "s, m, mm/s")])
 def test_units_in_order_of_some_columns_are_refused_where_one_is_not_used(written, names, units, tmp_path):
     why = f"units '{units}': {units.count(',') + 1} units in the order of {len(names)} columns, of which y is"
-    with pytest.raises(SeparatrixError, match=f"{why} not used: say them by name, as in 'units: t s, x mm'"):
+    with pytest.raises(
+        SeparatrixError, match=f"{why} not used: state them by name, as in 'units: t s, x mm'"
+    ):
         written(tmp_path / "record", {name: IN_BETWEEN[name] for name in names}, {"units": units})
 
 
@@ -197,7 +199,7 @@ def test_units_of_every_dataset_count(tmp_path):
     assert np.allclose(record.phi, np.pi / 180 * T)
 
 
-def test_a_unit_of_one_dataset_counts_and_the_others_are_told(tmp_path):
+def test_a_unit_of_one_dataset_counts_and_the_others_are_reported(tmp_path):
     record = stated(tmp_path / "a.h5", COLUMNS | {"force": T}, {"x": "mm"}, {})
     assert np.allclose(record.x, 1e-3 * COLUMNS["x"])
     assert any("no unit of force, t: read in SI units" in one for one in record.notes)
@@ -210,7 +212,7 @@ def test_units_that_are_none_of_the_column_are_refused(unit, tmp_path):
 
 
 def test_units_that_contradict_each_other_are_refused(tmp_path):
-    why = "'units' says 'm' of 'x', which itself says 'mm'"
+    why = "'units' gives 'm' for 'x', whose own unit is 'mm'"
     with pytest.raises(SeparatrixError, match=why):
         stated(tmp_path / "a.h5", COLUMNS, {"x": "mm"}, {"units": "t s, x m"})
     path = tmp_path / "a.csv"
@@ -223,7 +225,7 @@ def test_units_that_contradict_each_other_are_refused(tmp_path):
     path.with_name("a.csv.keys").write_text("units: t s, x um\n")
     record = read_record(path)
     assert np.allclose(record.x, 1e-6 * COLUMNS["x"])
-    assert any("x is in 'um' as the user says, not in 'mm'" in one for one in record.notes)
+    assert any("x is in 'um' as the user states, not in 'mm'" in one for one in record.notes)
 
 
 def test_packed_datasets_are_unpacked(tmp_path):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
-from separatrix.discovery.decision.misfit import foretold_chi2, refuted
+from separatrix.discovery.decision.misfit import predicted_chi2, refuted
 from separatrix.discovery.decision.partial import preferred
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.heldout import Prediction, _records_own, ahead, gained, gained_together
@@ -42,7 +42,7 @@ def candidate(predicted, parameters, training):
     )
     free = [SimpleNamespace(record=None, positive=True) for _ in range(parameters)]
     fitted = SimpleNamespace(fit=fit, added=tuple(range(parameters)), problem=SimpleNamespace(free=free))
-    # every segment tells as much
+    # every segment has as much information
     predicted.fit.reduced = SimpleNamespace(matrix=np.tile(np.eye(parameters), (count, 1, 1)))
     return ScoredCandidate(fitted, predicted, training, 0.0, np.zeros(count), parameters)
 
@@ -54,7 +54,7 @@ def test_of_two_wrong_machines_the_one_with_smaller_errors_wins_however_uncertai
 
 
 @pytest.mark.parametrize("misfit", [1.0, 1.4])
-def test_a_machine_near_the_noise_is_judged_by_its_predictive_density(misfit):
+def test_a_machine_near_the_noise_is_scored_by_its_predictive_density(misfit):
     wrong, right = prediction([90.0], [-40.0], 1.3), prediction([50.0], [-27.0], misfit)
     assert gained(right, wrong) == pytest.approx([13.0])
 
@@ -74,7 +74,7 @@ def test_segments_that_one_machine_cannot_fly_count_for_neither():
 
 
 @pytest.mark.parametrize(("lead", "chosen"), [(0.0, 1), (40.0, 2)])
-def test_more_parameters_are_taken_only_if_they_foretell_better_beyond_chance(lead, chosen):
+def test_more_parameters_are_taken_only_if_they_predict_better_beyond_chance(lead, chosen):
     scatter = np.random.default_rng(3).normal(0, 20, SEGMENTS)
     simple = candidate(prediction(np.full(SEGMENTS, 400.0), np.zeros(SEGMENTS), 8.0), 1, 5000.0)
     rich = candidate(prediction(400.0 - lead + scatter, np.zeros(SEGMENTS), 8.0), 2, 6000.0)
@@ -102,8 +102,8 @@ def test_an_unknown_parameter_counts_once_however_many_segments_it_moves():
     assert 0 < ahead(exact, one) < 10
 
 
-def test_a_record_that_tells_nothing_does_not_pay_for_one_that_tells_much():
-    """Segments of one record that say the same count once, in that record: the other one keeps its own."""
+def test_a_record_without_information_does_not_pay_for_one_with_much():
+    """Shared information of the segments of one record counts once and leaves the other record unaffected."""
     random, spread = np.random.default_rng(6), 0.3
     # the parameter moves the second record alone
     columns = random.standard_normal((2 * SEGMENTS, 50)) * (np.arange(2 * SEGMENTS) >= SEGMENTS)[:, None]
@@ -154,7 +154,7 @@ def test_a_guess_gives_crank_and_clock_of_the_record():
     assert _records_own(guess, own, np.array([0.3, 0.0])).tolist() == [0.3, 1e-4]
 
 
-def told(chi2: np.ndarray, gradient: float, information: float, error: float) -> Prediction:
+def predicted(chi2: np.ndarray, gradient: float, information: float, error: float) -> Prediction:
     """A prediction with one parameter of a machine, known to `error`."""
     one = prediction(chi2, np.zeros(chi2.size), 1.0)
     one.fit.unknowns, one.fit.evaluation = 2, SimpleNamespace(failed=np.zeros(chi2.size, bool))
@@ -167,25 +167,25 @@ def told(chi2: np.ndarray, gradient: float, information: float, error: float) ->
 def test_a_machine_that_leaves_noise_in_training_is_refuted_by_a_held_out_record_that_it_misses():
     fitted, options = SimpleNamespace(reduced_chi2=0.98), Options()
     noise = np.full(SEGMENTS, 48.0)
-    assert not refuted(told(noise, 0.0, 1.0, 0.1), fitted, options)
-    far = told(2238 * noise, 0.0, 1.0, 0.1)
+    assert not refuted(predicted(noise, 0.0, 1.0, 0.1), fitted, options)
+    far = predicted(2238 * noise, 0.0, 1.0, 0.1)
     assert refuted(far, fitted, options)
-    assert foretold_chi2(far, fitted) == pytest.approx(2238)
+    assert predicted_chi2(far, fitted) == pytest.approx(2238)
     # a few segments may be in a wrong minimum
-    in_local_minimum = noise.copy()
-    in_local_minimum[:3] *= 2238
-    assert not refuted(told(in_local_minimum, 0.0, 1.0, 0.1), fitted, options)
-    in_local_minimum[:6] *= 2238
-    assert refuted(told(in_local_minimum, 0.0, 1.0, 0.1), fitted, options)
+    misfit = noise.copy()
+    misfit[:3] *= 2238
+    assert not refuted(predicted(misfit, 0.0, 1.0, 0.1), fitted, options)
+    misfit[:6] *= 2238
+    assert refuted(predicted(misfit, 0.0, 1.0, 0.1), fitted, options)
     # noise that is larger than stated in training is so here
-    assert not refuted(told(3 * noise, 0.0, 1.0, 0.1), SimpleNamespace(reduced_chi2=1.7), options)
+    assert not refuted(predicted(3 * noise, 0.0, 1.0, 0.1), SimpleNamespace(reduced_chi2=1.7), options)
 
 
 def test_what_an_error_of_the_parameters_explains_refutes_no_machine():
-    """A parameter that is off by two of its errors makes of a record of much information what it likes."""
+    """A parameter that is off by two of its errors has a large effect on a record of much information."""
     fitted, options, information, off = SimpleNamespace(reduced_chi2=1.0), Options(), 100.0, 2.0
     chi2 = np.full(SEGMENTS, 48.0) + information * off**2
-    missing = told(chi2, information * off, information, 1.0)
+    missing = predicted(chi2, information * off, information, 1.0)
     assert chi2.sum() / (48.0 * SEGMENTS) > 9
     assert not refuted(missing, fitted, options)
     assert refuted(replace(missing, covariance=np.array([[1e-4]])), fitted, options)

@@ -22,7 +22,7 @@ def keys(path: Path, *lines: str) -> None:
     path.with_name(path.name + ".keys").write_text("\n".join(lines) + "\n")
 
 
-def said(record, *words: str) -> bool:
+def noted(record, *words: str) -> bool:
     return any(all(word in note for word in words) for note in record.notes)
 
 
@@ -57,7 +57,7 @@ def test_units_of_a_universal_file_count(tmp_path):
     assert np.allclose(record.force, 1e3 * (3 + T), rtol=1e-5)
     record = read_record(uff(tmp_path / "b.uff", function(ordinate_axis_units_lab="mm")))
     assert np.allclose(record.x, 1e-3 * X, atol=1e-6)
-    # the place of a rotation is an angle, whatever the unit of length
+    # the position of a rotation is an angle, whatever the unit of length
     turned = read_record(uff(tmp_path / "c.uff", units(1000.0, 1.0), function(rsp_dir=5)))
     assert np.allclose(turned.x, X, atol=1e-3)
     with pytest.raises(SeparatrixError, match="in 'mm by its label, 1.0 m by data set 164', expected"):
@@ -77,8 +77,8 @@ def test_functions_that_are_no_column_over_time_are_left_out(tmp_path):
     unused = [function(X[:77], T[:77], ordinate_spec_data_type=12) for _ in range(2)]
     record = read_record(uff(tmp_path / "a.uff", spectrum, function(), response, *unused))
     assert np.allclose(record.t, T)
-    assert said(record, "2 functions that are not over time")
-    assert said(record, "even steps of 0.005 s", "200 Hz")
+    assert noted(record, "2 functions that are not over time")
+    assert noted(record, "even steps of 0.005 s", "200 Hz")
     with pytest.raises(SeparatrixError, match="'t' is missing"):
         read_record(uff(tmp_path / "b.uff", spectrum))
 
@@ -110,7 +110,7 @@ def test_bursts_keep_the_gaps_between_them(tmp_path):
         tmp_path / "a.tdms",
         [("x", X[:100], wave(0.0, unit_string="mm"))],
         [("x", X[100:200], wave(3.5, unit_string="mm"))],
-        # of a writer in pieces, which says its start again, or when each piece begins: no gap
+        # a writer in pieces may repeat its start or state the start of each piece: no gap
         [("x", X[200:250], wave(3.5, unit_string="mm"))],
         [("x", X[250:], wave(4.25, unit_string="mm"))],
     )
@@ -179,7 +179,7 @@ def test_samples_that_the_recorder_calls_invalid_are_gaps(tmp_path):
     record = read_record(path)
     assert record.t.size == 280
     assert record.pieces == [(0, 120), (120, 280)]
-    assert said(record, "20 samples are marked invalid")
+    assert noted(record, "20 samples are marked invalid")
 
 
 # ---- LabVIEW measurement files
@@ -262,7 +262,7 @@ def test_24_bits_and_samples_at_full_scale(tmp_path):
     )
 
 
-def test_two_channels_of_a_wav_file_are_said_by_number(tmp_path):
+def test_two_channels_of_a_wav_file_are_selected_by_number(tmp_path):
     path = tmp_path / "a.wav"
     wavfile.write(path, 200, np.stack([0.5 * np.sin(5 * T), 0.2 * np.cos(5 * T)], axis=1))
     keys(path, "columns: x = 2, force = 1", "units: t s, x 2.5 mm, force 100 N")
@@ -307,7 +307,7 @@ def test_what_is_not_read_is_answered_with_what_is(tmp_path):
 # ---- damage
 
 
-def test_files_that_are_cut_off_are_told(tmp_path):
+def test_truncated_files_are_reported(tmp_path):
     whole = uff(tmp_path / "a.uff", function(), function(3 + T, ordinate_spec_data_type=13)).read_bytes()
     (tmp_path / "cut.uff").write_bytes(whole[:-400])
     with pytest.raises(SeparatrixError, match="cut.uff: is cut off: its last data set has no end"):
@@ -316,7 +316,7 @@ def test_files_that_are_cut_off_are_told(tmp_path):
     (tmp_path / "cut.tdms").write_bytes(whole[:-400])
     record = read_record(tmp_path / "cut.tdms")
     assert record.t.size == 250
-    assert said(record, "the file is cut off in its last segment")
+    assert noted(record, "the file is cut off in its last segment")
     samples = np.round(1e4 * np.sin(5 * T)).astype("i2")
     wavfile.write(tmp_path / "a.wav", 200, samples)
     (tmp_path / "cut.wav").write_bytes((tmp_path / "a.wav").read_bytes()[:-100])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A measured velocity says nothing next to an impact whose time is known less well than it is sampled."""
+"""A measured velocity is not compared next to an impact whose time is less certain than the sampling."""
 
 import numpy as np
 import pytest

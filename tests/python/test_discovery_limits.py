@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The experiment that would tell rivals apart is one experiment; what the base imitates has no size."""
+"""One experiment must separate a machine from all rivals; an effect that the base imitates has no size."""
 
 from types import SimpleNamespace
 
@@ -104,7 +104,7 @@ def test_a_free_motion_lasts_as_long_as_the_record_whenever_that_began():
 
 
 def test_what_the_parameters_of_a_machine_can_be_is_not_apart():
-    """A stiffness that the record leaves free tells nothing; the same difference with a known one does."""
+    """A difference of a stiffness separates two machines only if the record determines the stiffness."""
     one, other = fitted(1.0), fitted(1.0002)
     free = d_primes(one, [other], 1.1, 1.0)[0]
     reduced = one.fit.reduced

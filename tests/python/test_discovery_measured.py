@@ -65,7 +65,7 @@ def test_the_positioning_system_lacks_asymmetric_friction_and_remains_flexible(r
     assert any("emps_pulses" in reason and "flexible" in reason for reason in verdict["reasons"])
 
 
-def test_large_swings_of_the_pendulum_lack_dry_friction_and_drag(records):
+def test_large_oscillations_of_the_pendulum_lack_dry_friction_and_drag(records):
     verdict = found(records, "pendulum_large")
     assert (verdict["outcome"], verdict["complete"]) == ("named", False)
     assert verdict["effects"] == ["coulomb", "quadratic_drag"]
@@ -73,7 +73,7 @@ def test_large_swings_of_the_pendulum_lack_dry_friction_and_drag(records):
     assert after < 17 < 25 < before
 
 
-def test_small_swings_of_the_pendulum_have_the_same_dry_friction(records):
+def test_small_oscillations_of_the_pendulum_have_the_same_dry_friction(records):
     small, large = found(records, "pendulum_small"), found(records, "pendulum_large")
     assert small["outcome"] == "named"
     assert {"coulomb", "dahl"} <= set(small["effects"])
@@ -83,7 +83,7 @@ def test_small_swings_of_the_pendulum_have_the_same_dry_friction(records):
     assert after < 0.3 * before
 
 
-def test_a_spring_that_small_swings_suggest_is_refuted_by_large_ones(records):
+def test_a_spring_that_small_oscillations_suggest_is_refuted_by_large_ones(records):
     verdict = found(records, "pendulum_small", "pendulum_large")
     assert (verdict["outcome"], verdict["complete"]) == ("named", False)
     assert set(verdict["effects"]) == {"coulomb", "quadratic_drag", "dahl"}
@@ -91,12 +91,12 @@ def test_a_spring_that_small_swings_suggest_is_refuted_by_large_ones(records):
     assert verdict["parameters"]["effect.coulomb.force"]["value"] == pytest.approx(alone, rel=0.15)
 
 
-def test_half_swings_alone_foretell_the_small_pendulum_no_better(records):
+def test_half_periods_alone_predict_the_small_pendulum_no_better(records):
     """Constant friction misses by more than the scatter; friction that may change is hardly known."""
     figures = runpy.run_path(str(ROOT / "scripts" / "measured_figures"))
-    swings = [figures["half_swings"](records, name) for name in ("pendulum_small", "pendulum_small_low")]
-    own, held_out, error = figures["swings_alone"](*swings[0], *swings[1], 0)
+    turns = [figures["half_periods"](records, name) for name in ("pendulum_small", "pendulum_small_low")]
+    own, held_out, error = figures["half_periods_alone"](*turns[0], *turns[1], 0)
     assert own < 2 < 5 < held_out
     assert held_out > 3 * error
-    _, held_out, error = figures["swings_alone"](*swings[0], *swings[1], 1)
+    _, held_out, error = figures["half_periods_alone"](*turns[0], *turns[1], 1)
     assert min(held_out, error) > 9

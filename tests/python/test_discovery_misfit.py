@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A record that the machine misses is never passed over, and noise is doubted where the samples say so."""
+"""A record that the machine misses is never ignored, and noise is doubted where the samples contradict it."""
 
 from types import SimpleNamespace
 
@@ -59,7 +59,7 @@ def test_the_records_that_are_missed_are_named():
     assert missed(data(1, 1), fit(1.0, 1.4), Options()) == ["second (reduced chi^2 1.4)"]
 
 
-def test_a_record_that_cannot_be_flown_along_is_missed_and_told():
+def test_a_record_that_cannot_be_simulated_is_missed_and_reported():
     found = fit(1.05, 1.0)
     found.evaluation.failed[SEGMENTS:] = True
     found.good[SEGMENTS:] = found.good[0] = False
@@ -83,7 +83,7 @@ def test_a_machine_without_contacts_has_no_impacts_that_are_not_steady():
 @pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])
 def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, training, held_out, outcome):
     # without imperfections of a rig
-    monkeypatch.setattr(decide, "cleaned_prediction", lambda base, told: told.fit)
+    monkeypatch.setattr(decide, "cleaned_prediction", lambda base, prediction: prediction.fit)
     context = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
     first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
     predicted = SimpleNamespace(problem=None, fit=fit(1, held_out))
@@ -97,29 +97,29 @@ def test_stated_noise_is_doubted_where_the_samples_show_another(monkeypatch):
     """Scatter that only the fit shows is what the machine lacks."""
     monkeypatch.setattr(misfit, "noise_of", lambda *_: Noise({0: 30.0, 1: 30.0}, 0.0))
     assert doubted_noise(data(1e-3, 1e-3), BODY, fit(900, 900), 1) == []
-    said = doubted_noise(data(1e-4, 1e-3), BODY, fit(900, 900), 1)
-    assert [text.split(":")[0] for text in said] == ["first", "second"]
-    assert "stated as 0.0001 m" in said[0]
+    notes = doubted_noise(data(1e-4, 1e-3), BODY, fit(900, 900), 1)
+    assert [text.split(":")[0] for text in notes] == ["first", "second"]
+    assert "stated as 0.0001 m" in notes[0]
 
 
 def test_noise_that_is_stated_too_large_is_doubted(monkeypatch):
     monkeypatch.setattr(misfit, "noise_of", lambda *_: Noise({0: 0.01, 1: 0.01}, 0.0))
-    said = doubted_noise(data(0.1, 1e-3), BODY, fit(1e-4, 1e-4), 1)
-    assert all("scatter by only 0.001 m" in text for text in said)
-    assert len(said) == 2
+    notes = doubted_noise(data(0.1, 1e-3), BODY, fit(1e-4, 1e-4), 1)
+    assert all("scatter by only 0.001 m" in text for text in notes)
+    assert len(notes) == 2
     assert too_quiet(data(0.1, 1e-3), fit(1e-4, 1))
     assert not too_quiet(data(0.1, 0.1), fit(1, 1))
 
 
-def test_unstated_noise_far_above_the_scatter_of_the_samples_is_told(monkeypatch):
+def test_unstated_noise_far_above_the_scatter_of_the_samples_is_reported(monkeypatch):
     monkeypatch.setattr(misfit, "noise_of", lambda *_: Noise({0: 1.0, 1: 1.0}, 0.0))
     taken = data(1e-2, 1e-3)
     for one in taken.prepared:
         one.sigma_stated, one.memory = False, 0.0
     # the memory of the noise explains that neighbours scatter little
     taken.prepared[1].sigma, taken.prepared[1].memory = 3e-3, 0.9
-    (said,) = doubted_noise(taken, BODY, fit(1, 1), 1)
-    assert said.startswith("first: noise of 0.01 m is taken, neighbouring samples scatter by 0.00103 m")
+    (note,) = doubted_noise(taken, BODY, fit(1, 1), 1)
+    assert note.startswith("first: noise of 0.01 m is taken, neighbouring samples scatter by 0.00103 m")
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records of another machine, in other units or of another drive are told from missing physics."""
+"""Records of another machine, in other units or of another drive are distinguished from missing physics."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ CASE = {"body.mass": (95.0, "kg"), "restoring.stiffness": (88.8, "N/m"), "contac
 
 
 def data(frequency: float, stated: float) -> SimpleNamespace:
-    """One record of 5 s that moves at one frequency, beside a drive that is said to have another."""
+    """One record of 5 s that oscillates at one frequency, with another stated for its drive."""
     t = np.arange(2500) / 500
     x = 0.3 * np.cos(frequency * t) + 0.02 * t
     record = SimpleNamespace(name="first", x=x, interval=1 / 500, pieces=[(0, t.size)])
@@ -51,7 +51,7 @@ def test_a_machine_near_that_of_the_case_is_not_strange():
 
 
 @pytest.mark.parametrize(
-    ("found", "said"),
+    ("found", "expected"),
     [
         ({"mass": 0.095}, "body.mass 0.095 kg (case: 95)"),
         ({"stiffness": 8.3}, "restoring.stiffness 8.3 N/m (case: 88.8)"),
@@ -59,9 +59,9 @@ def test_a_machine_near_that_of_the_case_is_not_strange():
         ({"drive_scale": 5.0}, "scale of the drive 5"),
     ],
 )
-def test_what_is_far_from_the_case_is_said(found, said):
+def test_parameters_far_from_the_case_are_reported(found, expected):
     (note,) = other_machine(data(9.0, 9.0), base(**found), Options())
-    assert said in note
+    assert expected in note
 
 
 def test_the_strongest_line_is_where_the_motion_is():
@@ -71,7 +71,7 @@ def test_the_strongest_line_is_where_the_motion_is():
     assert apart == pytest.approx(2 * np.pi / 5, rel=1e-3)
 
 
-def test_a_motion_without_a_clear_line_says_nothing_about_the_drive():
+def test_a_motion_without_a_clear_line_does_not_contradict_the_drive():
     chaotic = data(8.96, 11.3)
     chaotic.prepared[0].record.x = np.random.default_rng(2).standard_normal(2500)
     assert other_drive(chaotic, base(1e4)) == []
@@ -80,21 +80,21 @@ def test_a_motion_without_a_clear_line_says_nothing_about_the_drive():
 @pytest.mark.parametrize(
     ("frequency", "chi2", "notes"), [(8.96, 1e4, 1), (8.96, 1.2, 0), (11.3, 1e4, 0), (5.65, 1e4, 0)]
 )
-def test_a_motion_beside_the_drive_is_told_where_the_machine_misses_it(frequency, chi2, notes):
+def test_another_frequency_than_the_drive_is_reported_where_the_machine_misses_it(frequency, chi2, notes):
     """Harmonics and subharmonics belong to the drive."""
-    said = other_drive(data(frequency, 11.3), base(chi2))
-    assert len(said) == notes
-    assert all("is drive_ratio right?" in note for note in said)
+    found = other_drive(data(frequency, 11.3), base(chi2))
+    assert len(found) == notes
+    assert all("is drive_ratio right?" in note for note in found)
 
 
-def test_a_phase_that_the_header_does_not_have_is_told():
+def test_another_phase_than_that_of_the_header_is_reported():
     """One that was not stated was searched for, and whole turns are none."""
     found = {"a": 2.3, "b": -2.3 + 2 * np.pi, "c": 0.05, "d": 2 * np.pi, "e": 2.3, "f": 2.3}
     prepared = [
         SimpleNamespace(record=SimpleNamespace(name=name), phase_known=name == "e", phase_stated=name != "f")
         for name in found
     ]
-    free = [Free("nuisance:phase", 0.0, record=place) for place in range(len(found))]
+    free = [Free("nuisance:phase", 0.0, record=index) for index in range(len(found))]
     fitted = SimpleNamespace(
         problem=SimpleNamespace(free=free), fit=SimpleNamespace(values=np.array(list(found.values())))
     )

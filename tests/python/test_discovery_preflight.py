@@ -49,14 +49,14 @@ def test_a_measured_crank_angle_counts_from_the_rows_that_it_is_fitted_to():
 def test_the_end_that_is_held_out_has_two_drive_periods(periods, share):
     model = Model.from_text(CASE)
     t = np.arange(0, periods * 2 * np.pi / RATE, 0.005)
-    training, held_out, said = _split([driven(t, phase=START)], [], model)
-    assert said == f"the last {share} % of the only record"
+    training, held_out, chosen = _split([driven(t, phase=START)], [], model)
+    assert chosen == f"the last {share} % of the only record"
     assert training[0].t.size + held_out[0].t.size == t.size
     for part in (*training, *held_out):
         prepare(part, model)
 
 
-def test_a_record_too_short_to_hold_out_its_end_says_so():
+def test_a_record_too_short_to_hold_out_its_end_is_refused_with_its_part():
     model = Model.from_text(CASE)
     t = np.arange(0, 3 * 2 * np.pi / RATE, 0.005)
     training, held_out, _ = _split([driven(t, phase=START)], [], model)
@@ -66,7 +66,7 @@ def test_a_record_too_short_to_hold_out_its_end_says_so():
         prepare(training[0], model)
 
 
-def test_a_gap_is_told_once_where_the_end_of_a_record_is_held_out():
+def test_a_gap_is_reported_once_where_the_end_of_a_record_is_held_out():
     t = np.arange(800) / 100
     t[200:] += 0.5
     training, held_out, _ = _split([driven(t)], [], Model.from_text(CASE))
@@ -157,14 +157,14 @@ def test_channels_that_cannot_be_what_they_are_called_are_refused(channel, facto
         prepare(record, Model.from_text(CASE))
 
 
-@pytest.mark.parametrize(("stated", "told"), [(RATE, False), (12.0, True)])
-def test_a_stated_frequency_that_the_crank_contradicts_is_told(stated, told):
+@pytest.mark.parametrize(("stated", "reported"), [(RATE, False), (12.0, True)])
+def test_a_stated_frequency_that_the_crank_contradicts_is_reported(stated, reported):
     record = driven(np.arange(800) / 100, drive_frequency_rad_s=stated)
     prepared = prepare(record, Model.from_text(CASE))
     assert prepared.frequency == pytest.approx(RATE, rel=1e-9)
-    said = f"drive_frequency_rad_s is {stated:g}, phi turns at 9.9 rad/s: that is taken"
-    assert (said in prepared.notes) == told
-    assert any("drive_frequency" in one for one in prepared.notes) == told
+    note = f"drive_frequency_rad_s is {stated:g}, phi turns at 9.9 rad/s: that is taken"
+    assert (note in prepared.notes) == reported
+    assert any("drive_frequency" in one for one in prepared.notes) == reported
 
 
 @pytest.mark.parametrize(("size", "accepted"), [(1.0, True), (-1.0, False)])

@@ -105,15 +105,15 @@ def test_derivatives_by_a_table_of_contact_forces_are_no_noise(library):
     paths = [f"effect.contact_curve.force[{i}]" for i in (1, 4, 8)]
     values = np.array([model.parameters[path].value for path in paths])
     found = model.segments(paths, values, *flight).jacobian[:, : len(paths)]
-    for place, value in enumerate(values):
+    for index, value in enumerate(values):
         ends = [
             model.segments(
-                paths, values + step * (np.arange(3) == place), *flight, derivatives=False, tolerance=1e-12
+                paths, values + step * (np.arange(3) == index), *flight, derivatives=False, tolerance=1e-12
             ).x
             for step in (1e-3 * value, -1e-3 * value)
         ]
         right = (ends[0] - ends[1]) / (2e-3 * value)
-        assert np.linalg.norm(found[:, place] - right) < 0.01 * np.linalg.norm(right)
+        assert np.linalg.norm(found[:, index] - right) < 0.01 * np.linalg.norm(right)
 
 
 def test_derivatives_are_central_differences(flown):

@@ -40,7 +40,7 @@ def write(path: Path, t: np.ndarray, x: np.ndarray, head: list[str] = HEAD) -> P
 
 
 def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """A record with one imperfection."""
+    """A record with one defect."""
     t, x = rows()
     head = list(HEAD)
     if kind == "time":
@@ -78,7 +78,7 @@ def spoiled(kind: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
         ("negative noise", ["'sensor_noise_sigma_m_s' is -1"]),
     ],
 )
-def test_faults_are_refused_with_their_place(tmp_path, kind, words):
+def test_defects_are_refused_with_their_row(tmp_path, kind, words):
     t, x, head = spoiled(kind)
     with pytest.raises(SeparatrixError) as error:
         read_record(write(tmp_path / "record.csv", t, x, head))
@@ -95,7 +95,7 @@ def test_lines_that_are_no_rows_are_named(tmp_path):
             read_record(path)
 
 
-def test_gaps_are_told_and_cut(tmp_path):
+def test_gaps_are_reported_and_cut(tmp_path):
     t, x = rows()
     t[200:] += 0.5
     record = read_record(write(tmp_path / "record.csv", t, x))
@@ -138,23 +138,23 @@ def test_records_get_names_of_their_own(tmp_path):
     assert [one.name for one in records] == ["a", "a_3", "a_2", "b", "a_4"]
 
 
-@pytest.mark.parametrize("imperfection", ["nan", "other machine", "coarse", "no such file"])
-def test_nothing_is_left_behind(tmp_path, library, capsys, imperfection):
+@pytest.mark.parametrize("defect", ["nan", "other machine", "coarse", "no such file"])
+def test_nothing_is_left_behind(tmp_path, library, capsys, defect):
     (tmp_path / "base.toml").write_text(CASE)
     good = write(tmp_path / "good.csv", *rows())
     t, x = rows()
-    if imperfection == "nan":
+    if defect == "nan":
         x[3] = np.nan
-    elif imperfection == "other machine":
+    elif defect == "other machine":
         x *= 1000
-    elif imperfection == "coarse":
+    elif defect == "coarse":
         t, x = np.arange(400) * 0.1, x
     bad = tmp_path / "bad.csv"
-    if imperfection != "no such file":
+    if defect != "no such file":
         write(bad, t, x, [line for line in HEAD if "rate" not in line])
     before = listing(tmp_path)
     arguments = [tmp_path / "base.toml", good, bad, "--out", tmp_path / "out", "-q"]
-    assert main([str(word) for word in arguments]) == (66 if imperfection == "no such file" else 65)
+    assert main([str(word) for word in arguments]) == (66 if defect == "no such file" else 65)
     assert "separatrix-discover: " in capsys.readouterr().err
     assert listing(tmp_path) == before
 
@@ -178,7 +178,7 @@ def test_a_report_that_fails_leaves_what_was_there(tmp_path, monkeypatch, capsys
     verdict = {"outcome": "none", "effects": [], "alternatives": [], "parameters": {}, "gap": {}, "where": []}
     verdict |= {"reasons": [], "separating_experiment": "", "notes": [], "asked_for": None}
     verdict |= {"remains": [], "families": [], "function": None, "character": []}
-    verdict |= {"added": [], "not_added": "", "places": {}, "in_families": []}
+    verdict |= {"added": [], "not_added": "", "locations": {}, "in_families": []}
     monkeypatch.setattr(cli, "investigate", lambda *_: (verdict, None))
     monkeypatch.setattr(cli, "write_results", write)
     monkeypatch.setattr(cli, "write_report", fail)
@@ -231,7 +231,7 @@ def test_a_byte_order_mark_is_no_text(tmp_path):
         ("# operator: none", ""),
     ],
 )
-def test_header_lines_that_look_wrong_are_told(tmp_path, line, words):
+def test_header_lines_that_look_wrong_are_reported(tmp_path, line, words):
     notes = read_record(write(tmp_path / "record.csv", *rows(), [*HEAD[:-1], line])).notes
     assert [words in text for text in notes] == ([True] if words else [])
 
@@ -277,7 +277,7 @@ def test_other_separators_are_read(tmp_path, separator, point):
 
 
 def test_bytes_that_are_no_text_are_taken_in_comments_only(tmp_path):
-    path = write(tmp_path / "record.csv", *rows(), ["# place: München", *HEAD])
+    path = write(tmp_path / "record.csv", *rows(), ["# site: München", *HEAD])
     wanted = read_record(path)
     text = path.read_text()
     path.write_bytes(text.encode("latin-1"))
@@ -290,15 +290,15 @@ def test_bytes_that_are_no_text_are_taken_in_comments_only(tmp_path):
         read_record(path)
 
 
-def test_columns_that_are_not_used_are_told(tmp_path):
+def test_columns_that_are_not_used_are_reported(tmp_path):
     t, x = rows()
     columns = {"t": t, "x": x, "a": 0 * t + 7, "driver_x": x}
-    said = "columns that are not used: a, driver_x"
-    assert said in make_record("record", columns).notes
+    note = "columns that are not used: a, driver_x"
+    assert note in make_record("record", columns).notes
     with h5py.File(tmp_path / "record.h5", "w") as file:
         for name, column in columns.items():
             file[name] = column
-    assert said in read_record(tmp_path / "record.h5").notes
+    assert note in read_record(tmp_path / "record.h5").notes
 
 
 def test_a_folder_is_no_record(tmp_path):
@@ -307,7 +307,7 @@ def test_a_folder_is_no_record(tmp_path):
 
 
 @pytest.mark.parametrize("size", [0.4, -50.0])
-def test_a_sample_where_no_motion_leads_is_left_out_and_told(tmp_path, size):
+def test_a_sample_that_no_motion_reaches_is_left_out_and_reported(tmp_path, size):
     t, x = rows()
     x[150] += size
     record = read_record(write(tmp_path / "record.csv", t, x))
@@ -341,7 +341,7 @@ def test_the_same_record_is_not_taken_twice(tmp_path, library, capsys):
 
 
 def test_runs_along_one_commanded_motion_are_two_records():
-    """Their force tells them apart; a copy that lacks a column is a copy."""
+    """Their force distinguishes them; a copy that lacks a column is a copy."""
     t, x = rows()
     force = np.cos(5 * t)
     one, other = (make_record(f"run{k}", {"t": t, "x": x, "force": k * force}) for k in (1, 2))
@@ -361,8 +361,8 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, ca
     for out, words in (("file", "file: a file, expected a folder"), ("file/sub", "Not a directory")):
         # were it looked for, the case would be missing: 66
         assert main(["no.toml", "no.csv", "--out", str(tmp_path / out)]) == 73
-        assert f"{tmp_path}/{out}" in (said := capsys.readouterr().err)
-        assert words in said
+        assert f"{tmp_path}/{out}" in (message := capsys.readouterr().err)
+        assert words in message
     assert main(["no.toml", "no.csv", "--out", str(tmp_path / "new" / "sub")]) == 66
     assert listing(tmp_path) == before
 
@@ -385,8 +385,8 @@ def test_a_termination_ends_with_one_line_and_leaves_nothing(tmp_path, monkeypat
         monkeypatch.setattr(cli, "write_results", lambda folder, *_: (folder / "a").write_text("half"))
         monkeypatch.setattr(cli, step, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
         assert main(["base.toml", "r.csv", "--out", str(tmp_path / "out")]) == 143
-        said = capsys.readouterr().err.splitlines()
-        assert said == ["separatrix-discover: terminated before the end"]
+        messages = capsys.readouterr().err.splitlines()
+        assert messages == ["separatrix-discover: terminated before the end"]
         assert not (tmp_path / "out").exists()
     assert signal.getsignal(signal.SIGTERM) is before
 
@@ -398,14 +398,14 @@ def test_the_report_has_its_share_of_the_time(capsys):
     assert "about 33 s left" in capsys.readouterr().err
 
 
-def test_an_angle_is_told_in_rad():
+def test_an_angle_is_reported_in_rad():
     t = np.arange(400) / 100
     x = 20 * np.cos(3 * t)
     x[150] += 10
-    (said,) = [
+    (message,) = [
         note for note in make_record("r", {"t": t, "x": x}, {"units": "s, deg"}).notes if "left out" in note
     ]
-    assert f"x is {np.radians(x[150]):.6g} rad between" in said
+    assert f"x is {np.radians(x[150]):.6g} rad between" in message
 
 
 def test_columns_that_are_not_used_may_hold_anything(tmp_path):

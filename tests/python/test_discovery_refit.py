@@ -44,10 +44,8 @@ def test_a_candidate_is_fitted_from_the_base_before_it_is_worse(
     assert found.fit.converged == converged
 
 
-def test_a_motion_is_imitated_without_faults_of_the_rig_and_followed_with_them(monkeypatch):
-    """The motion of the other name is that of its machine: imperfections that records showed are not in
-    it.
-    """
+def test_a_motion_is_imitated_without_imperfections_of_the_rig_and_followed_with_them(monkeypatch):
+    """The motion of the other name is that of its machine, without fitted imperfections."""
     imperfection = Free(f"{IMPERFECTION}curve_2", 0.0, -3.0, 3.0, record=0)
     free = [FREE[0], imperfection, FREE[1]]
     problem = SimpleNamespace(free=free, evaluate=lambda *_, **__: None, imitating=lambda _: "imitated")
@@ -74,9 +72,9 @@ def test_a_motion_is_imitated_without_faults_of_the_rig_and_followed_with_them(m
     (True, (), 101.0, 100.0, False),
     (False, (), 90.0, 100.0, False),
     (False, (), 101.0, 100.0, True),
-    # on top of an effect one start is heard, whatever it led to
+    # on top of an effect one start suffices, whatever its result
     (False, (1,), 101.0, 100.0, True),
-    # a base that is far off says nothing of where the minimum is
+    # a base that is far off does not show where the minimum is
     (True, (), 90.0, 2000.0, False),
 ])  # fmt: skip
 def test_a_start_from_afar_is_spared_where_the_base_leads(linear, added, chi2, far, enough):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report of a discovery says what the verdict says, whatever it is, and shows no empty figure."""
+"""The report of a discovery agrees with any verdict and has no empty figure."""
 
 import base64
 import io
@@ -100,7 +100,7 @@ CHARACTER = [
         "constant": None,
         "size": None,
         "closed": {"training": 0.91, "held_out": 0.95},
-        "text": "a force that depends on speed and place: it would close 91 % of the gap",
+        "text": "a force that depends on speed and position: it would close 91 % of the gap",
     },
 ]
 
@@ -133,7 +133,7 @@ def verdict(outcome: str) -> dict:
         "alternatives": ["offset_force", "offset_force+sensor_bias"] if outcome == "ambiguous" else [],
         "equivalent": False,
         "in_families": [],
-        "places": {},
+        "locations": {},
         "equivalences": ["offset_force and sensor_bias: a shift"] if outcome == "ambiguous" else [],
         "parameters": parameters,
         "where": [{"map": "position", "text": "a force of 2.55 +- 0.32 N is missing at 0.9 to 1.1 m"}],
@@ -237,10 +237,10 @@ def write_details(path: Path, stages: tuple[str, ...]) -> None:
 
 def make(folder: Path, outcome: str) -> dict:
     """What separatrix-discover leaves in its folder."""
-    told = verdict(outcome)
-    (folder / "verdict.json").write_text(json.dumps(told))
-    write_details(folder / "details.h5", ("before", "after") if told["effects"] else ("before",))
-    return told
+    made = verdict(outcome)
+    (folder / "verdict.json").write_text(json.dumps(made))
+    write_details(folder / "details.h5", ("before", "after") if made["effects"] else ("before",))
+    return made
 
 
 @pytest.fixture(scope="module", params=["named", "ambiguous", "none", "not-in-catalogue", "characterised"])
@@ -249,9 +249,9 @@ def report(
 ) -> tuple[dict, Page, bytes]:
     """The verdict, the page and the PDF of each outcome."""
     folder = tmp_path_factory.mktemp(request.param)
-    told = make(folder, request.param)
+    made = make(folder, request.param)
     html, pdf = write_report(folder, folder / "base.toml", Options(quick=True))
-    return told, Page(html.read_text()), pdf.read_bytes()
+    return made, Page(html.read_text()), pdf.read_bytes()
 
 
 def same(cell: str, value: float | None) -> bool:
@@ -264,13 +264,13 @@ def test_every_section_is_there(report: tuple) -> None:
 
 
 def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
-    told, page, _ = report
-    for row, gap in zip(page.tables["records"], told["gap"].values(), strict=True):
+    reported, page, _ = report
+    for row, gap in zip(page.tables["records"], reported["gap"].values(), strict=True):
         assert all(
             same(cell, gap[key])
             for cell, key in zip(row[1:4], ("before", "after", "noise_floor"), strict=True)
         )
-    for row, (path, one) in zip(page.tables["parameter"], told["parameters"].items(), strict=True):
+    for row, (path, one) in zip(page.tables["parameter"], reported["parameters"].items(), strict=True):
         assert row[0] == path
         assert row[4] == one["unit"]
         if one["interval_95"] is None:
@@ -280,34 +280,34 @@ def test_numbers_are_those_of_the_verdict(report: tuple) -> None:
         numbers = [*row[1:3], *row[3].split(" to ")]
         wanted = [one["value"], one["standard_error"], *one["interval_95"]]
         assert all(same(cell, value) for cell, value in zip(numbers, wanted, strict=True))
-    assert page.tables["gate" if told["gates"] else "effect"]
-    for row, (gate, passed) in zip(page.tables.get("gate", []), told["gates"].items(), strict=True):
+    assert page.tables["gate" if reported["gates"] else "effect"]
+    for row, (gate, passed) in zip(page.tables.get("gate", []), reported["gates"].items(), strict=True):
         assert (row[0], row[2]) == (gate, "passed" if passed else "failed")
-    for row, one in zip(page.tables["effect"], told["detectable"].values(), strict=True):
+    for row, one in zip(page.tables["effect"], reported["detectable"].values(), strict=True):
         assert row[1] == (one["path"] or "-")
         assert same(row[2].split(" ")[0], one["size"])
         assert row[3] == one["reason"]
 
 
 def test_where_nothing_is_missing_no_region_misses_a_force(report: tuple) -> None:
-    told, page, _ = report
-    nothing = told["outcome"] == "none"
+    reported, page, _ = report
+    nothing = reported["outcome"] == "none"
     assert ("what follows is what noise and small imperfections of a rig leave" in page.text) == nothing
-    assert any(line.startswith("  where:") for line in summary(told)) != nothing
+    assert any(line.startswith("  where:") for line in summary(reported)) != nothing
 
 
-def test_a_value_of_a_table_is_told_with_its_knot() -> None:
-    told = verdict("named")
+def test_a_value_of_a_table_is_reported_with_its_knot() -> None:
+    reported = verdict("named")
     path = "effect.cubic_spring.stiffness"
-    told["parameters"][path]["at"] = "stretch 0.2 m"
-    assert any(line.startswith(f"  {path} at stretch 0.2 m = ") for line in summary(told))
-    assert any(line.startswith(f"{path} at stretch 0.2 m = ") for line in sections(told)[0].body[1])
+    reported["parameters"][path]["at"] = "extension 0.2 m"
+    assert any(line.startswith(f"  {path} at extension 0.2 m = ") for line in summary(reported))
+    assert any(line.startswith(f"{path} at extension 0.2 m = ") for line in sections(reported)[0].body[1])
 
 
-def test_a_motion_that_is_to_be_driven_faster_says_how_much() -> None:
-    told = verdict("ambiguous")
-    told["experiments"] = [{"drive_ratio": None, "scale": 2.0, "rate": 4.0, "d_prime": 9.0, "text": ""}]
-    table = next(one for one in sections(told) if one.key == "next").body[1]
+def test_a_motion_that_is_to_be_driven_faster_has_its_factor() -> None:
+    reported = verdict("ambiguous")
+    reported["experiments"] = [{"drive_ratio": None, "scale": 2.0, "rate": 4.0, "d_prime": 9.0, "text": ""}]
+    table = next(one for one in sections(reported) if one.key == "next").body[1]
     assert (table.head[0], table.rows) == ("times as fast", [["4", "2", "9"]])
 
 
@@ -328,14 +328,15 @@ def test_the_verdicts_here_have_the_keys_of_those_of_the_workflow(library: Path)
     assert ours.keys() <= real.keys()
     for key in ("gap", "records", "candidates", "parameters"):
         one, other = (
-            told[key] if isinstance(told[key], list) else [*told[key].values()] for told in (ours, real)
+            reported[key] if isinstance(reported[key], list) else [*reported[key].values()]
+            for reported in (ours, real)
         )
         assert one[0].keys() <= other[0].keys(), key
 
 
 def test_the_excess_that_was_removed(report: tuple) -> None:
-    told, page, _ = report
-    gap = told["gap"]["held_out"]
+    reported, page, _ = report
+    gap = reported["gap"]["held_out"]
     removed = (gap["before"] - gap["after"]) / (gap["before"] - 1)
     cell = page.tables["records"][1][4]
     assert (
@@ -345,7 +346,7 @@ def test_the_excess_that_was_removed(report: tuple) -> None:
     )
 
 
-def test_a_verdict_in_part_says_that_a_gap_remains() -> None:
+def test_a_verdict_in_part_reports_the_remaining_gap() -> None:
     for complete in (True, False):
         summary = sections(verdict("named") | {"complete": complete})[0].body[0]
         assert ("a gap remains" in summary) != complete
@@ -353,18 +354,18 @@ def test_a_verdict_in_part_says_that_a_gap_remains() -> None:
 
 
 def test_the_words_fit_the_outcome(report: tuple) -> None:
-    told, page, _ = report
-    said = {
+    reported, page, _ = report
+    expected = {
         "named": "The base machine lacks: cubic spring",
         "ambiguous": "but offset force, offset force with sensor bias would do about as well",
         "none": "No effect is missing that these records could show",
         "not-in-catalogue": "no effect of the catalogue explains it.",
-        "characterised": "on what it depends: memory, or speed and place.",
+        "characterised": "on what it depends: memory, or speed and position.",
     }
-    present = [outcome for outcome, text in said.items() if text in page.text]
-    assert present == [told["outcome"]]
-    assert ("measure the barrier" in page.text) == (told["outcome"] == "ambiguous")
-    for text in (*told["reasons"], *told["notes"], told["where"][0]["text"]):
+    present = [outcome for outcome, text in expected.items() if text in page.text]
+    assert present == [reported["outcome"]]
+    assert ("measure the barrier" in page.text) == (reported["outcome"] == "ambiguous")
+    for text in (*reported["reasons"], *reported["notes"], reported["where"][0]["text"]):
         assert text in page.text
 
 
@@ -403,19 +404,19 @@ def test_without_the_engine_there_is_a_page_and_no_pdf(
 ) -> None:
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     make(tmp_path, "none")
-    said = []
+    stages = []
     html, pdf = write_report(
-        tmp_path, tmp_path / "base.toml", Options(quick=True, progress=lambda *one: said.append(one[0]))
+        tmp_path, tmp_path / "base.toml", Options(quick=True, progress=lambda *one: stages.append(one[0]))
     )
     assert html.is_file()
     assert not pdf.exists()
-    assert any("separatrix[report]" in one for one in said)
+    assert any("separatrix[report]" in one for one in stages)
 
 
 def test_a_function_is_drawn_on_the_first_page_with_its_band(tmp_path: Path) -> None:
-    told = make(tmp_path, "named")
+    reported = make(tmp_path, "named")
     at = np.array([0.0, 1.0, 2.0])
-    told["function"] = {
+    reported["function"] = {
         "effect": "friction_curve", "variable": "speed", "unit": "m/s", "quantity": "friction (N)",
         "text": "friction (N) 1 at 0 m/s to 2 at 2 m/s",
         "parts": [
@@ -428,7 +429,7 @@ def test_a_function_is_drawn_on_the_first_page_with_its_band(tmp_path: Path) -> 
         "tables": [{"at": list(at), "value": list(1 + at)}],
         "closed_forms": {"linear": {"fits": True, "at": list(at), "curve": list(1 + at)}},
     }  # fmt: skip
-    (tmp_path / "verdict.json").write_text(json.dumps(told))
+    (tmp_path / "verdict.json").write_text(json.dumps(reported))
     html, _ = write_report(tmp_path, tmp_path / "base.toml", Options(quick=True))
     text = html.read_text()
     first = text[: text.index('<section id="compared">')]
@@ -436,7 +437,7 @@ def test_a_function_is_drawn_on_the_first_page_with_its_band(tmp_path: Path) -> 
     assert "friction (N) 1 at 0 m/s to 2 at 2 m/s" in first
 
 
-def test_a_record_without_impacts_says_so(tmp_path: Path) -> None:
+def test_a_record_without_impacts_is_reported(tmp_path: Path) -> None:
     make(tmp_path, "named")
     with h5py.File(tmp_path / "details.h5", "a") as file:
         empty = {"impacts": np.zeros((0, 6))}
@@ -465,13 +466,13 @@ def test_maps_before_and_after(
 
     monkeypatch.setattr(comparison, "impact_speeds", kept)
     html, _ = write_report(tmp_path, tmp_path / "base.toml")
-    # half of the drive, as the record says
+    # half of the drive, as the record states
     assert flown == pytest.approx(2 * [0.5 * Model.from_text(CASE).parameters["drive.cosine[1]"].value])
     page = Page(html.read_text())
     assert {"bifurcation", "impact-speeds"} <= {name for name, _ in page.pictures}
 
 
-def test_no_program_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_program_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SEPARATRIX_PROGRAM", str(tmp_path / "absent"))
     make(tmp_path, "named")
     html, _ = write_report(tmp_path, tmp_path / "base.toml")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small imperfections of a rig explain what they cause, and nothing that is larger than they are."""
+"""Small imperfections of a rig explain their own effects and nothing larger."""
 
 from dataclasses import replace
 
@@ -66,7 +66,7 @@ def test_a_curved_sensor_is_no_gap():
     assert base.fit.sample_chi2 > 1.2
     assert gap.fit.sample_chi2 < 1.1
     assert gap.p > 0.01
-    # an exact step of the quadratic model: what is told to remain is what remains
+    # an exact step of the quadratic model: the stated remainder is the real one
     again = cleaned(base.problem, gap.fit)
     assert again.total == pytest.approx(gap.fit.total, abs=0.2 * (base.fit.total - gap.fit.total))
 
@@ -96,14 +96,14 @@ def test_an_effect_is_its_own_as_far_as_it_is_larger_than_faults_of_a_rig():
 
 
 @pytest.mark.parametrize(("gain", "imperfections", "beside", "lead"), [
-    # nothing speaks for imperfections: all of the gain is evidence
+    # without evidence of imperfections all of the gain is evidence
     (20.0, (-12.0, -5.0, -2.0), (1.0, 2.0, 5.0), 20.0),
-    # one effect says with less what sixteen imperfections say too
+    # one effect explains with fewer parameters what sixteen imperfections explain too
     (150.0, (124.0, 120.0, 97.0), (9.0, 20.0, 47.0), 26.0),
-    # the rig has imperfections, which say nearly all that the effect says
+    # the imperfections of the rig explain nearly all that the effect explains
     (11.0, (33.0, 30.0, 21.0), (0.3, 0.8, 2.8), 0.3),
 ])  # fmt: skip
-def test_a_rig_has_faults_or_it_has_none(gain, imperfections, beside, lead):
+def test_a_rig_has_imperfections_or_it_has_none(gain, imperfections, beside, lead):
     """An effect has to beat the better of the two, and may have imperfections beside it itself."""
     contest = Contest(gain, np.array(imperfections), np.array(beside))
     assert contest.lead == pytest.approx(lead)
@@ -113,7 +113,7 @@ def test_a_rig_has_faults_or_it_has_none(gain, imperfections, beside, lead):
     assert more < 0.2 if lead < 1 else more >= 5.0
 
 
-def test_what_is_a_fault_of_the_rig_is_no_effect():
+def test_an_imperfection_of_the_rig_is_no_effect():
     base, _ = fitted_base(drag=0.0, curved=1e-3)
     assert share_with_imperfections(replace(base, fit=cleaned(base.problem, base.fit)), base) < 0.3
 
@@ -136,17 +136,20 @@ def three_records(curved: tuple[float, float, float], drag: float = 0.0) -> tupl
 
 
 def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_number():
-    """Neither where it was fitted nor predicted; the intervals hold what imperfections have moved."""
+    """Neither where it was fitted nor predicted; the intervals include the shift by imperfections."""
     base, prepared = three_records((1e-3, -1e-3, 8e-4))
     fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
     assert fitted.fit.sample_chi2 > 1.5
     assert ceiling(fitted.problem, fitted.fit, 1.0).fit.sample_chi2 < 1.1
     held_out = gather(prepared[2:], 1.0, None)
     known = Known(fitted.fit.values, fitted.covariance, fitted.unseen)
-    told = predict(held_out, base, fitted.problem.free, known)
-    assert told.sample_chi2 > 1.5
-    assert cleaned(told.problem, told.fit).reduced_chi2 > cleaned_prediction(fitted, told).reduced_chi2
-    assert cleaned_prediction(fitted, told).sample_chi2 < 1.15
+    prediction = predict(held_out, base, fitted.problem.free, known)
+    assert prediction.sample_chi2 > 1.5
+    assert (
+        cleaned(prediction.problem, prediction.fit).reduced_chi2
+        > cleaned_prediction(fitted, prediction).reduced_chi2
+    )
+    assert cleaned_prediction(fitted, prediction).sample_chi2 < 1.15
     beside = with_imperfections(fitted.problem, fitted.fit)
     off, narrow = [], []
     for i, one in enumerate(fitted.problem.free):
@@ -159,7 +162,7 @@ def test_a_sensor_that_is_curved_unlike_in_each_record_is_no_gap_and_no_wrong_nu
 
 
 @pytest.mark.parametrize(("curved", "drag"), [(1e-3, 0.0), (0.0, 0.1)])
-def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_explain_it(curved, drag):
+def test_a_better_prediction_counts_only_as_far_as_imperfections_do_not_explain_it(curved, drag):
     base, prepared = three_records((curved, -curved, curved), drag)
     training, held_out = gather(prepared[:2], 1.0, None), gather(prepared[2:], 1.0, None)
     without = fit_base(training, base, 1.0)
@@ -167,11 +170,11 @@ def test_what_is_foretold_better_is_an_effect_only_as_far_as_faults_do_not_expla
     problem = training.problem(found.model, training.last, found.free)
     fit = minimise(problem, values_of(without, found.free), without.fit.starts)
     effect = Fitted(found.names, found.model, problem, fit, found.added)
-    told = [
+    predictions = [
         predict(held_out, one.model, one.problem.free, Known(one.fit.values, one.covariance, one.unseen))
         for one in (effect, without)
     ]
-    _, share = shares_with_imperfections((effect, without), tuple(told))
+    _, share = shares_with_imperfections((effect, without), tuple(predictions))
     assert share > 0.6 if drag else share < 0.2
 
 
@@ -180,8 +183,8 @@ def test_the_evidence_of_faults_of_a_rig_is_that_of_all_records(curved):
     base, prepared = three_records((curved, -curved, curved))
     fitted = fit_base(gather(prepared[:2], 1.0, None), base, 1.0)
     known = Known(fitted.fit.values, fitted.covariance, fitted.unseen)
-    told = predict(gather(prepared[2:], 1.0, None), base, fitted.problem.free, known)
-    evidence = evidence_of_imperfections(fitted, told)
+    prediction = predict(gather(prepared[2:], 1.0, None), base, fitted.problem.free, known)
+    evidence = evidence_of_imperfections(fitted, prediction)
     assert evidence > 100 if curved else evidence < 3
 
 
@@ -197,8 +200,8 @@ def test_whitened_columns_come_back_in_their_units(memory):
     assert found[:, 0] == pytest.approx(table, abs=1e-12)
 
 
-def test_faults_that_are_fitted_are_those_that_are_weighed():
-    """The curve of a sensor about the middle of its record, over its swing, in halves of a thousandth."""
+def test_imperfections_that_are_fitted_are_those_that_are_weighed():
+    """The curve of a sensor about the mean of its record, over its standard deviation, in units of 5e-4."""
     base, _ = fitted_base(drag=0.0, curved=1e-3)
     tables = imperfections_of(base.problem, base.fit, 10.0)
     assert len(tables) == 14
@@ -237,24 +240,24 @@ def test_an_effect_that_faults_hide_is_named_beside_them(drag):
         (one,) = decision.accepted
         assert one.name == "quadratic_drag"
         free, values = one.fitted.problem.free, one.fitted.fit.values
-        place = one.fitted.added[0]
-        error = np.sqrt(one.fitted.covariance[place, place])
-        assert abs(values[place] - drag) < 4 * error
+        index = one.fitted.added[0]
+        error = np.sqrt(one.fitted.covariance[index, index])
+        assert abs(values[index] - drag) < 4 * error
         sizes = {(known.path, known.record): value for known, value in zip(free, values, strict=True)}
         squares = [sizes["nuisance:imperfection_of_rig:curve_2", record] for record in (0, 1)]
         assert squares == pytest.approx([2.4, -2.4], abs=0.6)
         # its own of the held-out record; those of the drive are known from training
-        told = one.prediction.problem.free
-        own = [known for known in told if known.is_fault and known.record is not None]
+        ahead = one.prediction.problem.free
+        own = [known for known in ahead if known.is_imperfection and known.record is not None]
         assert [known.error for known in own] == [1.0, 1.0]
-        shared = [known for known in told if known.is_fault and known.record is None]
+        shared = [known for known in ahead if known.is_imperfection and known.record is None]
         assert [known.error for known in shared] == [None] * 12
         (words,) = in_words(one.fitted)
         assert "curved by up to 0.0012 of the signal" in words or "curved by up to 0.001" in words
         assert in_words(fitted) == []
 
 
-def test_a_fault_that_is_larger_than_faults_are_makes_no_name():
+def test_an_imperfection_beyond_its_largest_size_gives_no_name():
     """A sensor that is curved by four standard deviations: what three leave over is no friction."""
     context, fitted = context_of((2e-3, 2e-3, 2e-3), 0.0)
     beside, decision = decide_with_imperfections(context, fitted)

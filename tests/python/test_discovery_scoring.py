@@ -64,19 +64,19 @@ def test_an_effect_that_few_segments_can_show_pays_without_the_best_of_them():
     """Break-away shows where the body starts: three of 20 segments, which a resampling may all leave out."""
     base = fitted("", np.full(COUNT, 100.0))
     for gains, holds in (([9.0, 8.0, 7.0], True), ([30.0, 0.5, 0.2], False)):
-        parts, told = np.zeros(COUNT), np.full(COUNT, 1e-6)
-        parts[:3], told[:3] = gains, 1.0
+        parts, information = np.zeros(COUNT), np.full(COUNT, 1e-6)
+        parts[:3], information[:3] = gains, 1.0
         one = scored(parts, np.zeros(COUNT))
-        one.fitted.fit.reduced.matrix = told[:, None, None]
+        one.fitted.fit.reduced.matrix = information[:, None, None]
         assert (stable(one, base, OPTIONS) > OPTIONS.inclusion) == holds
         # what is by chance gained elsewhere is no second one
         parts[3:] = 0.2
         one = scored(parts, np.zeros(COUNT))
-        one.fitted.fit.reduced.matrix = told[:, None, None]
+        one.fitted.fit.reduced.matrix = information[:, None, None]
         assert (stable(one, base, OPTIONS) > OPTIONS.inclusion) == holds
 
 
-def test_a_held_out_record_tells_an_effect_by_the_odds_of_a_name():
+def test_a_held_out_record_supports_an_effect_by_the_odds_of_a_name():
     """However much its segments differ: the bounds of so few by resampling are wide."""
     uneven = np.array([2.24, 2.17, 1.86, 1.37, 0.9, 0.4, 0.36, -0.37, -0.62, -0.79, -1.61, -1.66])
     assert held_out_bounds(predicted(uneven, np.ones(12)), OPTIONS)[0][0] < 0
@@ -89,14 +89,14 @@ def test_a_held_out_record_tells_an_effect_by_the_odds_of_a_name():
     # one segment alone may be one of a wrong minimum
     alone = np.array([7.0, *11 * [-0.1]])
     assert not predicts(predicted(alone, np.ones(12)), OPTIONS)
-    # impacts of one speed say nothing of how restitution falls with it; a doubtful effect is not proven so
+    # impacts of one speed have no information on a fall of restitution; a doubtful effect is not proven so
     silent, base = predicted(np.full(12, 0.1), np.ones(12)), fitted("", np.full(COUNT, 100.0))
     assert beyond_doubt(silent, base, OPTIONS)
     assert not beyond_doubt(silent, replace(base, fit=fit(np.full(COUNT, 100.0), decrement=50.0)), OPTIONS)
     assert not beyond_doubt(predicted(np.zeros(12), np.ones(12)), base, OPTIONS)
     silent.training = 5.0
     assert not beyond_doubt(silent, base, OPTIONS)
-    # whose noise is all that tells two machines apart that should predict alike, and whose is not
+    # with and without noise as the only difference of two machines that should predict alike
     noise = np.array([*6 * [1.0], *6 * [-1.0]])
     for offset, information, holds in ((0.0, 1e-3, True), (0.0, 1e3, False), (-0.5, 1e-3, False)):
         one = predicted(noise + offset, np.full(12, information))
@@ -111,7 +111,7 @@ def predicted(gains: np.ndarray, information: np.ndarray) -> ScoredCandidate:
     return one
 
 
-def test_segments_that_say_nothing_of_an_effect_do_not_spoil_its_bounds():
+def test_segments_without_information_on_an_effect_do_not_spoil_its_bounds():
     everywhere, ones = np.repeat([4.0, 6.0], 8), np.ones(16)
     low, high = held_out_bounds(predicted(everywhere, ones), OPTIONS)[0]
     assert 64 <= low < 80 < high <= 96
@@ -121,7 +121,7 @@ def test_segments_that_say_nothing_of_an_effect_do_not_spoil_its_bounds():
     assert held_out_bounds(predicted(quiet, silent), OPTIONS)[0] == (low, high)
     lost = np.concatenate([everywhere, np.zeros(10)])
     assert held_out_bounds(predicted(lost, np.ones(26)), OPTIONS)[0] == (low, high)
-    # one segment that tells, of many: odds of 20 to 1, either way
+    # one informative segment of many: odds of 20 to 1, either way
     for gain, helps in ((50.0, True), (2.9, False), (-50.0, False)):
         one = np.array([gain, *12 * [0.0]])
         low, high = held_out_bounds(predicted(one, np.ones(13)), OPTIONS)[0]
@@ -139,11 +139,11 @@ def contender(name: str, evidence: float) -> ScoredCandidate:
     ("stribeck", 3.1, 1.0, []),
     ("asymmetric_friction", 5.9, 1.0, ["asymmetric_friction"]),
     ("asymmetric_friction", 6.1, 1.0, []),
-    # small imperfections of a rig explain most of what tells them apart
+    # small imperfections of a rig explain most of the difference
     ("stribeck", 20.0, 0.1, ["stribeck"]),
     ("stribeck", 40.0, 0.1, []),
 ])  # fmt: skip
-def test_two_names_of_one_motion_need_more_to_be_told_apart(monkeypatch, other, behind, own, rivals):
+def test_two_names_of_one_motion_need_more_to_be_distinguished(monkeypatch, other, behind, own, rivals):
     monkeypatch.setattr(scoring, "share_with_imperfections", lambda *_: own)
     pool = [contender("offset_force", 50.0), contender(other, 50.0 - behind)]
     best, close = best_of(pool, OPTIONS)
@@ -204,8 +204,8 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
     other = decide._without_name(context, decide.Decision("none", [], [], [], [found], gap, None))
     assert other.outcome == ("none" if gain > 2.5 else outcome)
     (reason,) = given.reasons
-    told = f"{np.sqrt(closable / 1000):.2g} of that of a sample (root mean square), p = {p:.2g}"
-    assert (told in reason) == (outcome == "none")
+    text = f"{np.sqrt(closable / 1000):.2g} of that of a sample (root mean square), p = {p:.2g}"
+    assert (text in reason) == (outcome == "none")
 
 
 @pytest.mark.parametrize(("name", "also", "two"), [
@@ -245,10 +245,10 @@ def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, predic
 def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, left, named):
     """It has the freedom to follow the fitted ones where the missing force is no function at all."""
     one = scored(np.full(COUNT, 5.0), np.ones(COUNT))
-    told = Prediction(None, None, None, None, left[0], 1.0, None)
-    one = replace(one, prediction=told)
+    prediction = Prediction(None, None, None, None, left[0], 1.0, None)
+    one = replace(one, prediction=prediction)
     monkeypatch.setattr(decide, "cleaned_prediction", lambda *_: left[1])
-    monkeypatch.setattr(decide, "misses", lambda told, *_: told.fit > 1.1)
+    monkeypatch.setattr(decide, "misses", lambda prediction, *_: prediction.fit > 1.1)
     monkeypatch.setattr(decide, "_shaped", lambda *_: (one, []))
     monkeypatch.setattr(
         decide, "conclude", lambda context, decision, best, rivals: replace(decision, accepted=[best])
@@ -284,7 +284,7 @@ def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatc
     monkeypatch.setattr(flexible, "fit_member", lambda *_: next(made))
     member = SimpleNamespace(seen=lambda _: None, values=("force",), knots="", effect="friction_curve")
     found = SimpleNamespace(base=base, scored=[], predicted=None)
-    found.score = lambda one, told: ScoredCandidate(
+    found.score = lambda one, _: ScoredCandidate(
         one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3
     )
     context = SimpleNamespace(options=OPTIONS, training=None, predict=lambda *_: None)
@@ -350,7 +350,9 @@ def test_a_kink_from_where_little_of_the_gain_is_missing_is_the_end_of_a_fit(
 
 
 @pytest.mark.parametrize(("training", "rivals"), [(-10.0, ["viscous"]), (-2.0, []), (5.0, [])])
-def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(monkeypatch, training, rivals):
+def test_a_name_that_the_fitted_records_clearly_contradict_is_not_distinguished(
+    monkeypatch, training, rivals
+):
     """As of two drags of which one is 10 ahead where it was fitted, the other 20 where it was predicted."""
     monkeypatch.setattr(scoring, "share_with_imperfections", lambda *_: 1.0)
     monkeypatch.setattr(scoring, "ahead", lambda one, other: 20.0)
@@ -365,9 +367,9 @@ def test_a_name_that_the_fitted_records_clearly_contradict_is_not_told_apart(mon
 
 @pytest.mark.parametrize("better", [80.0, 20.0])
 def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better):
-    """What a set is held against must not be in a local minimum in a minimum that the set left."""
+    """A set must not be compared with a machine in a minimum that the set left."""
     alone = [contender("second_barrier", 50.0), contender("sensor_gain", 40.0), contender("viscous", 30.0)]
-    warm_started = contender("second_barrier", better)
+    led = contender("second_barrier", better)
     names = ("second_barrier", "sensor_gain")
     whole = replace(alone[0], fitted=replace(alone[0].fitted, names=names))
     first = SimpleNamespace(base=None, predicted=None, scored=list(alone), rank=lambda: None)
@@ -375,14 +377,14 @@ def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better
 
     def warm_started_by(data, one, other):
         asked.append(one.names)
-        return warm_started.fitted if one.names == warm_started.fitted.names else one
+        return led.fitted if one.names == led.fitted.names else one
 
     monkeypatch.setattr(several, "warm_started_by", warm_started_by)
-    monkeypatch.setattr(several, "scored", lambda *_: warm_started)
+    monkeypatch.setattr(several, "scored", lambda *_: led)
     context = SimpleNamespace(training=None, predict=lambda *_: None)
     part = several._warm_started_by(context, first, whole, alone[0])
     assert asked == [("second_barrier",), ("sensor_gain",)]
-    assert part is (warm_started if better > 50 else alone[0])
+    assert part is (led if better > 50 else alone[0])
     assert first.scored == [part, *alone[1:]]
 
 
@@ -392,7 +394,7 @@ def test_an_effect_alone_follows_the_set_that_closes_the_gap(monkeypatch, better
     # imperfections of the rig explain what it does
     (1e-3, 79.0, False),
 ])  # fmt: skip
-def test_an_effect_of_a_set_is_needed_where_held_out_records_can_say_nothing_of_it(
+def test_an_effect_of_a_set_is_needed_where_held_out_records_have_no_information(
     monkeypatch, information, imperfections, needed
 ):
     """As of restitution in impacts of one speed, which noise makes 0.5 worse there."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What sensors and clocks do to a record is told with its row, and is not mistaken for motion."""
+"""Artefacts of sensors and clocks are reported with their rows and not mistaken for motion."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_a_stray_sample_in_fast_motion_is_left_out(size):
         )
 
 
-def test_impacts_pulses_and_rest_are_no_faults():
+def test_impacts_pulses_and_rest_are_no_artefacts():
     t, x = bouncing()
     # a burst of a force at the limit of what is sampled
     shaken = x + 1e-4 * np.cos(2.2 * np.arange(t.size)) * (np.abs(t - 2) < 0.03)
@@ -151,7 +151,7 @@ def test_stamps_that_a_mostly_quiet_motion_follows_stay(quiet):
 def test_a_record_of_gaps_alone_is_refused():
     t, x = bouncing(400)
     rows = np.flatnonzero(np.arange(t.size) % 10 < 8)
-    with pytest.raises(SeparatrixError, match="row 9: gaps leave 0 samples in stretches of at least 12"):
+    with pytest.raises(SeparatrixError, match="row 9: gaps leave 0 samples in intervals of at least 12"):
         of(t[rows], x[rows])
 
 

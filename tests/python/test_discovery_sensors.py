@@ -53,9 +53,9 @@ def test_x_and_v_are_of_the_watched_body_also_beside_named_columns(columns, foun
         for name, kind in (("x.second", "x"), ("v.second", "v")):
             if kind in columns:
                 assert np.array_equal(prepared.sensor(name).values, getattr(one, kind))
-        assert prepared.place == ("second" if "x" in columns else "first")
-        assert np.array_equal(prepared.sensor(f"x.{prepared.place}").values, one.x)
-    # that there is a place to follow
+        assert prepared.observed == ("second" if "x" in columns else "first")
+        assert np.array_equal(prepared.sensor(f"x.{prepared.observed}").values, one.x)
+    # so that there is a position to follow
     assert gather_sensed([prepared], 1.0, None, model).last == 2
 
 
@@ -66,7 +66,7 @@ def test_a_body_with_two_columns_of_a_kind_is_refused(kind):
         prepare_sensors(record(**columns), Model.from_text(SPRINGS))
 
 
-def test_x_beside_a_named_place_is_tested_for_clipping():
+def test_x_beside_a_named_position_is_tested_for_clipping():
     with pytest.raises(SeparatrixError, match="x stays at its largest value 0.8 m .* clipped"):
         make_record("record", {"t": T, "x.first": OTHER, "x": np.minimum(X, 0.8)}, {"units": "t s, x m"})
 
@@ -123,6 +123,6 @@ def test_the_error_of_a_crank_angle_counts_in_the_fit():
         (10 * T, RATE, "8.6 samples per drive period, at least 12 are needed"),
     ],
 )
-def test_an_angle_that_tells_no_drive_is_refused(t, rate, words):
+def test_an_angle_that_determines_no_drive_is_refused(t, rate, words):
     with pytest.raises(SeparatrixError, match=f"turned: .*{words}"):
         prepare_sensors(turned(t, rate), Model.from_text(SPRINGS))

@@ -115,8 +115,8 @@ def test_a_gap_that_is_closed_but_for_a_hundredth_is_adequate_whatever_the_rest_
     assert not adequate(candidate(training=1e5, left=28_000, samples=20_000), Options())
 
 
-def test_noise_that_is_larger_than_it_was_said_to_be_is_no_gap():
-    """As velocities of a sensor that is not quite linear: no force explains what is left."""
+def test_noise_larger_than_stated_is_no_gap():
+    """As velocities of a slightly nonlinear sensor: no force explains the remainder."""
     assert adequate(candidate(training=512, left=400, samples=2400, p=0.02), Options())
     assert not adequate(candidate(training=512, left=400, samples=2400, p=1e-3), Options())
     assert not adequate(candidate(training=512, left=3000, samples=2400, p=0.02), Options())
@@ -140,30 +140,30 @@ def test_what_is_far_below_the_noise_of_a_sample_is_no_gap():
 
 
 @pytest.mark.parametrize(
-    ("speed", "place", "pieces", "mostly"),
+    ("speed", "position", "pieces", "mostly"),
     # p of gains as large is 0 for all of them
     [(2e3, 1.5e5, 1.6e5, "position"), (2e3, 1.5e3, 1.6e5, ""), (90, 30, 60, "speed")],
 )
-def test_what_a_force_depends_on_is_what_explains_most(speed, place, pieces, mostly):
-    gains = {"speed": speed, "position": place, "pieces": pieces}
+def test_what_a_force_depends_on_is_what_explains_most(speed, position, pieces, mostly):
+    gains = {"speed": speed, "position": position, "pieces": pieces}
     families = [Family(name, gain, 5, float(chi2.sf(gain, 5))) for name, gain in gains.items()]
     assert Ceiling(families, None).mostly == mostly
 
 
-def test_a_law_that_leaves_more_than_noise_says_that_its_errors_count_noise_alone():
-    def said(leaves: str, beside: bool) -> list[str]:
+def test_a_note_states_that_errors_count_noise_alone_where_a_law_leaves_more():
+    def notes(leaves: str, beside: bool) -> list[str]:
         left = SimpleNamespace(fit=SimpleNamespace(sample_chi2=1.44))
-        told = SimpleNamespace(with_imperfections=beside)
-        return _of_accepted(SimpleNamespace(leaves=leaves, name="viscous", ceiling=left, prediction=told))
+        ahead = SimpleNamespace(with_imperfections=beside)
+        return _of_accepted(SimpleNamespace(leaves=leaves, name="viscous", ceiling=left, prediction=ahead))
 
-    assert said(NOISE, False) == []
-    assert "errors of parameters count noise alone" in said(LITTLE, False)[0]
-    assert "1.2 times as large" in said(LARGER_NOISE, False)[0]
-    (note,) = said(NOISE, True)
+    assert notes(NOISE, False) == []
+    assert "errors of parameters count noise alone" in notes(LITTLE, False)[0]
+    assert "1.2 times as large" in notes(LARGER_NOISE, False)[0]
+    (note,) = notes(NOISE, True)
     assert "beside small imperfections of the rig" in note
 
 
-def test_a_function_is_told_with_its_hump():
+def test_a_function_is_reported_with_its_hump():
     none = np.zeros((5, 5))
     member = next(one for one in MEMBERS if one.effect == "friction_position_curve")
     at = np.linspace(-0.02, 0.02, 5)
@@ -178,9 +178,9 @@ def test_a_function_is_told_with_its_hump():
     assert hump([0.06, 0.07, 0.096, 0.07, 0.059], 0.02) == ""
 
 
-def test_what_remains_is_told_in_words():
-    said = Remains("training", 0.99994, 0.37, "velocity").text()
-    assert said == (
+def test_the_remainder_is_reported_in_words():
+    text = Remains("training", 0.99994, 0.37, "velocity").text()
+    assert text == (
         "in training, 99.994 % of the gap is closed; what remains is 0.37 times the noise of a sample, "
         "mostly a force that depends on velocity"
     )
@@ -210,11 +210,11 @@ def test_a_noisy_crank_angle_is_fitted_within_its_error(noise):
     values = problem.values
     starts = np.column_stack([one.record.x[first], np.zeros(first.size)])
     off = values.copy()
-    place = [each.path for each in free].index("nuisance:phase")
-    off[place] = 3 * one.phase_error
+    index = [each.path for each in free].index("nuisance:phase")
+    off[index] = 3 * one.phase_error
     # three errors cost 9 of chi^2, shared among the segments
-    column = problem.channels * 100 + [k for k, each in enumerate(free) if each.error].index(place)
+    column = problem.channels * 100 + [k for k, each in enumerate(free) if each.error].index(index)
     found = problem.evaluate(off, starts)
     assert np.sum(found.used * found.residual**2, axis=0)[column] == pytest.approx(9)
     assert found.used[:, column].sum() == pytest.approx(1)
-    assert np.all(found.by_parameter[:, column, place] == 1 / one.phase_error)
+    assert np.all(found.by_parameter[:, column, index] == 1 / one.phase_error)

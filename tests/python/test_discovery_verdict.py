@@ -56,7 +56,7 @@ def asked(folder: Path, made: list[Path], out: str, *more: str) -> dict:
     return json.loads((folder / out / "verdict.json").read_text())
 
 
-def test_a_hidden_effect_is_named_added_and_foretells(separatrix, tmp_path):
+def test_a_hidden_effect_is_named_added_and_predicts(separatrix, tmp_path):
     made = records(separatrix, tmp_path, "[effect.viscous]\ndamping = 0.3\n")
     few = ("--effects", "viscous,restitution_slope,offset_force,drive_ripple")
     verdict = asked(tmp_path, made, "out", *few)
@@ -133,7 +133,7 @@ def test_a_part_is_named_where_more_is_missing(separatrix, tmp_path):
     assert (tmp_path / "out" / "extended.toml").exists()
 
 
-def test_a_parameter_at_its_bound_has_no_interval_and_the_report_says_so(monkeypatch):
+def test_a_parameter_at_its_bound_is_reported_without_an_interval(monkeypatch):
     monkeypatch.setattr(
         verdict, "with_imperfections", lambda *_: SimpleNamespace(errors=np.array([0.0, 0.5]))
     )
@@ -171,6 +171,6 @@ def test_a_fit_worse_than_the_machine_that_it_contains_is_not_called_converged()
         names=("viscous",), fit=fit, problem=SimpleNamespace(free=free), added=(0,), tries=1
     )
     scored = SimpleNamespace(name="viscous", fitted=fitted, held_out=0.0, evidence=0.0, imperfections=None)
-    told = {gain: _candidate(SimpleNamespace(**vars(scored), training=gain)) for gain in (-0.5, -400.0)}
-    assert told[-0.5]["converged"]
-    assert not told[-400.0]["converged"]
+    entries = {gain: _candidate(SimpleNamespace(**vars(scored), training=gain)) for gain in (-0.5, -400.0)}
+    assert entries[-0.5]["converged"]
+    assert not entries[-400.0]["converged"]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a gap is: the map of what the missing force depends on is told, not those that go along with it."""
+"""Where a gap is: the map over the variable of the missing force is reported, not correlated ones."""
 
 import pytest
 from separatrix.discovery import Options
@@ -14,8 +14,8 @@ from separatrix.library import Model
 pytestmark = pytest.mark.usefixtures("library")
 
 
-def told_of(folder, records, drawn, louder: float = 1.0) -> list[dict]:
-    """What is told of where the gap of a case of the generator is, noise said to be so much `louder`."""
+def regions(folder, records, drawn, louder: float = 1.0) -> list[dict]:
+    """Reported regions of the gap of a case of the generator, with stated noise that is `louder`."""
     case = folder / "case"
     records.write_case(case, folder / "truth.json", drawn)
     base = Model.read(case / records.BASE)
@@ -36,9 +36,9 @@ def test_the_clearest_region_of_a_drag_is_one_of_the_speed(source_dir, tmp_path,
     import records
     from design import draw
 
-    told = told_of(tmp_path, records, draw(5101, 25))
-    assert {one["map"] for one in told} <= {"velocity", "position and velocity"}
-    assert told
+    found = regions(tmp_path, records, draw(5101, 25))
+    assert {one["map"] for one in found} <= {"velocity", "position and velocity"}
+    assert found
 
 
 def test_a_loss_that_grows_with_the_speed_of_impacts_is_missing_at_impacts(source_dir, tmp_path, monkeypatch):
@@ -47,16 +47,16 @@ def test_a_loss_that_grows_with_the_speed_of_impacts_is_missing_at_impacts(sourc
     import records
     from design import draw
 
-    told = told_of(tmp_path, records, draw(5202, 0))
-    assert {one["map"] for one in told} == {"impact speed"}
-    assert all(one["text"].startswith("a speed after impacts of") for one in told)
+    found = regions(tmp_path, records, draw(5202, 0))
+    assert {one["map"] for one in found} == {"impact speed"}
+    assert all(one["text"].startswith("a speed after impacts of") for one in found)
 
 
-def test_nothing_is_told_where_the_noise_explains_all(source_dir, tmp_path, monkeypatch):
+def test_nothing_is_reported_where_the_noise_explains_all(source_dir, tmp_path, monkeypatch):
     """No map explains more than its bins: the best of none was asked for."""
     monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
     monkeypatch.syspath_prepend(str(source_dir / "scripts"))
     import records
     from design import draw
 
-    assert told_of(tmp_path, records, draw(5101, 25), louder=1e4) == []
+    assert regions(tmp_path, records, draw(5101, 25), louder=1e4) == []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The site: every code block of its teaching pages runs and prints what it says."""
+"""The site: every code block of its teaching pages runs and prints what it states."""
 
 import re
 import runpy
@@ -37,7 +37,7 @@ def test_the_code_of_a_page_runs(
 
 
 @pytest.mark.parametrize("page", TEACHING, ids=lambda page: page.stem)
-def test_the_blocks_of_a_page_say_what_they_are(page: Path) -> None:
+def test_the_blocks_of_a_page_name_their_language(page: Path) -> None:
     """A block that no test runs has to be asked for."""
     found = blocks(page)
     assert {language for language, _ in found} - {"{toctree}", ""} <= LANGUAGES
@@ -122,8 +122,8 @@ def test_links_between_documents_lead_somewhere() -> None:
     assert dead == []
 
 
-def test_the_links_of_a_site_are_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A missing page, a missing name and what is loaded from outside are told, the rest is not."""
+def test_the_links_of_a_site_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A missing page, a missing name and what is loaded from outside are reported, the rest is not."""
     monkeypatch.syspath_prepend(str(DOCS.parent / "scripts"))
     from docs_pages.links import problems
 

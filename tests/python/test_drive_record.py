@@ -83,20 +83,20 @@ def test_one_file_has_one_period(separatrix, tmp_path):
 
 
 def test_what_is_refused(separatrix, tmp_path):
-    """What the harmonics leave is told; a record is not beside a series, and has to be there."""
+    """What the harmonics leave is reported; a record is not beside a series, and has to be there."""
     _write(tmp_path, np.where(np.arange(SAMPLES) == 3, 1.0, 0.0))
 
-    def said(drive):
+    def refusal(drive):
         (tmp_path / "case.toml").write_text(CASE.format(drive=drive))
         outcome = run(separatrix, "trajectory", "case.toml", "--force", folder=tmp_path)
         assert outcome.code in (65, 66)
         return outcome.err
 
-    assert "'drive.shaker.record': found a record of which 32 harmonics leave 4" in said(
+    assert "'drive.shaker.record': found a record of which 32 harmonics leave 4" in refusal(
         'record = "force.csv"'
     )
-    assert "'drive.shaker.mean': found beside a record" in said('record = "force.csv"\nmean = 1')
-    assert "nowhere.csv" in said('record = "nowhere.csv"')
+    assert "'drive.shaker.mean': found beside a record" in refusal('record = "force.csv"\nmean = 1')
+    assert "nowhere.csv" in refusal('record = "nowhere.csv"')
     # decimal commas make more columns, which were read as other numbers
     for row, expected in (
         ("1,1,5", "found 3 values in '1,1,5', allowed 2 like the header"),
@@ -105,7 +105,7 @@ def test_what_is_refused(separatrix, tmp_path):
         ("1,1-5", "found '1-5', allowed a finite number"),
     ):
         (tmp_path / "force.csv").write_text(f"t,force\n0,0\n{row}\n2,2\n")
-        assert f"force.csv:3: {expected}" in said('record = "force.csv"')
+        assert f"force.csv:3: {expected}" in refusal('record = "force.csv"')
     _write(tmp_path, np.where(np.arange(SAMPLES) == 3, 1.0, 0.0))
     (tmp_path / "case.toml").write_text(CASE.format(drive='record = "force.csv"\nharmonics = 8'))
     succeed(separatrix, "trajectory", "case.toml", "--force", folder=tmp_path)

@@ -66,7 +66,7 @@ def test_measured_force_drives_what_it_was_measured_on(separatrix, tmp_path):
 
 
 def test_samples_of_a_force_repeat_as_one_period(separatrix, tmp_path):
-    """The first sample follows the last, which is said; one that ends with its last jumps, and is stated."""
+    """Reported: the first sample follows the last, or the period ends with the last sample and jumps."""
     samples = [round(float(x), 12) for x in np.cos(2 * np.pi * np.arange(20) / 20)]
     text = (
         "[body]\nmass = 1\n[restoring]\nlaw = 'linear'\nstiffness = 4\n"
@@ -79,11 +79,11 @@ def test_samples_of_a_force_repeat_as_one_period(separatrix, tmp_path):
         ("periodic", 40, [], False),
     ):
         (tmp_path / "case.toml").write_text(text.format(duration))
-        said = succeed(
+        output = succeed(
             separatrix, "trajectory", "case.toml", *settings, "-o", f"{name}.h5", folder=tmp_path
         ).out
-        assert ("say so: drive.periodic = 1" in said) == warned
-        assert ("assumed: drive.periodic = 1 (the first sample follows the last: period 2.0" in said) == (
+        assert ("set drive.periodic = 1" in output) == warned
+        assert ("assumed: drive.periodic = 1 (the first sample follows the last: period 2.0" in output) == (
             not settings
         )
     with h5py.File(tmp_path / "longer.h5") as file:
@@ -91,8 +91,8 @@ def test_samples_of_a_force_repeat_as_one_period(separatrix, tmp_path):
     with h5py.File(tmp_path / "periodic.h5") as file:
         assert file.attrs["drive_period"] == pytest.approx(2.0)
         # a chain of straight lines instead of a cosine has (sin(pi/20)/(pi/20))^2 of its amplitude
-        swing = (np.sin(np.pi / 20) / (np.pi / 20)) ** 2 / np.hypot(4 - np.pi**2, 0.5 * np.pi)
-        assert file.attrs["amplitude"] == pytest.approx(swing, rel=2e-3)
+        expected = (np.sin(np.pi / 20) / (np.pi / 20)) ** 2 / np.hypot(4 - np.pi**2, 0.5 * np.pi)
+        assert file.attrs["amplitude"] == pytest.approx(expected, rel=2e-3)
 
 
 def test_maps_over_an_effect(separatrix, tmp_path):
@@ -125,7 +125,7 @@ def names_in(cell):
     return cell.split("`")[1::2]
 
 
-def test_laws_tell_the_effects(separatrix, tmp_path):
+def test_laws_list_the_effects(separatrix, tmp_path):
     """Names, units and defaults that the discovery workflow takes from the table; the guide has them all."""
     rows = json.loads(run(separatrix, "laws", "--json", folder=tmp_path).out)
     effects = {

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures: what they show is what the file says."""
+"""Figures: they show what the file states."""
 
 import re
 from pathlib import Path
@@ -99,9 +99,9 @@ def test_the_phase_portrait_jumps_at_each_impact_of_the_window(tmp_path: Path) -
     assert len(jumps) == 3
     breaks = np.flatnonzero(np.isnan(x))
     assert len(breaks) == 3
-    for place, (position, before, after) in zip(breaks, jumps, strict=True):
-        assert (x[place - 1], v[place - 1]) == (position, before)
-        assert (x[place + 1], v[place + 1]) == (position, after)
+    for index, (position, before, after) in zip(breaks, jumps, strict=True):
+        assert (x[index - 1], v[index - 1]) == (position, before)
+        assert (x[index + 1], v[index + 1]) == (position, after)
     # no piece of the path crosses from one side of an impact to the other
     assert np.nanmax(np.abs(np.diff(v))) < 0.1
 
@@ -159,7 +159,7 @@ def test_every_kind_gives_png_and_pdf(tmp_path: Path, kind: str, capsys: pytest.
 
 
 @pytest.mark.parametrize("kind", list(WRITERS))
-def test_figures_say_what_they_show(tmp_path: Path, kind: str) -> None:
+def test_figures_name_what_they_show(tmp_path: Path, kind: str) -> None:
     path = WRITERS[kind](tmp_path / f"{kind}.h5")
     with style.context(), open_result(path) as result:
         made = cli._figures(path, result, None, "The title", Look())

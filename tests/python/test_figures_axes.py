@@ -189,8 +189,8 @@ def test_panels_of_a_figure_lie_beside_each_other(made: Callable, library: Path)
         ax.set_title(letter, loc="left")
     figure.canvas.draw()
     boxes = [ax.get_tightbbox() for ax in figure.axes]
-    for place, box in enumerate(boxes):
-        assert all(box.width * box.height > 0 and not box.overlaps(other) for other in boxes[:place])
+    for index, box in enumerate(boxes):
+        assert all(box.width * box.height > 0 and not box.overlaps(other) for other in boxes[:index])
         assert 0 <= box.x0 < box.x1 <= figure.bbox.x1 and 0 <= box.y0 < box.y1 <= figure.bbox.y1
     assert figure.axes[4].get_position().x0 > axes[1, 1].get_position().x1
     for ax in axes[0]:
@@ -264,7 +264,7 @@ def test_points_of_the_section_lie_on_the_motion(library: Path, source_dir: Path
 
 
 def test_a_section_is_at_the_nearest_sampled_phase(library: Path, source_dir: Path) -> None:
-    """The phase is that of the drive, whatever the crank angle of the start; the caption says it."""
+    """The phase is that of the drive, whatever the crank angle of the start; the caption names it."""
     motion = strange(source_dir, 60, samples=4)
     quarter = np.column_stack([motion.x, motion.v])[1::4]
     for angle in (1.5, 1.5 - 2 * np.pi, 1.4):

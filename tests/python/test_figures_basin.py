@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures of maps: every point at its place in its colour, reduced or not."""
+"""Figures of maps: every point at its position in its colour, reduced or not."""
 
 import re
 import tracemalloc
@@ -19,7 +19,7 @@ from separatrix.labels import share_texts
 
 @pytest.mark.parametrize("order", [("x0", "v0"), pytest.param(("v0", "x0"), marks=pytest.mark.long)])
 @pytest.mark.parametrize("descending", [pytest.param(False, marks=pytest.mark.long), True])
-def test_each_point_has_its_colour_at_its_place(tmp_path: Path, order: tuple, descending: bool) -> None:
+def test_each_point_has_its_colour_at_its_position(tmp_path: Path, order: tuple, descending: bool) -> None:
     axes = {"x0": X0[::-1] if descending else X0, "v0": V0}
     attractor = np.random.default_rng(3).integers(1, 4, (7, 4))
     shown = attractor if order == ("x0", "v0") else attractor.T
@@ -40,15 +40,15 @@ def test_cells_reach_half_way_to_their_neighbours(tmp_path: Path) -> None:
     assert figure.axes[0].get_ylim() == pytest.approx((-8.0, 8.0))
 
 
-def test_a_reduced_map_keeps_places_and_extent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reduced_map_keeps_positions_and_extent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(basin, "majority_plane", lambda *a: reduce.majority_plane(*a, target=10))
     x, v = np.linspace(0, 1, 41), np.linspace(0, 2, 23)
     attractor = np.where(x[:, None] + 0 * v > 0.6, 2, 1)
     attractor[:, v > 1.5] = 3
     figure = draw(write_basin(tmp_path / "b.h5", {"x0": x, "v0": v}, attractor, regime_of=(0, 1, 2, 3)))
     assert figure.axes[0].get_xlim() == pytest.approx((-0.0125, 1.0125))
-    for place, identity in (((0.2, 0.5), 1), ((0.9, 0.5), 2), ((0.2, 1.9), 3), ((0.99, 1.95), 3)):
-        assert colour_at(figure, *place) == pytest.approx(to_rgb(style.ATTRACTORS[identity - 1]), abs=0.01)
+    for point, identity in (((0.2, 0.5), 1), ((0.9, 0.5), 2), ((0.2, 1.9), 3), ((0.99, 1.95), 3)):
+        assert colour_at(figure, *point) == pytest.approx(to_rgb(style.ATTRACTORS[identity - 1]), abs=0.01)
     assert "5 by 3 points" in figure.separatrix_caption
 
 
@@ -64,7 +64,7 @@ def test_panels_show_their_own_slice(tmp_path: Path) -> None:
     assert colours[0] == colours[2] == pytest.approx(to_rgb(style.ATTRACTORS[0]), abs=0.01)
 
 
-def test_too_many_slices_are_thinned_and_said(tmp_path: Path) -> None:
+def test_too_many_slices_are_thinned_and_reported(tmp_path: Path) -> None:
     axes = {"x0": X0, "v0": V0, "drive_ratio": np.linspace(1, 2, 5), "crank_angle": np.linspace(0, 6, 5)}
     figure = draw(write_basin(tmp_path / "b.h5", axes, np.ones((7, 4, 5, 5), int)))
     assert len(figure.axes) == basin.MOST_PANELS

@@ -355,9 +355,9 @@ def test_wishes_that_make_no_sense_are_one_line(
 ) -> None:
     path, _ = stack(tmp_path / "b.h5")
     assert cli.main([str(path), "-o", str(tmp_path / "out"), *options]) == 64
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert message in output
+    assert output.count("\n") == 1
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
 
@@ -422,7 +422,7 @@ def test_two_maps_are_compared_point_by_point(tmp_path: Path, capsys: pytest.Cap
 
 @pytest.mark.parametrize(("units", "force"), [(("m", "m/s"), "N"), (("rad", "rad/s"), "N m")])
 def test_contacts_of_an_angle_have_its_units(units: tuple[str, str], force: str) -> None:
-    """Penetration, speed and force as the file has them; those asked for take the place of their own kind."""
+    """Penetration, speed and force as the file has them; those asked for replace their own kind."""
     t = np.arange(400) / 100
     values = {"x": (np.sin(9 * t), units[0]), "v": (9 * np.cos(9 * t), units[1])}
     values["contact_force"] = (-np.maximum(np.sin(9 * t) - 0.5, 0), force)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What captions say about machines of several bodies and structures."""
+"""Captions of machines of several bodies and structures."""
 
 from pathlib import Path
 
@@ -19,17 +19,17 @@ def pieces_of(case: sx.Case, axes: frozenset = frozenset()) -> list[str]:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_every_number_and_every_end_of_a_part_is_told(source_dir: Path, library: Path, name: str) -> None:
+def test_every_number_and_every_end_of_a_part_is_named(source_dir: Path, library: Path, name: str) -> None:
     """Nothing that differs from zero is left out, and no joint without what it joins."""
     case = sx.load(source_dir / "examples" / f"{name}.toml")
-    told = pieces_of(case)
+    pieces = pieces_of(case)
     for family in FAMILIES:
         for part, keys in case.resolved.get(family, {}).items():
             if not isinstance(keys, dict):
                 continue
             (mine,) = [
                 piece
-                for piece in told
+                for piece in pieces
                 if piece.split(" (")[0].split(":")[0] == (part if family == "body" else f"{family} {part}")
             ]
             for key, value in keys.items():
@@ -38,7 +38,7 @@ def test_every_number_and_every_end_of_a_part_is_told(source_dir: Path, library:
                         assert one in mine, (part, key)
                     if isinstance(one, float) and one != 0 and abs(one) < 1e300 and key != "damping_ratio":
                         assert f"{one:.6g}" in mine, (part, key)
-    assert told[-1] == f"$x$, $v$: {case.resolved['watch']['body']}"
+    assert pieces[-1] == f"$x$, $v$: {case.resolved['watch']['body']}"
 
 
 def test_units_zeros_axes_and_long_lists() -> None:

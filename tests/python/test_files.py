@@ -139,15 +139,15 @@ def test_a_value_of_a_map_is_that_of_its_start(separatrix, tmp_path, results, ki
         data.load()
     shape = data["regime"].shape
     random = np.random.default_rng(1)
-    places = [tuple(int(random.integers(n)) for n in shape) for _ in range(6)]
+    indices = [tuple(int(random.integers(n)) for n in shape) for _ in range(6)]
     seen = set()
-    for i, place in enumerate(places):
-        point = data.isel(dict(zip(data["regime"].dims, place, strict=True)))
+    for i, index in enumerate(indices):
+        point = data.isel(dict(zip(data["regime"].dims, index, strict=True)))
         options = [f"start.x0={float(point['x0'])!r}", f"start.v0={float(point['v0'])!r}"]
         if "drive_ratio" in point.coords:
             options.append(f"drive.ratio={float(point['drive_ratio'])!r}")
         options = [word for option in options for word in ("--set", option)]
-        # Long enough to be on the attractor, which the map says it is.
+        # Long enough to be on the attractor that the map names.
         command = ["trajectory", "case.toml", *options, "--set", "run.duration=120", "-o", f"{i}.h5"]
         succeed(separatrix, *command, folder=tmp_path)
         with h5py.File(tmp_path / f"{i}.h5") as file:
@@ -284,10 +284,10 @@ def test_verify_names_a_dataset_with_a_flipped_byte(separatrix, tmp_path, result
     path = tmp_path / "file.h5"
     shutil.copy(results["map"], path)
     with h5py.File(path) as file:
-        place = file["v_max"].id.get_offset()
+        offset = file["v_max"].id.get_offset()
         size = file["v_max"].nbytes
     content = bytearray(path.read_bytes())
-    content[place + size // 2] ^= 1
+    content[offset + size // 2] ^= 1
     path.write_bytes(content)
     outcome = run(separatrix, "verify", "file.h5", folder=tmp_path)
     assert (outcome.code, outcome.out) == (74, "")

@@ -297,8 +297,8 @@ def test_faults_of_a_rig_are_small_and_in_half_of_the_cases(generator):
     one = case.training[0]
     clean = one.observe(one.driven(case.machine), one.states(one.driven(case.machine))[0])[:, 0]
     case.rig = {"crank_noise": 1e-3, "curved": 1e-3, "cubic": -1e-3, "harmonics": 1e-3}
-    driven, faults = records.with_imperfections(case, one)
-    one.sensor = {**one.sensor, **faults}
+    driven, imperfections = records.with_imperfections(case, one)
+    one.sensor = {**one.sensor, **imperfections}
     seen = one.observe(driven, one.states(driven)[0])[:, 0]
     change = np.median(np.abs(seen - clean)) / clean.std()
     assert 1e-4 < change < 0.05

@@ -81,7 +81,7 @@ def test_a_run_that_was_given_up_is_an_error(name: str, separatrix: Path, folder
 
 
 @pytest.mark.parametrize("name", [*WRITTEN, "boundary"])
-def test_what_reads_such_a_file_says_so(name: str, separatrix: Path, folder: Path, capsys) -> None:
+def test_what_reads_such_a_file_reports_it(name: str, separatrix: Path, folder: Path, capsys) -> None:
     """`verify`, `boundary` and the figures end with the same code, unless they are asked to go on."""
     if name == "boundary":
         assert run(separatrix, "boundary", "basin.h5", folder=folder).code == 78
@@ -110,10 +110,10 @@ def test_some_given_up_points_are_counted(separatrix: Path, folder: Path) -> Non
 
 
 def test_a_motion_that_leaves_the_domain_was_not_given_up(separatrix: Path, folder: Path) -> None:
-    """That it leaves is what was asked: `run.domain` says where."""
+    """That it leaves is what was asked: `run.domain` gives the bounds."""
     settings = ["--set", "integrator.event_budget=1000", "--set", "run.domain=0.01"]
-    said = succeed(separatrix, "trajectory", "case.toml", *settings, "-o", "left.h5", folder=folder).out
-    assert "ended before the end: left_domain" in said
+    output = succeed(separatrix, "trajectory", "case.toml", *settings, "-o", "left.h5", folder=folder).out
+    assert "ended before the end: left_domain" in output
 
 
 def test_python_raises_with_what_there_is(library: Path, folder: Path) -> None:

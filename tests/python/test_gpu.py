@@ -34,8 +34,8 @@ def on_host(monkeypatch):
 @pytest.mark.parametrize("kind", ["map", "stack", "refined", "points", "sweep"])
 def test_the_device_does_not_matter(separatrix, tmp_path, results, on_host, kind):
     output = tmp_path / "gpu.h5"
-    said = succeed(separatrix, *KINDS[kind], *ON_GPU, "-o", output, folder=results["map"].parent)
-    assert "computed by GPU 0 (stand-in on the host, for tests)" in said.out
+    ended = succeed(separatrix, *KINDS[kind], *ON_GPU, "-o", output, folder=results["map"].parent)
+    assert "computed by GPU 0 (stand-in on the host, for tests)" in ended.out
     assert differences(results[kind], output) == []
     with h5py.File(output) as file:
         assert file["provenance"].attrs["device"].startswith("GPU 0")
@@ -67,8 +67,8 @@ def test_nor_do_threads(separatrix, tmp_path, results, on_host, monkeypatch, thr
 def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_host):
     output = tmp_path / "gpu.h5"
     command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    said = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
-    assert "computed by rank 0: GPU 0, 1: GPU 1, 2: GPU 0" in said.out
+    ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
+    assert "computed by rank 0: GPU 0, 1: GPU 1, 2: GPU 0" in ended.out
     assert differences(results["map"], output) == []
 
 
@@ -76,8 +76,8 @@ def test_ranks_with_one_device_are_named_together(mpi_separatrix, tmp_path, resu
     monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "1")
     output = tmp_path / "gpu.h5"
     command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    said = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
-    assert "computed by rank 0-2: GPU 0" in said.out
+    ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
+    assert "computed by rank 0-2: GPU 0" in ended.out
     assert differences(results["map"], output) == []
 
 
@@ -179,8 +179,8 @@ def test_a_gpu_that_fails_leaves_a_file_to_go_on_with(
     assert "failure made for a test (CUDA error 719)" in ended.err
     assert "with --resume (without --force) goes on, with --device cpu without a GPU" in ended.err
     assert not output.exists()
-    said = succeed(separatrix, *command, "--resume", "--device", "cpu", folder=results["map"].parent)
-    assert " of 5 tiles were done before" in said.out
+    ended = succeed(separatrix, *command, "--resume", "--device", "cpu", folder=results["map"].parent)
+    assert " of 5 tiles were done before" in ended.out
     assert differences(results["map"], output) == []
 
 
@@ -258,7 +258,7 @@ def test_what_is_fused_or_approximate_is_found(check):
     assert check.faults_of_ptx("\tdiv.approx.f32 %f1, %f2, %f3;\n") == ["1 div.approx.f32"]
 
 
-def test_fused_operations_of_divisions_are_told_from_others(check):
+def test_fused_operations_of_divisions_are_distinguished(check):
     code = (
         "\t\tFunction : _Z1kN6flightE0EE\n        /*0040*/                   MUFU.RCP64H R3, R0 ;\n"
         "        /*0070*/              @!P0 DFMA R4, R2, -R6, 1 ;\n        /*0080*/     DMUL R4, R4, R4 ;\n"

@@ -81,8 +81,8 @@ def test_changed_machines_have_the_same_bits(separatrix, tmp_path, key):
 @pytest.mark.parametrize("kind", ["map", "stack", "refined", "points", "sweep"])
 def test_files_of_every_kind_have_the_same_bits(separatrix, tmp_path, results, kind):
     output = tmp_path / "gpu.h5"
-    said = succeed(separatrix, *KINDS[kind], *ON_GPU, "-o", output, folder=results["map"].parent)
-    assert "computed by GPU 0 (" in said.out
+    ended = succeed(separatrix, *KINDS[kind], *ON_GPU, "-o", output, folder=results["map"].parent)
+    assert "computed by GPU 0 (" in ended.out
     assert differences(results[kind], output) == []
 
 
@@ -122,8 +122,8 @@ def test_an_interrupted_run_goes_on_with_the_other_device(separatrix, source_dir
     ended = run(separatrix, *command, *limits, folder=tmp_path)
     assert ended.code == 75, ended
     other = "gpu" if first == "cpu" else "cpu"
-    said = succeed(separatrix, *command, "--resume", "--device", other, folder=tmp_path, timeout=600)
-    done = next(line for line in said.out.splitlines() if " tiles were done before" in line)
+    ended = succeed(separatrix, *command, "--resume", "--device", other, folder=tmp_path, timeout=600)
+    done = next(line for line in ended.out.splitlines() if " tiles were done before" in line)
     assert not done.startswith("0 of ")
     succeed(separatrix, *command[:-1], tmp_path / "cpu.h5", "--device", "cpu", folder=tmp_path, timeout=600)
     assert differences(tmp_path / "map.h5", tmp_path / "cpu.h5") == []

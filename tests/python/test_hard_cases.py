@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions that are given up, cost too much or are hardly meant: the file is right and the program tells."""
+"""Motions that are given up, cost too much or are hardly meant: the file is right, the program reports it."""
 
 import csv
 
@@ -112,9 +112,9 @@ def test_a_motion_given_up_at_once(separatrix, tmp_path):
 def test_a_stiff_barrier_ends_by_the_step_budget(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(SOFT)
     outcome = run(separatrix, "trajectory", "case.toml", folder=tmp_path)
-    told = outcome.out
+    output = outcome.out
     assert outcome.code == 78
-    assert "so stiff that integrator.step_budget = 20000 lasts" in told
+    assert "so stiff that integrator.step_budget = 20000 lasts" in output
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file.attrs["reason"] == "step_budget"
     (tmp_path / "list.csv").write_text("x0,v0\n0,0.5\n0.01,0\n")
@@ -127,8 +127,8 @@ def test_a_stiff_barrier_ends_by_the_step_budget(separatrix, tmp_path):
 def test_an_impulse_after_the_end_is_reported(separatrix, tmp_path):
     (tmp_path / "case.toml").write_text(PAIR)
     impulse = ["--set", "body.impulse=1", "--set", "body.impulse_time=2.5"]
-    told = succeed(separatrix, "trajectory", "case.toml", *impulse, folder=tmp_path).out
-    assert "body.impulse_time = 2.5 s is after the end" in told
+    output = succeed(separatrix, "trajectory", "case.toml", *impulse, folder=tmp_path).out
+    assert "body.impulse_time = 2.5 s is after the end" in output
 
 
 @pytest.mark.parametrize(
@@ -141,13 +141,13 @@ def test_an_impulse_after_the_end_is_reported(separatrix, tmp_path):
         ),
     ],
 )
-def test_a_motion_without_section_is_told(separatrix, tmp_path, setting, key):
+def test_a_motion_without_section_is_reported(separatrix, tmp_path, setting, key):
     (tmp_path / "case.toml").write_text(PAIR)
     axes = 'axis=[{name="x0",from=0,to=1,count=2},{name="v0",from=0,to=1,count=2}]'
-    told = succeed(
+    output = succeed(
         separatrix, "basin", "case.toml", "--set", axes, "--set", setting, "-o", "b.h5", folder=tmp_path
     ).out
-    assert f"no attractors are looked for: with {key} the state" in told
+    assert f"no attractors are looked for: with {key} the state" in output
     with h5py.File(tmp_path / "b.h5") as file:
         assert set(file["attractor"][()].ravel().tolist()) <= {-1, 0}
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""libseparatrix from Python: the motion is the program's, its texts are cases, refusals say what is wrong."""
+"""libseparatrix from Python: the motion is the program's, its texts are cases, refusals name the fault."""
 
 import json
 import subprocess
@@ -157,7 +157,7 @@ def test_more_impacts_than_room_are_all_listed(model: Model) -> None:
 
 
 def test_a_start_that_is_none_has_a_reason(model: Model) -> None:
-    """NaN, and a place beyond the barrier; the segment between them is flown."""
+    """NaN, and a position beyond the barrier; the segment between them is flown."""
     result = fly(model, start=[(np.nan, 0.0, 0.0), (0.5, 0.0, 0.0), (1.2, 0.0, 0.0)])
     assert result.reason.tolist() == [65, 0, 65]
     assert result.steady.tolist() == [False, True, False]
@@ -265,7 +265,7 @@ def test_a_sensor_shows_another_position(model: Model) -> None:
 
 
 def test_a_measured_force_is_taken_from_the_call() -> None:
-    """A mass under a force that rises linearly, from three places in its record: the closed form."""
+    """A mass under a force that rises linearly, from three times of its record: the closed form."""
     text = '[body]\nmass = 2\n[restoring]\nlaw = "none"\n[drive]\nlaw = "measured_force"\ninterval = 1\n'
     model = Model.from_text(text + "force = [0, 0]\n")
     assert set(model.parameters) == {"body.mass", "body.gravity"}
@@ -333,7 +333,7 @@ def test_a_file_that_is_missing_is_named(tmp_path: Path) -> None:
         ({"force": (np.zeros(1), 0.1, np.zeros(9))}, "measured_force"),
     ],
 )
-def test_a_bad_call_says_what_is_wrong(model: Model, options: dict, expected: str) -> None:
+def test_a_bad_call_reports_what_is_wrong(model: Model, options: dict, expected: str) -> None:
     """What was found and what is allowed."""
     with pytest.raises(CaseError, match=expected):
         fly(model, **options)
@@ -368,7 +368,7 @@ def test_the_library_is_looked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert library_path() == tmp_path / "lib" / "libseparatrix.so"
 
 
-def test_the_table_of_effects_says_what_each_is_and_needs() -> None:
+def test_the_table_of_effects_states_what_each_is_and_needs() -> None:
     found = effects()
     assert found["stribeck"].family == "friction over speed"
     assert (found["stribeck"].amplitudes, found["stribeck"].sizes) == (("excess",), ("velocity",))

@@ -21,7 +21,7 @@ def events(folder: Path) -> list[dict]:
 
 
 @pytest.mark.parametrize("ranks", [0, 3])
-def test_the_log_has_what_stdout_says_and_more(mpi_separatrix, tmp_path, ranks):
+def test_the_log_has_what_stdout_has_and_more(mpi_separatrix, tmp_path, ranks):
     write_case(tmp_path)
     outcome = succeed(mpi_separatrix, *COMMAND, folder=tmp_path, ranks=ranks)
     lines = events(tmp_path)
@@ -79,7 +79,7 @@ def test_progress_is_in_a_log_at_once(separatrix, tmp_path):
 
 
 def test_progress_of_a_sweep_never_goes_back(separatrix, tmp_path):
-    """Both directions are one stretch of work."""
+    """Both directions are counted as one task."""
     write_case(tmp_path)
     sweep = ("--set=sweep.starts=[0, 0]", "--progress", "1e-6", "--json")
     outcome = succeed(separatrix, "sweep", "case.toml", *sweep, "-o", "sweep.h5", folder=tmp_path)
@@ -99,7 +99,7 @@ def test_a_log_that_cannot_be_written(separatrix, tmp_path):
 
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_log_on_a_full_disk_costs_the_log_alone(mpi_separatrix, tmp_path, ranks):
-    """The work is done, and the code says that not all of what was asked for is there."""
+    """The work is done, and the code reports that not all of what was asked for is there."""
     write_case(tmp_path)
     succeed(mpi_separatrix, *COMMAND, folder=tmp_path)
     full = ["basin", "case.toml", "-o", "full.h5", "--log", "/dev/full"]
@@ -135,7 +135,7 @@ def test_stdout_on_a_full_disk(separatrix, tmp_path, form):
     succeed(separatrix, "verify", "map.h5", "--sample", "2", folder=tmp_path)
 
 
-def test_a_file_says_how_it_was_made(mpi_separatrix, tmp_path):
+def test_a_file_states_how_it_was_made(mpi_separatrix, tmp_path):
     write_case(tmp_path)
     os.environ["UCX_TEST_OF_SEPARATRIX"] = "yes"
     succeed(mpi_separatrix, *COMMAND, folder=tmp_path, ranks=2)

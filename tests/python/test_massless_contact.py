@@ -66,10 +66,10 @@ def test_the_modes_left_out_are_the_spring(separatrix, beam, tmp_path, ends):
         (tmp_path / "case.toml").write_text(
             CASE.format(modes=3, tip=tip, between=between, law=law, more=more)
         )
-        said = succeed(
+        output = succeed(
             separatrix, "trajectory", "case.toml", "--force", "-o", "motion.h5", folder=tmp_path
         ).out
-        assert "warning" not in said
+        assert "warning" not in output
         with h5py.File(tmp_path / "motion.h5") as file:
             events.append((file["event_kind"][:], file["event_time"][:]))
             kinds = dict(
@@ -87,7 +87,7 @@ def test_the_modes_left_out_are_the_spring(separatrix, beam, tmp_path, ends):
     assert set(kind) <= {kinds["touch_upper"], kinds["separation"]}
 
 
-def test_a_bar_on_a_wall_pushes_as_waves_say(source_dir, build_dir, tmp_path):
+def test_a_bar_on_a_wall_pushes_as_waves_predict(source_dir, build_dir, tmp_path):
     """Rows of docs/validation.md: 16 modes and the flexibility of the others, against waves."""
     sys.path.insert(0, str(source_dir / "scripts"))
     try:

@@ -63,7 +63,7 @@ def test_results_do_not_depend_on_threads(crank) -> None:
     assert [item.as_dict() for item in one] == [item.as_dict() for item in other]
 
 
-def test_what_the_map_alone_tells_holds_what_new_starts_tell(crank) -> None:
+def test_bounds_from_the_map_alone_hold_values_of_new_starts(crank) -> None:
     names = ["global_integrity", "integrity_factor", "local_integrity", "basin_stability"]
     rough, fine = sx.measures(crank, names, new_starts=False), sx.measures(crank, names, starts=2000)
     for name in names[:2]:
@@ -95,7 +95,7 @@ def test_the_safe_basin_lies_in_the_basin(case) -> None:
 
 
 def test_measures_are_refused_with_words(crank, tmp_path: Path) -> None:
-    for wrong, said in (
+    for wrong, message in (
         ({"names": "gim"}, "found 'gim', allowed all, global_integrity"),
         ({"attractors": 7}, "attractors: found 7, allowed 1, 2"),
         ({"phases": 1}, "phases: found 1, allowed 2 or more"),
@@ -103,7 +103,7 @@ def test_measures_are_refused_with_words(crank, tmp_path: Path) -> None:
         ({"frequency": -1.0}, "frequency: found -1.0, allowed > 0"),
         ({"deviation": {"x0": 1.0}, "names": "basin_stability"}, "deviation: found x0, allowed x0 and v0"),
     ):
-        with pytest.raises(sx.SeparatrixError, match=said):
+        with pytest.raises(sx.SeparatrixError, match=message):
             sx.measures(crank, **wrong)
     with pytest.raises(sx.SeparatrixError, match="no such file"):
         sx.measures(tmp_path / "none.h5")
@@ -226,8 +226,10 @@ def test_the_command(case, tmp_path: Path, capsys: pytest.CaptureFixture) -> Non
         )
         == 0
     )
-    said = capsys.readouterr().out
-    assert "local integrity of attractor 1" in said and "limited:" in said and "not known" not in said
+    printed = capsys.readouterr().out
+    assert (
+        "local integrity of attractor 1" in printed and "limited:" in printed and "not known" not in printed
+    )
     output = tmp_path / "out.json"
     asked = [str(path), "--measures", "global_integrity", "--starts", "200", "--json", "-o", str(output)]
     assert main(asked) == 0

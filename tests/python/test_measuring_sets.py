@@ -127,7 +127,7 @@ def test_the_interval_of_a_share_allows_for_what_a_coarse_grid_misses() -> None:
     assert areas.global_share(None, tiny, axes, 2, 0).upper == 1
 
 
-def test_the_interval_of_a_share_holds_what_it_says() -> None:
+def test_the_interval_of_a_share_has_its_confidence() -> None:
     labels, area = ellipse((0.7, 0.3)), np.pi * 0.21 / 2.4**2
     inside = 0
     for seed in range(200):
@@ -237,11 +237,11 @@ def test_labels_that_are_not_known_widen_the_entropy(width: float) -> None:
 
     truth = entropy.basin_entropy(whole, UNIT, 0.05, 2000, 100)
     found = entropy.basin_entropy(labels, UNIT, 0.05, 2000, 100)
-    for told, discs, right in (
+    for measured, discs, right in (
         (found.all_discs, found.discs, truth.all_discs[0]),
         (found.boundary, found.mixed, truth.boundary[0]),
     ):
-        _, low, high = found.bounds(told, discs)
+        _, low, high = found.bounds(measured, discs)
         assert 0 <= low < right < high <= np.log(3)
     assert found.unsure and not truth.unsure
     assert truth.bounds(truth.all_discs, truth.discs) == truth.all_discs
@@ -254,7 +254,7 @@ def test_the_slope_of_the_entropy_is_the_exponent() -> None:
     assert low < slope < high
 
 
-def test_merging_tells_shared_boundaries() -> None:
+def test_merging_detects_shared_boundaries() -> None:
     """Stripes 1 2 3 1 2 3 ... share none of their boundaries farther than a stripe; three blocks do."""
     stripes = np.tile(np.repeat(np.tile([1, 2, 3], 10), 1), (30, 1))
     distances, shares = wada.merging(stripes)

@@ -114,8 +114,8 @@ def test_a_sweep_begins_at_the_crank_angle_of_the_start(separatrix, tmp_path, on
     succeed(separatrix, *NO_STARTS, *short, "-o", "turned.h5", folder=tmp_path)
     succeed(separatrix, *NO_STARTS, *short[:2], "-o", "zero.h5", folder=tmp_path)
     with h5py.File(tmp_path / "turned.h5") as turned, h5py.File(tmp_path / "zero.h5") as zero:
-        for direction, place in ((0, 0), (1, -1)):
-            assert turned["x_max"][direction, place] != zero["x_max"][direction, place]
+        for direction, end in ((0, 0), (1, -1)):
+            assert turned["x_max"][direction, end] != zero["x_max"][direction, end]
 
 
 def test_limits_have_the_unit_of_the_swept_parameter(separatrix, tmp_path, one_way):
@@ -165,19 +165,19 @@ def grazing_ratios(case):
 def test_limits_are_where_the_settled_motion_touches_the_wall(separatrix, source_dir, tmp_path, tolerance):
     path = source_dir / "examples" / "sweep_viscous.toml"
     few = options("sweep.starts=[0, 0]", f"sweep.limit_tolerance={tolerance}")
-    said = succeed(separatrix, "sweep", path, *few, "-o", "out.h5", folder=tmp_path).out
+    output = succeed(separatrix, "sweep", path, *few, "-o", "out.h5", folder=tmp_path).out
     up, down = grazing_ratios(tomllib.loads(path.read_text()))
     assert (up, down) == pytest.approx((0.870901, 1.114313), abs=1e-6)
     with h5py.File(tmp_path / "out.h5") as file:
         rows = zip(meanings(file["limits/name"]), file["limits/lower"], file["limits/upper"], strict=True)
         found = {name: (lower, upper) for name, lower, upper in rows}
-    for name, place in (("impacts_start_up", up), ("impacts_start_down", down)):
+    for name, ratio in (("impacts_start_up", up), ("impacts_start_down", down)):
         lower, upper = found[name]
-        assert lower <= place <= upper
+        assert lower <= ratio <= upper
         assert upper - lower <= 1.01 * tolerance
     if tolerance < 1e-6:
         # as many digits as they are worth
-        assert "0.8709006" in said
+        assert "0.8709006" in output
 
 
 @pytest.mark.parametrize("command", ["basin", "sweep"])
@@ -239,7 +239,7 @@ def test_a_branch_has_one_label_over_two_parameters(separatrix, tmp_path):
         catalogue = {name: file[f"catalogue/{name}"][()] for name in ("slice", "attractor", "regime")}
         period = file["catalogue/period"][()]
     assert set(catalogue["slice"]) == set(range(9))
-    # here there is one free and one impacting motion at each place, both of period 1
+    # here there is one free and one impacting motion in each slice, both of period 1
     assert (period == 1).all()
     labels = {}
     for regime, label in zip(catalogue["regime"], catalogue["attractor"], strict=True):
@@ -255,8 +255,8 @@ def test_every_labelled_point_has_the_regime_of_its_attractor(separatrix, tmp_pa
     with h5py.File(tmp_path / "case.basin.h5") as file:
         label, regime = file["attractor"][()], file["regime"][()]
         of_label = dict(zip(file["catalogue/attractor"][()], file["catalogue/regime"][()], strict=True))
-    for place in zip(*np.nonzero(label), strict=True):
-        assert regime[place] == of_label[label[place]]
+    for index in zip(*np.nonzero(label), strict=True):
+        assert regime[index] == of_label[label[index]]
 
 
 @pytest.mark.parametrize("command", ["basin", "trajectory"])
@@ -271,7 +271,7 @@ def test_a_pipe_is_not_replaced(separatrix, tmp_path, command):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["case.toml", "pipe.h5"]
 
 
-def test_the_figures_of_a_plane_say_where_its_motions_start(results):
+def test_the_figures_of_a_plane_name_where_its_motions_start(results):
     style = pytest.importorskip("separatrix.style")
     from separatrix import open_result
     from separatrix.figures import basin
@@ -391,41 +391,43 @@ def test_a_spring_at_its_free_length_holds_no_energy(separatrix, tmp_path):
     So it does where its foot is given.
     """
     write_case(tmp_path, AT_FREE_LENGTH)
-    said = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
-    assert said.startswith("at_rest: amplitude 0.0 m, v_max 0.0 m/s")
+    output = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
+    assert output.startswith("at_rest: amplitude 0.0 m, v_max 0.0 m/s")
     with h5py.File(tmp_path / "out.h5") as file:
         assert np.abs(file["potential_energy"][()]).max() < 1e-16
     moving = ["trajectory", "case.toml", *options("start.x0=0.2"), "-o", "out.h5", "--force"]
     assert succeed(separatrix, *moving, folder=tmp_path).out.startswith("non_impact")
     with h5py.File(tmp_path / "out.h5") as file:
-        stretch = file["x"][()] - 0.1
-        np.testing.assert_allclose(file["potential_energy"], 5 * stretch**2, rtol=0, atol=1e-15)
+        extension = file["x"][()] - 0.1
+        np.testing.assert_allclose(file["potential_energy"], 5 * extension**2, rtol=0, atol=1e-15)
     foot = '[body.foot]\nmass = 1\n[drive.foot]\nbody = "foot"\nlaw = "motion"\nmean = 0.3\nfrequency = 6\n'
     write_case(tmp_path, AT_FREE_LENGTH.replace('["b"]', '["foot", "b"]') + foot + '[watch]\nbody = "b"\n')
     succeed(separatrix, "trajectory", "case.toml", "-o", "foot.h5", folder=tmp_path)
     with h5py.File(tmp_path / "foot.h5") as file:
-        stretch = file["x"][()] - 0.4
-        np.testing.assert_allclose(file["potential_energy"], 5 * stretch**2, rtol=0, atol=1e-15)
+        extension = file["x"][()] - 0.4
+        np.testing.assert_allclose(file["potential_energy"], 5 * extension**2, rtol=0, atol=1e-15)
 
 
 def test_a_period_without_a_mode_is_a_unit_of_time(separatrix, tmp_path):
     for spring, words in (("", "unit of time 1.0"), (AT_FREE_LENGTH, "period of the slowest mode 1.98692 s")):
         body = '[body.b]\nmass = 1\nload = "-9.81 N"\n[run]\nduration = 1\n[start]\nx0 = 1\n'
         write_case(tmp_path, spring or body)
-        said = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", folder=tmp_path).out
-        assert words in said
+        output = succeed(
+            separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", folder=tmp_path
+        ).out
+        assert words in output
 
 
 def test_a_run_shorter_than_a_drive_period_is_of_seconds(separatrix, tmp_path):
     write_case(tmp_path)
     command = ["trajectory", "case.toml", *options("run.duration=1e-3"), "-o", "out.h5"]
-    said = succeed(separatrix, *command, folder=tmp_path).out
-    assert "(last 0.000250000 s)" in said
-    assert "per period" not in said
-    assert "drive periods" not in said
+    output = succeed(separatrix, *command, folder=tmp_path).out
+    assert "(last 0.000250000 s)" in output
+    assert "per period" not in output
+    assert "drive periods" not in output
 
 
-def test_a_motion_that_leaves_says_when(separatrix, tmp_path):
+def test_a_motion_that_leaves_reports_when(separatrix, tmp_path):
     """x = x0 cosh(10 t) is at 1e6 m at t = ln(2e8)/10; captions have no steady motion, no drive."""
     write_case(
         tmp_path,
@@ -433,9 +435,9 @@ def test_a_motion_that_leaves_says_when(separatrix, tmp_path):
     )
     longer = options("run.duration=10")
     command = ["trajectory", "case.toml", *longer, "-o", "out.h5"]
-    said = succeed(separatrix, *command, folder=tmp_path).out
-    found = re.search(r"ended before the end: left_domain after (\d\.\d+) s; 0 events", said)
-    assert found is not None, said
+    output = succeed(separatrix, *command, folder=tmp_path).out
+    found = re.search(r"ended before the end: left_domain after (\d\.\d+) s; 0 events", output)
+    assert found is not None, output
     assert float(found[1]) == pytest.approx(np.log(2e8) / 10, abs=0.011)
     exponents = succeed(separatrix, "stability", "case.toml", "--periods", "64", *longer, folder=tmp_path).out
     assert "not known: the motion leaves the domain (run.domain)" in exponents

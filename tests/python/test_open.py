@@ -22,7 +22,7 @@ from separatrix.figures.caption import describe_case, resolved_case
 
 @pytest.fixture
 def basin(tmp_path: Path) -> Path:
-    """A map with unequal sizes in which attractor 2 sits at one known place."""
+    """A map with unequal sizes in which attractor 2 sits at one known point."""
     attractor = np.ones((5, 3, 2), dtype=int)
     attractor[4, 1, 0] = 2
     axes = {"x0": np.linspace(-1, 1, 5), "v0": np.linspace(-6, 6, 3), "drive_ratio": np.array([1.1, 1.2])}
@@ -116,7 +116,7 @@ def test_codes_become_text(basin: Path) -> None:
 @pytest.mark.parametrize("text", ["", ".", "R.", "RRL.", "SC.D.", "R.R.R.R.R.R.R.R.R+"])
 def test_a_word_survives_packing(text: str) -> None:
     codes = {"R": 1, "L": 2, "S": 3, "C": 4, "D": 5, "+": 6, ".": 7}
-    packed = sum(codes[symbol] << 3 * place for place, symbol in enumerate(text))
+    packed = sum(codes[symbol] << 3 * index for index, symbol in enumerate(text))
     assert decode_word(np.int64(packed)) == text
 
 

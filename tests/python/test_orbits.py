@@ -26,12 +26,12 @@ def grazing(source_dir: Path) -> sx.Case:
 def test_branches_are_those_of_the_program(grazing: sx.Case, separatrix: Path, tmp_path: Path) -> None:
     asked = ("--parameter", "drive.amplitude", "--from", "0.05", "--to", "0.3", "--searches", "3")
     succeed(separatrix, "branches", grazing.name, "-o", "theirs.h5", *asked, folder=tmp_path)
-    told: list[tuple] = []
+    reported: list[tuple] = []
     mine = sx.branches(
-        grazing, "drive.amplitude", 0.05, 0.3, searches=3, progress=lambda *what: told.append(what)
+        grazing, "drive.amplitude", 0.05, 0.3, searches=3, progress=lambda *what: reported.append(what)
     )
     assert_same(mine, sx.open_result(tmp_path / "theirs.h5"))
-    assert {things for things, _, _ in told} == {"starts"}
+    assert {things for things, _, _ in reported} == {"starts"}
     found = mine.separatrix.labelled_points.set_index("label")
     assert found.loc["GR-fold", "drive.amplitude"] == pytest.approx(0.1, abs=1e-11)
     assert found.loc["SN", "multiplier_1"] == pytest.approx(1.0, abs=1e-8)
@@ -48,13 +48,13 @@ def test_branches_are_those_of_the_program(grazing: sx.Case, separatrix: Path, t
 
 
 def test_branches_that_make_no_sense_are_refused(grazing: sx.Case) -> None:
-    for wrong, said in (
+    for wrong, message in (
         (("drive.ration", 1, 2), "^parameter: found 'drive.ration', allowed body.mass"),
         (("body.mass",), "^start and stop are needed"),
         (("drive.amplitude", 2.0, 1.0), "^start, stop: found 2.0 and 1.0, allowed a range that rises"),
         (("contact.restitution", 0.5, 1.5), "^stop: found 1.5, allowed"),
     ):
-        with pytest.raises(sx.CaseError, match=said):
+        with pytest.raises(sx.CaseError, match=message):
             sx.branches(grazing, *wrong)
     with pytest.raises(sx.SeparatrixError, match="^x0: found"):
         sx.branches(grazing, "drive.amplitude", 1, 2, x0=(0, 1, 2))
@@ -74,10 +74,8 @@ def test_branches_end_at_an_interrupt(grazing: sx.Case, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interrupt_that_comes_too_late_says_that_the_result_is_kept(
-    grazing: sx.Case, tmp_path: Path
-) -> None:
-    """The program may be at its end before it hears; what is said is then what is."""
+def test_an_interrupt_that_comes_too_late_reports_the_kept_result(grazing: sx.Case, tmp_path: Path) -> None:
+    """The program may end before it gets the signal; then the message states what was kept."""
 
     def stop(*_: object) -> None:
         time.sleep(1.5)
@@ -95,8 +93,8 @@ def test_stability_is_that_of_the_program(source_dir: Path, separatrix: Path, tm
     chaos = case.with_(contact__upper=0.0)
     found = sx.stability(chaos, x0=-0.3, periods=5000)
     settings = ("--set", "contact.upper=0.0", "--set", "start.x0=-0.3", "--periods", "5000")
-    said = succeed(separatrix, "stability", case.name, *settings, folder=tmp_path).out
-    assert str(found) == said.strip()
+    output = succeed(separatrix, "stability", case.name, *settings, folder=tmp_path).out
+    assert str(found) == output.strip()
     assert (found.motion, found.periods) == ("chaotic", 5000)
     assert found.exponents[0] > 10 * found.errors[0] > 0 > found.exponents[1]
     assert sum(found.exponents) == pytest.approx(found.sum_found, abs=1e-12)

@@ -22,7 +22,7 @@ def cmake_version(source_dir: Path) -> str:
     return re.search(r"project\(separatrix VERSION ([0-9.]+)", text)[1]
 
 
-def test_every_place_names_the_version_of_the_build(source_dir: Path) -> None:
+def test_every_file_names_the_version_of_the_build(source_dir: Path) -> None:
     version = cmake_version(source_dir)
     assert separatrix.__version__ == version
     assert f"\nversion: {version}\n" in (source_dir / "CITATION.cff").read_text()
@@ -98,16 +98,16 @@ def test_a_release_writes_the_version_everywhere(source_dir: Path, tmp_path: Pat
     loader = importlib.machinery.SourceFileLoader("release", str(source_dir / "scripts" / "release"))
     release = importlib.util.module_from_spec(importlib.util.spec_from_loader("release", loader))
     loader.exec_module(release)
-    for name in release.PLACES:
+    for name in release.VERSIONED:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(source_dir / name, tmp_path / name)
-    old = {name: (tmp_path / name).read_text() for name in release.PLACES}
+    old = {name: (tmp_path / name).read_text() for name in release.VERSIONED}
     with pytest.raises(SystemExit, match="allowed a version"):
         release.write("1.2", tmp_path)
     # twice, because the first makes lines that the second replaces
     for version in ("9.8.6", "9.8.7"):
         assert release.write(version, tmp_path) == 0
-    for name in release.PLACES:
+    for name in release.VERSIONED:
         new = (tmp_path / name).read_text()
         assert new != old[name]
         assert "9.8.7" in new

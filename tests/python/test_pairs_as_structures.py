@@ -29,7 +29,7 @@ axis = [
 ]
 """
 
-# name: numbers, the place of the stops, laws of the two forms, duration
+# name: numbers, the positions of the stops, laws of the two forms, duration
 CASES = {
     # nothing ties the two to the ground: what they do is seen from a frame that moves along
     "backlash": (

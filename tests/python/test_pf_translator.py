@@ -144,9 +144,9 @@ def test_a_failure_names_line_expected_and_found(serial, assertion, message):
 
 
 def test_a_test_that_asserts_nothing_fails(serial):
-    result = serial.run(suite(case("says_nothing", "continue")))
+    result = serial.run(suite(case("asserts_none", "continue")))
     assert result.returncode == 1
-    assert "says_nothing asserts nothing" in result.stdout
+    assert "asserts_none asserts nothing" in result.stdout
 
 
 def test_before_and_after_run_around_each_test(serial):

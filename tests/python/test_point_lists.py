@@ -22,7 +22,7 @@ def starts(tmp_path):
 
 
 def test_points_start_every_body(separatrix, source_dir, starts, tmp_path):
-    """A point is the trajectory of the case with its numbers in it, and the table tells all of them."""
+    """A point is the trajectory of the case with its numbers in it, and the table lists all of them."""
     case = source_dir / "examples" / "structure_two_masses.toml"
     output, table = tmp_path / "points.h5", tmp_path / "ends.csv"
     succeed(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Python computes what the program computes, to the bit, and says what is wrong as it does."""
+"""Python computes what the program computes, to the bit, and reports what is wrong as it does."""
 
 import contextlib
 import os
@@ -20,7 +20,7 @@ from program import CASE, succeed, write_case
 from separatrix.labelling import axis_values
 
 STACK = {"drive.ratio": (1.1, 1.3, 3), "x0": (0, 1.1, 7), "v0": (-6, 6, 11)}
-# What a file says of how it was made, and what names an axis in the table of laws.
+# What a file states of how it was made, and what names an axis in the table of laws.
 MADE = ("checksum",)
 
 
@@ -129,8 +129,8 @@ def test_wrong_arguments_are_refused_in_one_line(case: sx.Case, results: dict[st
         (lambda: sx.trajectory(case, samples="x"), "samples: found 'x', allowed a number"),
         (lambda: sx.open_result(results["points"]).separatrix.plot(units=None), "units: found None"),
     )
-    for call, said in wrong:
-        with pytest.raises(sx.SeparatrixError, match=said) as caught:
+    for call, message in wrong:
+        with pytest.raises(sx.SeparatrixError, match=message) as caught:
             call()
         assert "\n" not in str(caught.value)
     assert case.with_({"drive.ratio": np.array(1.3)}).resolved["drive"]["ratio"] == 1.3
@@ -212,7 +212,7 @@ def test_values_have_units_wherever_a_case_has_them(case: sx.Case) -> None:
             assert "\n" not in str(refused.value)
 
 
-def test_errors_say_what_the_program_says(case: sx.Case, tmp_path: Path) -> None:
+def test_errors_are_those_of_the_program(case: sx.Case, tmp_path: Path) -> None:
     """File, line, key, found, allowed; all problems at once; nothing of the command line."""
     bad = tmp_path / "bad.toml"
     bad.write_text(CASE.replace("restitution = 0.5", "restitutoin = 0.5").replace("mass = 1.0", "mass = -1"))
@@ -274,11 +274,11 @@ def test_axes_have_the_bits_of_the_program(case: sx.Case) -> None:
         assert mine.tobytes() == theirs.tobytes()
 
 
-def test_progress_is_told(case: sx.Case) -> None:
-    told: list[tuple] = []
-    sx.basin(case, x0=60, v0=60, progress=lambda *what: told.append(what))
-    assert told[-1] == ("points", 3600, 3600)
-    assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
+def test_progress_is_reported(case: sx.Case) -> None:
+    reported: list[tuple] = []
+    sx.basin(case, x0=60, v0=60, progress=lambda *what: reported.append(what))
+    assert reported[-1] == ("points", 3600, 3600)
+    assert [done for _, done, _ in reported] == sorted(done for _, done, _ in reported)
     silent = sx.basin(case, progress=False)
     assert silent.sizes["x0"] == 19
 
@@ -298,11 +298,11 @@ import separatrix as sx
 
 case = sx.load(sys.argv[1]).with_(run__duration=20000.0, attractors__sample=4, run__stop="duration")
 options = eval(sys.argv[2])
-told = open(sys.argv[3], "w")
+noted = open(sys.argv[3], "w")
 
 def note(things, done, total):
     if things == "points" and done:
-        print(done, file=told, flush=True)
+        print(done, file=noted, flush=True)
 
 try:
     result = sx.basin(case, x0=(0, 1.1, 40), v0=(-6, 6, 40), progress=note, **options)
@@ -321,12 +321,12 @@ def test_an_interrupt_stops_and_resume_goes_on(case: sx.Case, tmp_path: Path, op
     """Ctrl-C as a terminal sends it; the resumed result is that of a run that was not stopped."""
     script = tmp_path / "stopped.py"
     script.write_text(STOPPED)
-    told = tmp_path / "told"
+    noted = tmp_path / "noted"
     files = [tmp_path / "stopped.nc", tmp_path / "whole.nc"]
-    command = [sys.executable, script, case.name, options, told]
+    command = [sys.executable, script, case.name, options, noted]
     child = subprocess.Popen([*command, files[0]], stdout=subprocess.PIPE, text=True, process_group=0)
     last = time.monotonic() + 60
-    while not (told.exists() and told.read_text()) and child.poll() is None and time.monotonic() < last:
+    while not (noted.exists() and noted.read_text()) and child.poll() is None and time.monotonic() < last:
         time.sleep(0.02)
     with contextlib.suppress(ProcessLookupError):  # done already
         os.killpg(child.pid, signal.SIGINT)
@@ -389,17 +389,17 @@ def test_results_draw_the_figures_of_the_command(
 def test_the_code_of_the_guide_runs(
     source_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every Python block of docs/python.md, one after the other, and what it says that it prints."""
+    """Every Python block of docs/python.md, one after the other, and the output that it states."""
     guide = (source_dir / "docs" / "python.md").read_text()
     blocks = re.findall(r"^```python\n(.*?)^```", guide, re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 4
     (tmp_path / "examples").symlink_to(source_dir / "examples")
     monkeypatch.chdir(tmp_path)
-    said: list[str] = []
-    names = {"print": lambda *what: said.append(" ".join(map(str, what)))}
+    printed: list[str] = []
+    names = {"print": lambda *what: printed.append(" ".join(map(str, what)))}
     for block in blocks:
         exec(compile(block, "docs/python.md", "exec"), names)
-    assert said == re.findall(r"print\(error\) +# (.*)", guide)
+    assert printed == re.findall(r"print\(error\) +# (.*)", guide)
     assert (tmp_path / "bifurcation.png").stat().st_size > 10_000
 
 

@@ -166,10 +166,10 @@ def test_a_record_that_does_not_fit_is_refused_before_the_run(separatrix, case, 
 
 
 def test_every_file_is_named_when_it_is_written(separatrix, case):
-    said = succeed(
+    output = succeed(
         separatrix, "trajectory", "case.toml", "--record", "record.csv", "--csv", "events.csv", folder=case
     ).out
-    written = [line.split("wrote ")[1] for line in said.splitlines() if "wrote " in line]
+    written = [line.split("wrote ")[1] for line in output.splitlines() if "wrote " in line]
     assert sorted(path.split("/")[-1] for path in written) == [
         "case.trajectory.h5",
         "events.csv",

@@ -88,14 +88,14 @@ def test_the_program_is_not_contradicted(referee, separatrix, source_dir, tmp_pa
 
 
 def test_a_wrong_claim_is_seen(referee, libraries):
-    """Another period, another place, another count of impacts, a cycle called none."""
+    """Another period, another position, another count of impacts, a cycle called none."""
     comparison = importlib.import_module("compare")
     machine = referee.machine_of(oscillator(1.0, 1.0))
     (found,) = referee.outcomes(libraries[0], machine, np.array([[-0.5, 0.0]]))
     claim, right, aside = comparison.Claim, found.cycle[:1], found.cycle[:1] + 1e-4
-    assert comparison.judged(machine, found, claim(1, 1, 1.0), right) == "agrees"
-    assert comparison.judged(machine, found, claim(1, 2, 1.0), right) == "wrong"
-    assert comparison.judged(machine, found, claim(1, 1, 1.0), aside) == "wrong"
-    assert comparison.judged(machine, found, claim(1, 1, 0.9666), right) == "wrong"
-    assert comparison.judged(machine, found, claim(1, 0, 1.0, aperiodic=True)) == "wrong"
-    assert comparison.judged(machine, found, claim(0, 0, 1.0)) == "not known"
+    assert comparison.verdict_on(machine, found, claim(1, 1, 1.0), right) == "agrees"
+    assert comparison.verdict_on(machine, found, claim(1, 2, 1.0), right) == "wrong"
+    assert comparison.verdict_on(machine, found, claim(1, 1, 1.0), aside) == "wrong"
+    assert comparison.verdict_on(machine, found, claim(1, 1, 0.9666), right) == "wrong"
+    assert comparison.verdict_on(machine, found, claim(1, 0, 1.0, aperiodic=True)) == "wrong"
+    assert comparison.verdict_on(machine, found, claim(0, 0, 1.0)) == "not known"

@@ -44,7 +44,7 @@ def test_a_refined_map_is_the_whole_map(separatrix, tmp_path, shape):
         assert file["catalogue/count"][()].tolist() == whole["catalogue/count"][()].tolist()
 
 
-def test_the_file_says_how_much_was_computed(separatrix, tmp_path):
+def test_the_file_states_how_much_was_computed(separatrix, tmp_path):
     write_case(tmp_path)
     command = ["basin", "case.toml", *FINE, *COARSE, "--json"]
     events = {}
@@ -64,11 +64,11 @@ def test_the_file_says_how_much_was_computed(separatrix, tmp_path):
     limit = (1 - 0.05 ** (1 / (13 * 17))) * 13 * 17 * 64 / (97 * 131)
     assert facts["wrong_share_upper_limit"] == pytest.approx(limit, rel=1e-9)
     assert events["wrong"]["share_upper_limit"] == facts["wrong_share_upper_limit"]
-    told = json.loads(succeed(separatrix, "info", "case.basin.h5", "--json", folder=tmp_path).out)[
+    stated = json.loads(succeed(separatrix, "info", "case.basin.h5", "--json", folder=tmp_path).out)[
         "refinement"
     ]
-    assert told["points_computed"] == facts["points_computed"]
-    assert told["percent_computed"] == pytest.approx(100 * (origin <= CONTRADICTED).mean())
+    assert stated["points_computed"] == facts["points_computed"]
+    assert stated["percent_computed"] == pytest.approx(100 * (origin <= CONTRADICTED).mean())
     assert "refined:" in succeed(separatrix, "info", "case.basin.h5", folder=tmp_path).out
 
 

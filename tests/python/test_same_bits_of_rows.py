@@ -17,7 +17,7 @@ SMALL = ("axis[1].count=9", "axis[2].count=11", "run.duration=12", "run.window=3
 STOPPED = 75
 
 
-ROWS = [pytest.param(row, marks=[pytest.mark.long] * (place % 2)) for place, row in enumerate(rows.ROWS)]
+ROWS = [pytest.param(row, marks=[pytest.mark.long] * (index % 2)) for index, row in enumerate(rows.ROWS)]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.key)

@@ -127,7 +127,7 @@ def tiles_done(path: Path) -> int:
         return int((file["tiles/state"][()] == 1).sum())
 
 
-def test_lanes_and_the_event_loop_tell_the_same(separatrix, tmp_path, reference):
+def test_lanes_and_the_event_loop_report_the_same(separatrix, tmp_path, reference):
     write_case(tmp_path, CHAIN)
     alone = ["--set", 'integrator.lanes="off"', "-o", "map.h5"]
     succeed(separatrix, *COMMAND, *alone, folder=tmp_path)

@@ -103,7 +103,7 @@ def test_the_same_seed_gives_the_same(scaling):
     assert (first.finish == second.finish).all()
 
 
-def test_costs_get_the_spread_and_keep_their_order_and_places(scaling):
+def test_costs_get_the_spread_and_keep_their_order_and_neighbours(scaling):
     _, costs, _ = scaling
     measured = uneven(100)
     for spread in (1, 10, 1000):

@@ -32,7 +32,7 @@ def test_every_text_is_inside(separatrix, source_dir, tmp_path, case):
 
 
 def test_what_is_between_what(separatrix, source_dir, tmp_path):
-    """Rows run between the columns of their ends, and say what the case says."""
+    """Rows run between the columns of their ends, and show the numbers of the case."""
     root = _draw(separatrix, source_dir / "examples" / "structure_blocks_on_a_belt.toml", tmp_path)
     texts = {text.text: float(text.get("x")) for text in root.iter(f"{SVG}text")}
     ground, first, second = (texts[name] for name in ("ground", "first", "second"))

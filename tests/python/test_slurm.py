@@ -136,13 +136,13 @@ def wait_for_tiles(part: Path, separatrix: Path, more_than: int) -> int:
     while True:
         if part.exists():
             # One process alone locks the file that it writes.
-            told = subprocess.run(
+            output = subprocess.run(
                 [separatrix, "info", part, "--json"],
                 capture_output=True,
                 text=True,
                 env=os.environ | {"HDF5_USE_FILE_LOCKING": "FALSE"},
             ).stdout
-            if told and (tiles := json.loads(told)["tiles_done"]) > more_than:
+            if output and (tiles := json.loads(output)["tiles_done"]) > more_than:
                 return tiles
         assert time.monotonic() < deadline
         time.sleep(0.2)

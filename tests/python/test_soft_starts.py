@@ -202,7 +202,7 @@ def test_a_map_goes_on_into_a_soft_wall(name: str, separatrix, tmp_path, monkeyp
 
 
 def test_all_points_of_a_motion_are_marked_in_its_map() -> None:
-    """One of two section points is inside the wall: marked where the map goes so far, else said."""
+    """One of two section points is inside the wall: marked where the map goes so far, else reported."""
     case = sx.Case.from_text(
         """
 [body]

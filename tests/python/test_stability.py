@@ -101,7 +101,7 @@ def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp
     assert (first["without_period"], entries) == (0, [])
 
 
-def test_a_period_above_the_limit_is_told(separatrix: Path, source_dir: Path, tmp_path: Path):
+def test_a_period_above_the_limit_is_reported(separatrix: Path, source_dir: Path, tmp_path: Path):
     """A cycle of three periods in a map that looks for one alone."""
     case = tmp_path / "petals.toml"
     case.write_text(
@@ -124,7 +124,9 @@ axis = [{ name = "x0", from = -2.5, to = 0, count = 8 }, { name = "v0", from = -
     assert entries[0]["exponents"][0] < 0
 
 
-def test_a_weak_cycle_of_a_map_is_told_though_its_mean_exponent_is_positive(separatrix: Path, tmp_path: Path):
+def test_a_weak_cycle_of_a_map_is_reported_despite_its_positive_mean_exponent(
+    separatrix: Path, tmp_path: Path
+):
     """A cycle contracts with 5e-4/s: means over a thousand seconds are off by more, its multipliers not."""
     case = tmp_path / "weak.toml"
     case.write_text(
@@ -161,9 +163,9 @@ def test_a_damaged_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: 
     assert ended.returncode == 74
     assert "period" in ended.stderr
     # a file is buffered, a pipe is not
-    with (tmp_path / "said.txt").open("w") as said:
-        subprocess.run([separatrix, "stability", target], stderr=said, check=False)
-    assert (tmp_path / "said.txt").read_text() == ended.stderr
+    with (tmp_path / "message.txt").open("w") as file:
+        subprocess.run([separatrix, "stability", target], stderr=file, check=False)
+    assert (tmp_path / "message.txt").read_text() == ended.stderr
 
 
 def test_a_file_that_is_no_map_is_refused(separatrix: Path, source_dir: Path, tmp_path: Path):
@@ -213,8 +215,8 @@ def test_touches_of_a_soft_stop_are_impacts(separatrix: Path, source_dir: Path, 
     if structure:
         case, more = tmp_path / "soft.toml", ()
         case.write_text(SOFT_STOP)
-    said = succeed(separatrix, "stability", case, *more, "--periods", 200, "--json", folder=tmp_path).out
-    motion = next(line for line in map(json.loads, said.splitlines()) if line["event"] == "motion")
+    output = succeed(separatrix, "stability", case, *more, "--periods", 200, "--json", folder=tmp_path).out
+    motion = next(line for line in map(json.loads, output.splitlines()) if line["event"] == "motion")
     assert (motion["type"], motion["impacts"]) == ("periodic", 200)
 
 
@@ -238,7 +240,7 @@ duration = 20
 
 
 @pytest.mark.parametrize(
-    ("damping", "loss", "wall", "said"),
+    ("damping", "loss", "wall", "outcome"),
     [
         (0.2, 1, -9, "comes to rest"),
         (0.0002, 1, -9, "comes to rest"),
@@ -247,13 +249,13 @@ duration = 20
         (0, 1, -0.5, "is periodic"),
     ],
 )
-def test_a_motion_that_decays_is_not_periodic(separatrix, tmp_path, damping, loss, wall, said):
+def test_a_motion_that_decays_is_not_periodic(separatrix, tmp_path, damping, loss, wall, outcome):
     """Each turn is smaller than the one before by a share: a rest is what it comes to, not a cycle."""
     case = tmp_path / "case.toml"
     case.write_text(DECAY.format(damping=damping, loss=loss, wall=wall))
     text = succeed(separatrix, "stability", case, "--periods", "200", folder=tmp_path).out
-    assert f"the motion {said}" in text
-    assert ("by 200 returns" in text) or said == "comes to rest"
+    assert f"the motion {outcome}" in text
+    assert ("by 200 returns" in text) or outcome == "comes to rest"
 
 
 @pytest.mark.parametrize(("loss", "impacts"), [(0, 1), (0.1, 6)])

@@ -10,7 +10,7 @@ from scipy import io, sparse
 
 
 def test_a_case_keeps_its_files(tmp_path, monkeypatch):
-    """A saved case, and one whose process has gone to another folder, says what it said where it was read."""
+    """A saved case, and one whose process has changed its folder, resolves as where it was read."""
     folder = tmp_path / "machine"
     folder.mkdir()
     for name, matrix in zip(("mass", "stiffness"), cantilever(12), strict=True):
@@ -56,7 +56,7 @@ window = 5.0
     assert str(refused.value).startswith("bad.toml:")
 
 
-def test_what_a_file_gives_is_said_as_it_is(tmp_path):
+def test_numbers_of_a_file_are_reported_as_they_are(tmp_path):
     """A matrix that ends early ends the file; friction at break-away is not below zero."""
     io.mmwrite(tmp_path / "mass.mtx", np.eye(2), precision=17)
     (tmp_path / "stiffness.mtx").write_text("%%MatrixMarket matrix array real general\n2 2\n3\n-1\n")
@@ -64,11 +64,11 @@ def test_what_a_file_gives_is_said_as_it_is(tmp_path):
     friction = (
         '[body.b]\nmass = 1\n[friction.f]\nbetween = ["b"]\nlaw = "coulomb"\nforce = 1\nstatic_force = -0.5\n'
     )
-    for text, said in (
+    for text, message in (
         (structure, "stiffness.mtx:4: found the end of the file, allowed a number for row 1 of column 2"),
         (friction, "key 'friction.f.static_force': found -0.5 N, allowed at least the force"),
     ):
         (tmp_path / "case.toml").write_text(text + "[run]\nduration = 5\n")
         with pytest.raises(sx.CaseError) as refused:
             sx.trajectory(sx.load(tmp_path / "case.toml"))
-        assert said in str(refused.value)
+        assert message in str(refused.value)

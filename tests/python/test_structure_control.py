@@ -151,24 +151,24 @@ def test_a_release_by_a_sample_is_an_event(separatrix: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("parts", "said"),
+    ("parts", "message"),
     [
         (SERVO + SERVO.replace("servo", "other"), "found a controller beside another"),
         (SERVO + FOOT, "beside a body whose motion"),
         (KNOCK.replace("ball", "foot") + FOOT, "'drive.knock.body': found a body whose motion is given"),
     ],
 )
-def test_what_is_refused(separatrix: Path, tmp_path: Path, parts, said):
+def test_what_is_refused(separatrix: Path, tmp_path: Path, parts, message):
     (tmp_path / "case.toml").write_text(RUN + BODIES + parts)
     ended = run(separatrix, "trajectory", "case.toml", folder=tmp_path)
-    assert ended.code == 65 and said in ended.err
+    assert ended.code == 65 and message in ended.err
 
 
 @pytest.mark.parametrize(
-    ("parts", "said"),
+    ("parts", "message"),
     [(SERVO + "integral = 3\n", "a controller adds up"), (SERVO + KNOCK, "at times of their own")],
 )
-def test_variations_that_are_not_known(separatrix: Path, tmp_path: Path, parts, said):
+def test_variations_that_are_not_known(separatrix: Path, tmp_path: Path, parts, message):
     (tmp_path / "case.toml").write_text(RUN + BODIES + parts)
     ended = run(separatrix, "stability", "case.toml", folder=tmp_path)
-    assert ended.code == 65 and said in ended.err
+    assert ended.code == 65 and message in ended.err

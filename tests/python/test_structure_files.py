@@ -164,8 +164,8 @@ SPEEDS = {1: 0.2205597811, 2: 0.3458546130, 3: 0.4537810705, 4: 0.5216891864, 8:
 def test_beam_with_a_stop_by_its_modes(separatrix, modes, tmp_path):
     """The orbit with one impact a period, in closed form, and a flight from it.
 
-    It is a motion for one mode only: with more the tip meets the stop earlier, where the program says, and
-    its gap up to then is that of the formula.
+    It is a motion for one mode only: with more the tip meets the stop earlier, where the program finds it,
+    and its gap up to then is that of the formula.
     """
     omega, stop, restitution, zeta = 0.9, 0.5, 0.8, 0.02
     frequency = RATIOS[:modes] / RATIOS[0]
@@ -452,10 +452,10 @@ def test_the_library_flies_what_the_program_flies(matrices, tmp_path, separatrix
     case.write_text(CASE.format(file="beam.h5", more=more, **numbers))
     succeed(separatrix, "trajectory", case, "-o", tmp_path / "motion.h5", folder=tmp_path)
     with h5py.File(tmp_path / "motion.h5") as file:
-        place = file["x"][:]
-    assert np.array_equal(sx.trajectory(case)["x"], place)
+        position = file["x"][:]
+    assert np.array_equal(sx.trajectory(case)["x"], position)
     softer = sx.load(case).with_({"structure.beam.damping_ratio": 0.05})
-    assert not np.array_equal(sx.trajectory(softer)["x"], place)
+    assert not np.array_equal(sx.trajectory(softer)["x"], position)
     for file, found in (("none.h5", "no such file"), ("case.toml", "cannot be read as a structure file")):
         with pytest.raises(sx.CaseError, match=found) as refused:
             softer.with_({"structure.beam.file": file})

@@ -55,7 +55,7 @@ TWO = "coordinate real general\n2 2 2\n1 1 5.0\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (TWO + "2 2 3,25\n", ":4: found '2 2 3,25', allowed row, column and number"),
         *((TWO + row, f":4: found '{row}'") for row in ("2 2 /", "2*2 5.0", "2 2 5.0 6.0", "2,2,5.0", "2 2")),
@@ -66,7 +66,7 @@ TWO = "coordinate real general\n2 2 2\n1 1 5.0\n"
         (TWO, ":2: found 1 entries after this line, allowed 2"),
         ("coordinate real symmetric\n2 2 2\n1 2 1\n2 1 1", "symmetric: one triangle is the whole"),
         ("coordinate real skew-symmetric\n2 2 1\n2 2 1", "on the diagonal of a skew-symmetric"),
-        ("coordinate integer general\n1 1 1\n1 1 1.5", "whole, as the header says integer"),
+        ("coordinate integer general\n1 1 1\n1 1 1.5", "whole, as the header states integer"),
         ("array real general\n2 2\n1 2\n3 4", ":3: found '1 2', allowed one number a line"),
         ("coordinate complex general\n1 1 1\n1 1 1 0", ":1: found"),
         ("coordinate pattern general\n1 1 1\n1 1", ":1: found"),
@@ -77,10 +77,10 @@ TWO = "coordinate real general\n2 2 2\n1 1 5.0\n"
         ("array real general\n1000000000 1000000000\n1", "found 1000000000 rows"),
     ],
 )
-def test_matrix_market_is_what_it_looks_like(text, said, tmp_path):
+def test_matrix_market_is_what_it_looks_like(text, message, tmp_path):
     """SciPy takes several of these for another matrix."""
     (tmp_path / "a.mtx").write_text(HEAD + text)
-    _refused(read_matrix_market, tmp_path / "a.mtx", said, "allowed")
+    _refused(read_matrix_market, tmp_path / "a.mtx", message, "allowed")
 
 
 def _harwell_boeing(matrix, kind="RSA", letter="D", rhs=0):
@@ -114,7 +114,7 @@ def test_harwell_boeing_of_solvers(tmp_path):
         path.write_text("\n".join(lines).replace(kind.upper(), kind) + "\n")
         assert read_harwell_boeing(path).toarray() == pytest.approx(STIFFNESS, rel=1e-12, abs=1e-9)
     lines = _harwell_boeing(STIFFNESS)
-    for number, change, said in (
+    for number, change, message in (
         (2, ("RSA", "CSA"), ":3: found the type 'CSA', allowed RSA"),
         (2, ("RSA", "PSA"), "allowed RSA"),
         (3, ("(4D20.12)", "(4A20)"), ":4: found the format '(4A20)', allowed"),
@@ -127,7 +127,7 @@ def test_harwell_boeing_of_solvers(tmp_path):
         text[number] = text[number].replace(*change, 1)
         assert text != lines
         path.write_text("\n".join(text))
-        _refused(read_harwell_boeing, path, said)
+        _refused(read_harwell_boeing, path, message)
     path.write_text("\n".join(lines[:-1]))
     _refused(read_harwell_boeing, path, "found the end of the file")
     path.write_text("\n".join(lines)[:-1] + "\n")
@@ -165,12 +165,12 @@ def test_coordinates_without_mass_are_named(tmp_path, capsys):
 def test_modes_without_an_end_are_refused(tmp_path):
     whole = _modes(tmp_path / "a.unv", (1, 1.0, 1.0)).read_bytes()
     first = whole.index(b"    -1", 1)
-    for cut, said in (
+    for cut, message in (
         (whole[: len(whole) - 30], "has no end"),
         (whole[:first] + whole[whole.index(b"    -1", first + 1) :], "allowed an even number"),
     ):
         (tmp_path / "cut.unv").write_bytes(cut)
-        _refused(read_modes, tmp_path / "cut.unv", said)
+        _refused(read_modes, tmp_path / "cut.unv", message)
 
 
 def _mat73(path, content):
@@ -194,7 +194,7 @@ def _same(structure):
 
 
 def test_matlab_files_of_every_kind(tmp_path):
-    """Version 7.3, dense and sparse; a structure that holds K and M; two of them are told apart by name."""
+    """Version 7.3, dense and sparse; a structure that holds K and M; two of them by their names."""
     path = tmp_path / "m.mat"
     _mat73(path, {"M": MASS, "K": sparse.csc_array(STIFFNESS)})
     _same(read_matrices({}, both=path))
@@ -256,7 +256,7 @@ def test_calculix(tmp_path, capsys):
 
 
 def test_one_matrix_is_not_taken_for_two(tmp_path, capsys):
-    """A file of one matrix says nothing of the others; what is wrong with it names the file."""
+    """A file of one matrix holds none of the others; what is wrong with it names the file."""
     io.mmwrite(tmp_path / "k.mtx", STIFFNESS)
     sparse.save_npz(tmp_path / "k.npz", sparse.csr_array(STIFFNESS))
     for name in ("k.mtx", "k.npz"):
@@ -273,16 +273,16 @@ def test_one_matrix_is_not_taken_for_two(tmp_path, capsys):
 
 
 def test_damaged_files_are_refused_with_their_name(tmp_path, capsys):
-    """Changed bytes in every place: read, or code 65 with the file; readers that crash do so elsewhere."""
+    """Changed bytes at every offset: read, or code 65 with the file; readers that crash do so elsewhere."""
     path = tmp_path / "s.mat"
     io.savemat(path, {"M": MASS, "K": sparse.csc_array(STIFFNESS)})
     whole = path.read_bytes()
     words = ["--point", "tip=1", "-o", str(tmp_path / "o.h5"), "--force"]
-    for place in range(128, 160 + len(whole) // 2, len(whole) // 12):
-        path.write_bytes(whole[:place] + bytes([255, 0, 7]) + whole[place + 3 :])
+    for offset in range(128, 160 + len(whole) // 2, len(whole) // 12):
+        path.write_bytes(whole[:offset] + bytes([255, 0, 7]) + whole[offset + 3 :])
         assert main([str(path), *words]) in (0, 65)
-        said = capsys.readouterr().err
-        assert not said or str(path) in said
+        output = capsys.readouterr().err
+        assert not output or str(path) in output
     with pytest.raises(SeparatrixError, match="the reader of structure files crashes in it"):
         read_apart(path, "structure", lambda: os.kill(os.getpid(), signal.SIGSEGV))
     with pytest.raises(
@@ -357,14 +357,14 @@ def test_units_of_a_universal_file_count(tmp_path):
     metres = read_modes(_modes(path))
     assert metres.shapes["8:2"] == pytest.approx([0.5])
     mm = read_modes(_modes(path, (9, 1000.0, 1.0), modal_m=0.004))
-    for place, row in metres.shapes.items():
+    for point, row in metres.shapes.items():
         # a rotation comes with a mass of tonnes mm^2 where its amplitude is one of radians
-        assert mm.shapes[place] == pytest.approx(row * (1 if place.endswith(":2") else 1000))
-    for change, said in (
+        assert mm.shapes[point] == pytest.approx(row * (1 if point.endswith(":2") else 1000))
+    for change, message in (
         ({"units": (9, 0.0, 1.0)}, "data set 164: found the factors 0 of length"),
         ({"units": (1, 3.2808, 0.2248)}, "of force with the units code 1, allowed 1 and 1"),
         ({"spec_data_type": 12}, "found shapes of the specific data type 12, allowed displacement"),
         ({"modal_m": 0.0}, "found the modal mass 0.0, allowed above 0"),
         ({"node_nums": [7, 7]}, "found a node twice"),
     ):
-        _refused(read_modes, _modes(path, **change), said)
+        _refused(read_modes, _modes(path, **change), message)

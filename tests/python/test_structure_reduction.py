@@ -71,11 +71,11 @@ def test_masses_that_are_none(tmp_path, capsys):
     assert main(words) == 65
     assert "--reduce modal leaves out what has no mass" in capsys.readouterr().err
     assert main([*words, "--reduce", "modal", "--modes", "4"]) == 0
-    for wrong, said in (
+    for wrong, message in (
         (np.array([[1.0, 2.0], [2.0, 1.0]]), "indefinite"),
         (np.array([[1.0, 0.0], [0.0, -1.0]]), "indefinite"),
     ):
-        with pytest.raises(SeparatrixError, match=said):
+        with pytest.raises(SeparatrixError, match=message):
             modal(Matrices(wrong, sparse.eye_array(2)), 1)
     with pytest.raises(SeparatrixError, match="neither mass nor stiffness"):
         modal(Matrices(np.ones((2, 2)), np.ones((2, 2))), 1)

@@ -71,7 +71,7 @@ def test_progress_of_the_capsule(separatrix, source_dir, tmp_path):
             assert x[last] - x[last - per_period] == pytest.approx(progress, abs=2e-8)
 
 
-def test_a_restitution_at_a_flexible_place_is_warned_of(separatrix, source_dir, tmp_path):
+def test_a_restitution_at_a_flexible_point_is_warned_of(separatrix, source_dir, tmp_path):
     """All modes of a cantilever move its tip alike: half of what yields are the upper half of them."""
     case = source_dir / "examples" / "validation" / "structures" / "cantilever.toml"
     text = case.read_text()
@@ -80,8 +80,8 @@ def test_a_restitution_at_a_flexible_place_is_warned_of(separatrix, source_dir, 
     (tmp_path / "four.toml").write_text(four.replace("[2]", "[2, -2, 2, -2]"))
     short = ["--set", "run.duration=14", "--set", "run.window=7"]
     assert "warning" not in succeed(separatrix, "trajectory", "one.toml", *short, folder=tmp_path).out
-    said = succeed(separatrix, "trajectory", "four.toml", *short, folder=tmp_path).out
-    assert "warning: contact.stop: the upper half of the modes makes 50 %" in said
+    output = succeed(separatrix, "trajectory", "four.toml", *short, folder=tmp_path).out
+    assert "warning: contact.stop: the upper half of the modes makes 50 %" in output
 
 
 def test_too_many_bodies_for_a_search_are_warned_of(separatrix, tmp_path):
@@ -93,8 +93,8 @@ def test_too_many_bodies_for_a_search_are_warned_of(separatrix, tmp_path):
     axes = "".join(f'[[axis]]\nname = "{name}"\nfrom = 0\nto = 1\ncount = 2\n' for name in ("x0", "v0"))
     drive = '[drive.force]\nlaw = "force"\nbody = "b1"\namplitude = 1\nfrequency = 1\n'
     (tmp_path / "case.toml").write_text(bodies + drive + "[run]\nduration = 20\nwindow = 7\n" + axes)
-    said = succeed(separatrix, "basin", "case.toml", folder=tmp_path).out
-    assert "warning: no attractors are looked for: the section has 18 coordinates, more than 16" in said
+    output = succeed(separatrix, "basin", "case.toml", folder=tmp_path).out
+    assert "warning: no attractors are looked for: the section has 18 coordinates, more than 16" in output
 
 
 RING = """
@@ -231,7 +231,7 @@ def test_friction_that_does_not_add_up_is_refused(separatrix, tmp_path):
     assert "friction.two.law': found friction on the surface of friction.one" in done.err
 
 
-def test_a_chatter_is_told_when_it_is_over(separatrix, tmp_path):
+def test_a_chatter_is_reported_when_it_is_over(separatrix, tmp_path):
     """Each of two balls comes to rest where its bounces add up to; events stand in the order of time."""
     heights = {"one": 1.0, "two": 0.9992}
     lines = ["[start]", "x0 = 1.0", "[run]", "duration = 10"]
@@ -325,7 +325,7 @@ def test_a_chatter_under_a_curved_spring_ends(separatrix, tmp_path):
 
 
 def test_slow_transients_are_no_attractors(separatrix, tmp_path):
-    """Motions that still come together are told in a line, and not counted as attractors."""
+    """Motions that still come together are reported in a line, and not counted as attractors."""
     (tmp_path / "case.toml").write_text(
         """
 title = "Two bodies that come to one motion slowly"
@@ -427,8 +427,8 @@ def pairwise(v, masses, restitution):
 def test_newtons_cradle(separatrix, tmp_path, masses, restitution, start):
     """All come back at once, every half period after the first quarter; impacts of pairs in between."""
     (tmp_path / "case.toml").write_text(cradle(masses, restitution, 1, start))
-    said = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
-    assert "note:" not in said
+    output = succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path).out
+    assert "note:" not in output
     rate = np.sqrt(9.81)
     with h5py.File(tmp_path / "out.h5") as file:
         assert file.attrs["reason"] == "time_over"
@@ -452,5 +452,5 @@ def test_a_row_of_bodies_that_touch_is_noted(separatrix, tmp_path):
     for balls, in_sequence, noted in ((4, 0, True), (4, 1, False), (2, 0, False)):
         (tmp_path / "case.toml").write_text(cradle([1] * balls, 0.5, in_sequence, [-0.1] + [0] * (balls - 1)))
         for words in (["--validate"], ["--force"]):
-            said = succeed(separatrix, "trajectory", "case.toml", *words, folder=tmp_path).out
-            assert ("note: bodies touch in a row (contact.c2, contact.c3)" in said) == noted
+            output = succeed(separatrix, "trajectory", "case.toml", *words, folder=tmp_path).out
+            assert ("note: bodies touch in a row (contact.c2, contact.c3)" in output) == noted

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tutorial: its code, run in the order of the page, prints what the page says."""
+"""The tutorial: its code, run in the order of the page, prints what the page states."""
 
 import sys
 from pathlib import Path

@@ -22,6 +22,6 @@ def test_numbers_agree(rows, name, count):
     assert [row for row in found if row.verdict != "agrees"] == []
 
 
-def test_a_number_that_differs_is_told(rows):
+def test_a_number_that_differs_is_reported(rows):
     off = rows.Row("somebody", "a number", 1.0, 0.1, 1.2)
     assert off.verdict == "DIFFERS" and "**DIFFERS**" in rows.section([off])

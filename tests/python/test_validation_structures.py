@@ -90,19 +90,19 @@ def test_the_quadratic_gives_orbits_that_come_back(rows):
     coupled, damping = np.array([[2, -1], [-1, 1]]), np.diag([0.5, 0.0])
     force, row, frequency = np.array([1, 0]), np.array([0, 1]), 0.6
     found = rows.orbits(frequency, np.eye(2), damping, coupled, force, row, 1, 0.8)
-    speed, phase, place, velocity = max(found, key=lambda one: one[0])
+    speed, phase, position, velocity = max(found, key=lambda one: one[0])
     assert speed == pytest.approx(1.418642594893, abs=1e-11)
     machine = rows.Structure(
         [1, 1], lambda t, q, v: -coupled @ q - damping @ v + force * np.cos(frequency * t)
     )
     start = phase / frequency
-    end = machine.run(place, velocity, start + 2 * np.pi / frequency, start)
-    assert end[:2] == pytest.approx(place, abs=1e-9)
+    end = machine.run(position, velocity, start + 2 * np.pi / frequency, start)
+    assert end[:2] == pytest.approx(position, abs=1e-9)
     assert end[3] == pytest.approx(speed, abs=1e-9)
     assert velocity[1] == pytest.approx(-0.8 * speed, abs=1e-12)
 
 
-def test_a_number_that_is_off_is_told(rows):
+def test_a_number_that_is_off_is_reported(rows):
     one = rows.Number("somebody", "speed", 1.0, 1.1, 1e-9)
     assert one.verdict == "DIFFERS"
     assert "**DIFFERS**" in rows.section([one])

@@ -17,7 +17,7 @@ from separatrix.view.files import ResultFile
 
 KINDS = ("basin", "refined", "sweep", "points", "branches", "boundary", "trajectory", "measures")
 SHARES = tuple(f"share.h5.shard-{i}-of-2.part" for i in (1, 2))
-SAID = {
+DRAWN = {
     "basin": "event_word",
     "refined": "origin",
     "boundary": "boundary",
@@ -45,7 +45,7 @@ def test_python_opens_and_draws_it(old, kind):
         result.load()
         assert result.attrs["kind"] == ("basin" if kind == "refined" else kind)
         assert result.separatrix.case.title.startswith(("Coulomb friction", "Impact oscillator"))
-        assert result.separatrix.plot(SAID.get(kind)).axes
+        assert result.separatrix.plot(DRAWN.get(kind)).axes
         if kind == "basin":
             assert set(sx.decode_words(result["event_word"]).values.ravel()) == {".", "R."}
             margins = result.separatrix.attractors["grazing_margin"]

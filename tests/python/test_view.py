@@ -92,8 +92,8 @@ def test_colours_are_those_of_the_figures(desk: Desk, results: dict[str, Path], 
     assert (sent["up"], sent["down"]) == (style.RUN_UP, style.RUN_DOWN)
     static = source_dir / "postprocess" / "separatrix" / "view" / "static"
     scale = re.findall(r"#[0-9a-f]{6}", (static / "palette.js").read_text().lower())
-    for place, colour in zip(np.linspace(0, 1, len(scale)), scale, strict=True):
-        assert to_rgb(colour) == pytest.approx(matplotlib.colormaps[style.SCALAR_MAP](place)[:3], abs=0.02)
+    for value, colour in zip(np.linspace(0, 1, len(scale)), scale, strict=True):
+        assert to_rgb(colour) == pytest.approx(matplotlib.colormaps[style.SCALAR_MAP](value)[:3], abs=0.02)
     fixed = {colour.lower() for colour in (*palette.ATTRACTORS, *palette.OKABE_ITO, *palette.TOL_MUTED)}
     for script in static.glob("*.js"):
         assert not fixed - {"#000000"} & set(re.findall(r"#[0-9a-f]{6}", script.read_text().lower())), (
@@ -102,11 +102,11 @@ def test_colours_are_those_of_the_figures(desk: Desk, results: dict[str, Path], 
 
 
 def test_many_attractors_have_the_colours_of_their_legend() -> None:
-    """Up to ten by number, of more the ten with the largest basins; the others are told apart by the page."""
+    """Up to ten by number, of more the ten with the largest basins; the page distinguishes the others."""
     assert palette.of_attractors({1: 5, 3: 1}, 3) == {1: palette.ATTRACTORS[0], 3: palette.ATTRACTORS[2]}
     assert palette.of_attractors({1: 5, 9: 1}, 9) == {1: palette.TOL_MUTED[0], 9: palette.TOL_MUTED[8]}
     many = palette.of_attractors({number: number for number in range(1, 13)}, 12)
-    assert many == {12 - place: palette.TOL_MUTED[place] for place in range(10)}
+    assert many == {12 - index: palette.TOL_MUTED[index] for index in range(10)}
 
 
 @pytest.mark.parametrize("variable", range(len(LABEL_VARIABLES)))
@@ -258,7 +258,7 @@ def test_a_newer_view_ends_an_older(desk: Desk) -> None:
     ask(desk, "points", **plane_of(), **lattice, page=6, view=1)
 
 
-def test_a_motion_ends_as_points_says(desk: Desk, separatrix: Path, tmp_path: Path) -> None:
+def test_a_motion_ends_as_in_points(desk: Desk, separatrix: Path, tmp_path: Path) -> None:
     """The numbers of a click, with another ratio too; its tables; its case flies the same."""
     (tmp_path / "case.toml").write_text(CASE)
     (tmp_path / "starts.csv").write_text("x0,v0,ratio\n0.31,-1.7,1.2\n0.31,-1.7,1.07\n")
@@ -347,7 +347,7 @@ def test_refuses_what_is_out_of_range(desk: Desk, name: str, change: dict) -> No
         desk.answer(name, texts)
 
 
-def test_says_what_the_library_refuses(desk: Desk) -> None:
+def test_reports_what_the_library_refuses(desk: Desk) -> None:
     """A start beyond the barrier, a parameter that is not there or out of bounds."""
     for change, words in (
         ({"x": 3}, "contact.upper"),
@@ -371,8 +371,8 @@ def test_damaged_files_are_a_message(results: dict[str, Path], tmp_path: Path) -
     chance = np.random.default_rng(11)
     for _ in range(25):
         changed = bytearray(whole)
-        for place in chance.integers(0, len(whole), 40):
-            changed[place] ^= 1 << int(chance.integers(8))
+        for offset in chance.integers(0, len(whole), 40):
+            changed[offset] ^= 1 << int(chance.integers(8))
         cases.append(bytes(changed))
     refused = 0
     for case in cases:

@@ -66,15 +66,17 @@ def server(results: dict[str, Path], branch_file: Path, folder: Path, build_dir:
 def page(browser: object, server: Server) -> Iterator[object]:
     """A page of the viewer; nothing may be written to its console."""
     page = browser.new_page(viewport=SIZE, accept_downloads=True)
-    said: list[str] = []
+    messages: list[str] = []
     # The tests read pixels back, which the viewer never does.
-    page.on("console", lambda one: said.append(one.text) if "willReadFrequently" not in one.text else None)
-    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on(
+        "console", lambda one: messages.append(one.text) if "willReadFrequently" not in one.text else None
+    )
+    page.on("pageerror", lambda error: messages.append(str(error)))
     page.goto(server.address)
     page.wait_for_selector("canvas.map")
     ready(page)
     yield page
-    assert said == []
+    assert messages == []
     page.close()
 
 
@@ -110,7 +112,7 @@ def colour_at(page: object, x: float, y: float) -> list[int]:
 
 
 def test_pixels_have_the_colours_of_the_file(page: object, results: dict[str, Path], server: Server) -> None:
-    """The token is not left in the address; points of the map, and what is said about them."""
+    """The token is not left in the address; points of the map, and what is reported about them."""
     assert server.token not in page.url
     with h5py.File(results["map"]) as file:
         labels, times = file["attractor"][()], file["settle_time"][()]
@@ -192,8 +194,8 @@ def test_zooms_beyond_the_file_and_keeps(page: object, folder: Path) -> None:
     page.mouse.up()
     wait(page, f"v.live.number > {number} && v.live.picture.number > {number} && v.live.picture.stride === 1")
     page.get_by_role("button", name="Keep this view").click()
-    wait(page, "v.told.textContent.startsWith('wrote')")
-    kept = look(page, "v.told.textContent").removeprefix("wrote ")
+    wait(page, "v.status.textContent.startsWith('wrote')")
+    kept = look(page, "v.status.textContent").removeprefix("wrote ")
     with h5py.File(folder / kept) as file:
         shown = look(page, "Array.from(v.live.picture.arrays.attractor)")
         np.testing.assert_array_equal(file["attractor"][()].T.ravel(), shown)
@@ -221,14 +223,14 @@ def test_variables_slices_legend_and_sweep(page: object) -> None:
     wait(page, f"v.at.join() !== '{before}'")
     sweep = page.locator("section[aria-label=Sweep] canvas")
     sweep.scroll_into_view_if_needed()
-    place = look(page, "[v.links.diagrams[0].plot.x(1.1), v.links.diagrams[0].plot.box[1] + 40]")
-    sweep.click(position={"x": place[0], "y": place[1]})
+    pixel = look(page, "[v.links.diagrams[0].plot.x(1.1), v.links.diagrams[0].plot.box[1] + 40]")
+    sweep.click(position={"x": pixel[0], "y": pixel[1]})
     wait(page, "v.at[0] === 0")
     assert look(page, "v.links.diagrams[0].marked") == pytest.approx(1.1)
     page.get_by_label("Map").first.select_option("0")
     ready(page)
-    place = look(page, "[v.links.diagrams[0].plot.x(1.0), v.links.diagrams[0].plot.box[1] + 40]")
-    sweep.click(position={"x": place[0], "y": place[1]})
+    pixel = look(page, "[v.links.diagrams[0].plot.x(1.0), v.links.diagrams[0].plot.box[1] + 40]")
+    sweep.click(position={"x": pixel[0], "y": pixel[1]})
     wait(page, "v.with['drive.ratio'] !== undefined && v.live.picture && v.live.picture.stride > 0")
     page.get_by_label("Map").first.select_option("2")
     ready(page)
@@ -259,9 +261,9 @@ def test_branches_are_linked_with_the_map(page: object, branch_file: Path) -> No
     diagram = page.locator("section[aria-label=Branches] canvas")
     diagram.scroll_into_view_if_needed()
     point = int(np.flatnonzero((stable == 0) & (over > 1.13) & (over < 1.17))[0])
-    place = look(page, f"((d) => [d.plot.x({over[point]}), d.plot.y(d.answer.arrays.amplitude[{point}])])"
+    pixel = look(page, f"((d) => [d.plot.x({over[point]}), d.plot.y(d.answer.arrays.amplitude[{point}])])"
                  "(v.links.diagrams[1])")  # fmt: skip
-    diagram.click(position={"x": place[0], "y": place[1]})
+    diagram.click(position={"x": pixel[0], "y": pixel[1]})
     wait(page, "v.with['drive.ratio'] && v.live.picture && v.map.marks.some((m) => m.kind === 'saddle')")
     assert look(page, "v.with['drive.ratio']") == pytest.approx(over[point], abs=0.01)
     assert look(page, "v.links.diagrams[1].marked") == look(page, "v.links.diagrams[0].marked")
@@ -290,8 +292,8 @@ def test_boundaries_are_drawn_over_their_map(
     with Server(desk) as server:
         threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
         page = browser.new_page(viewport=SIZE)
-        said: list[str] = []
-        page.on("pageerror", lambda error: said.append(str(error)))
+        messages: list[str] = []
+        page.on("pageerror", lambda error: messages.append(str(error)))
         page.goto(server.address)
         page.wait_for_selector("canvas.map")
         ready(page)
@@ -312,20 +314,20 @@ def test_boundaries_are_drawn_over_their_map(
             ]
             assert look(page, "v.map.curves[0].xs.length") == 41
             page.wait_for_timeout(100)
-            place = look(page, "[v.map.px(v.map.curves[0].xs[10]), v.map.py(v.map.curves[0].ys[10])]")
-            dark = colour_at(page, *place)
-            assert max(dark) < 110 if piece == 0 else dark != colour_at(page, place[0], place[1] - 30)
+            pixel = look(page, "[v.map.px(v.map.curves[0].xs[10]), v.map.py(v.map.curves[0].ys[10])]")
+            dark = colour_at(page, *pixel)
+            assert max(dark) < 110 if piece == 0 else dark != colour_at(page, pixel[0], pixel[1] - 30)
         assert panel.locator("tbody tr").count() == 2
         panel.get_by_label("draw them over the map").uncheck()
         assert look(page, "v.map.curves.length") == 0
-        assert said == []
+        assert messages == []
         page.close()
         server.shutdown()
     desk.close()
 
 
 def test_two_tabs_and_a_server_that_stops(browser: object, results: dict[str, Path], library: Path) -> None:
-    """Both tabs work; when the server is gone they say so."""
+    """Both tabs work; when the server is gone they report it."""
     process, address = start_command(results)
     context = browser.new_context(viewport=SIZE)
     pages = [context.new_page() for _ in range(2)]
@@ -363,9 +365,9 @@ def test_the_exported_page_works_offline(
     assert re.findall(r"https?://[^\s\"'<]+", text) == []
     context = browser.new_context(viewport=SIZE, offline=True)
     page = context.new_page()
-    said: list[str] = []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
+    messages: list[str] = []
+    page.on("console", lambda message: messages.append(message.text))
+    page.on("pageerror", lambda error: messages.append(str(error)))
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.goto(path.as_uri())
@@ -378,7 +380,7 @@ def test_the_exported_page_works_offline(
     wait(page, "v.map.marks.some((m) => m.kind === 'saddle')")
     page.get_by_label("Map").first.select_option("1")
     ready(page)
-    assert said == []
+    assert messages == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
     context.close()
 
@@ -436,8 +438,8 @@ def test_the_widget_of_notebooks(browser: object, results: dict[str, Path]) -> N
         return [reply, base64.b64encode(buffers[0]).decode() if buffers else ""]
 
     page = browser.new_page(viewport=SIZE)
-    said: list[str] = []
-    page.on("pageerror", lambda error: said.append(str(error)))
+    messages: list[str] = []
+    page.on("pageerror", lambda error: messages.append(str(error)))
     page.expose_function("kernel", kernel)
     page.set_content(f"<style>{viewer._css}</style><div id='cell'></div>")
     page.evaluate(
@@ -459,7 +461,7 @@ def test_the_widget_of_notebooks(browser: object, results: dict[str, Path]) -> N
     wait(page, "v.panel.motion")
     assert kernel({"id": 1, "name": "tile", "parameters": {}})[0]["status"] == 400
     assert kernel({"id": 2})[0]["status"] == 400
-    assert said == []
+    assert messages == []
     page.close()
 
 

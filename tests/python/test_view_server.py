@@ -137,7 +137,7 @@ def test_refuses_other_methods_and_bad_requests(server: Server) -> None:
 
 
 def test_a_thousand_requests_at_once(server: Server) -> None:
-    """All are answered rightly, and the server goes on; connections that say nothing do not stop it."""
+    """All are answered rightly, and the server goes on; silent connections do not stop it."""
     silent = [socket.create_connection(("127.0.0.1", server.server_address[1])) for _ in range(40)]
     paths = [(TILE, MOTION, "/api/describe", "/app.js", "/nothing")[i % 5] for i in range(1000)]
     expected = {path: get(server, path)[1] for path in set(paths)}
@@ -220,7 +220,7 @@ def test_the_command_ends_when_idle(results: dict[str, Path]) -> None:
     assert time.monotonic() - began < 15
 
 
-def test_the_command_says_what_is_wrong(
+def test_the_command_reports_what_is_wrong(
     results: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A missing file, no file of ours, a folder that is none, a page that exists: one line and a code."""

@@ -38,7 +38,7 @@ def _problems(text: str, name: str, keys: list[str]) -> list[str]:
 
 
 def test_every_key_with_a_value_of_another_type(source_dir):
-    """A number in the place of the list of frequencies ended the program by a signal."""
+    """A number in place of the list of frequencies ended the program by a signal."""
     seen = set()
     for path in sorted((source_dir / "examples").glob("*.toml")):
         text = path.read_text()

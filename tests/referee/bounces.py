@@ -3,7 +3,7 @@
 """A referee for linear structures between rigid stops: matrix exponentials, impact by impact.
 
 It shares nothing with the program: scipy's `expm` of the matrix with the harmonic force in it, over equal
-stretches, and Brent's method where a gap closes. A body that bounces on and on does so until a bounce is
+intervals, and Brent's method where a gap closes. A body that bounces on and on does so until a bounce is
 shorter than the digits of its time, then it stays.
 """
 
@@ -28,7 +28,7 @@ class Stop:
 
 @dataclass
 class Bounces:
-    """z' = A z between impacts, flown in stretches of `step` [s], which must be less than any gap's turn."""
+    """z' = A z between impacts, integrated in intervals of `step` [s], shorter than any gap's turn."""
 
     matrix: np.ndarray
     stops: list[Stop]
@@ -46,7 +46,7 @@ class Bounces:
         """When a gap closes, within `length` [s]."""
         return brentq(lambda s: self.gap(stop, z, s), 0, length, xtol=1e-17, rtol=9e-16)
 
-    def first_stretch(self, z: np.ndarray, touched: Stop | None) -> float:
+    def first_interval(self, z: np.ndarray, touched: Stop | None) -> float:
         """A time for which every gap has opened that has just closed; 0 if the body stays."""
         if touched is None:
             return self.step
@@ -58,7 +58,7 @@ class Bounces:
     def run(self, z: np.ndarray, until: float, touched: int | None = None, most: int = 100000) -> np.ndarray:
         """State at `until`; `touched` is a stop that z begins at and leaves; it ends after `most` impacts."""
         t, over = 0.0, expm(self.matrix * self.step)
-        length = self.first_stretch(z, None if touched is None else self.stops[touched])
+        length = self.first_interval(z, None if touched is None else self.stops[touched])
         while t < until and len(self.impacts) < most:
             length = min(length, until - t)
             after = (over if length == self.step else expm(self.matrix * length)) @ z
@@ -72,7 +72,7 @@ class Bounces:
             rate = float(stop.row @ self.matrix @ z)
             self.impacts.append((t, k, rate))
             z = z - (1 + stop.loss) * rate * stop.kick
-            length = self.first_stretch(z, stop)
+            length = self.first_interval(z, stop)
             if length < 1e-15:
                 self.stays = t
                 z = z - float(stop.row @ self.matrix @ z) * stop.kick

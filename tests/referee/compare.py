@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the program says of the machines of cases/, beside what the independent referee finds.
+"""Compares results of the program for the machines of cases/ with those of the independent referee.
 
 For each case: the grid of starts (`basin`), the state of these motions after 40 drive periods (`points`),
 both runs over the values of a parameter, and many starts at each value (`sweep`). The verdicts:
@@ -66,10 +66,10 @@ class Verdicts:
 
 @dataclass(frozen=True)
 class Claim:
-    """What the program says of a motion: its label (0 none), period (0 none), impacts per drive period.
+    """What the program states of a motion: its label (0 none), period (0 none), impacts per drive period.
 
     `aperiodic`: the label stands for a motion that has no period, which is more than not to know one;
-    `rotation`: turns of a pendulum per drive period, where the program tells them.
+    `rotation`: turns of a pendulum per drive period, where the program reports them.
     """
 
     label: int
@@ -116,7 +116,7 @@ class Court:
         starts = start + BESIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
         return referee.outcomes(self.extended, machine, starts, self.effort)
 
-    def judge(
+    def assess(
         self,
         machine: Machine,
         start: np.ndarray,
@@ -125,21 +125,21 @@ class Court:
         points: np.ndarray | None = None,
     ) -> str:
         """Hold a claim against the referee's outcome; `points` are the cycle that the program means."""
-        verdict = judged(machine, found, claim, points)
+        verdict = verdict_on(machine, found, claim, points)
         if verdict == "wrong" and found.kind == "slow":
             (found,) = referee.outcomes(self.double, machine, start[None], PATIENT)
-            verdict = judged(machine, found, claim, points)
+            verdict = verdict_on(machine, found, claim, points)
         if verdict != "wrong":
             return verdict
         others = self.beside(machine, start)
         if all(same_motion(machine, found, other) for other in others):
             return "wrong"
-        met = any(judged(machine, other, claim, points) == "agrees" for other in others)
+        met = any(verdict_on(machine, other, claim, points) == "agrees" for other in others)
         return "rounding" if met else "unfounded"
 
 
-def judged(machine: Machine, found: Outcome, claim: Claim, points: np.ndarray | None = None) -> str:
-    """As `Court.judge`, without a second look."""
+def verdict_on(machine: Machine, found: Outcome, claim: Claim, points: np.ndarray | None = None) -> str:
+    """As `Court.assess`, without a second look."""
     if claim.period == 0:
         if found.period == 0:
             return "agrees"
@@ -174,7 +174,7 @@ def apart(machine: Machine, one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def same_motion(machine: Machine, one: Outcome, other: Outcome) -> bool:
-    """Whether two outcomes are the same attractor; motions without a cycle are not told apart."""
+    """Whether two outcomes are the same attractor; motions without a cycle are not distinguished."""
     if one.period != other.period:
         return False
     return one.period == 0 or distance(machine, one.cycle, other.cycle[0]) < SAME
@@ -186,7 +186,7 @@ def grid_of(case: dict) -> np.ndarray:
     return np.stack([item.ravel() for item in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
-def told(outcome: Outcome) -> str:
+def described(outcome: Outcome) -> str:
     """An outcome in words."""
     if not outcome.period:
         return f"{outcome.kind}, exponent {outcome.exponents[0]:+.4f} per drive period"
@@ -210,8 +210,8 @@ def compare_basin(court: Court, path: Path, case: dict, kinds: Counter) -> Verdi
         label, period = int(columns[0][k]), int(columns[1][k])
         claim = Claim(label, period, float(columns[2][k]), kind.get(label) == CHAOTIC, rotation.get(label))
         points = catalogue["point"][owner == label] if label and period else None
-        verdict = court.judge(machine, starts[k], outcome, claim, points)
-        verdicts.add(verdict, start=starts[k].tolist(), ours=str(claim), referee=told(outcome))
+        verdict = court.assess(machine, starts[k], outcome, claim, points)
+        verdicts.add(verdict, start=starts[k].tolist(), ours=str(claim), referee=described(outcome))
         kinds[outcome.kind] += 1
     return verdicts
 
@@ -235,10 +235,10 @@ def compare_sweep(court: Court, path: Path, case: dict, kinds: Counter) -> tuple
             Claim(int(found[0][k, i]), int(found[1][k, i]), float(found[2][k, i])) for i in range(len(starts))
         ]
         for i, (outcome, claim) in enumerate(zip(outcomes, claims, strict=True)):
-            verdict = court.judge(machine, begun[i], outcome, claim)
+            verdict = court.assess(machine, begun[i], outcome, claim)
             where = {"run": ("up", "down")[i]} if i < 2 else {"start": begun[i].tolist()}
             group = runs if i < 2 else many
-            group.add(verdict, value=value, **where, ours=str(claim), referee=told(outcome))
+            group.add(verdict, value=value, **where, ours=str(claim), referee=described(outcome))
             kinds[outcome.kind] += 1
     return runs, many
 

@@ -84,7 +84,7 @@ static void impact(body *b, int side) {
   }
 }
 
-/* One stretch of rest, by friction or on a wall, at most until `end`. */
+/* One interval of rest, by friction or on a wall, at most until `end`. */
 static void rest(body *b, real h) {
   const machine *m = b->law;
   real f[ORDER + 1], force[ORDER + 1], guard[ORDER + 1];

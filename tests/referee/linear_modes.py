@@ -3,7 +3,7 @@
 """A referee for structures that are too stiff for steps: matrix exponentials between events.
 
 One joint: friction that slides or sticks, or a spring that only pushes. It shares nothing with the
-program: scipy's `expm` of the matrix with the harmonic force in it, over small equal stretches, and
+program: scipy's `expm` of the matrix with the harmonic force in it, over small equal intervals, and
 Brent's method where a guard falls.
 """
 
@@ -30,7 +30,7 @@ class Piece:
 
 @dataclass
 class Pieces:
-    """Pieces by name, flown in stretches of `step` [s]."""
+    """Pieces by name, integrated in intervals of `step` [s]."""
 
     pieces: dict[str, Piece]
     step: float
@@ -40,7 +40,7 @@ class Pieces:
     def run(
         self, name: str, z: np.ndarray, until: float, watch: Callable[[np.ndarray], None] = lambda z: None
     ):
-        """State at `until`; `events` are (piece that begins, time), `watch` sees the end of every stretch."""
+        """State at `until`; `events` are (piece that begins, time), `watch` gets each interval's end."""
         over = {key: expm(piece.matrix * self.step) for key, piece in self.pieces.items()}
         t = 0.0
         while t < until:
@@ -103,7 +103,7 @@ class Modes:
         z[2 * self.n] = z[2 * self.n + 2] = 1
         return z
 
-    def place(self, z: np.ndarray, row) -> float:
+    def displacement(self, z: np.ndarray, row) -> float:
         """Displacement of a point with `row` in the coordinates of the modes."""
         return float(row @ (z[: self.n] / self.scale))
 
@@ -144,10 +144,10 @@ def pressed(modes: Modes, row, stiffness: float, step: float) -> Pieces:
     """A structure with a spring along `row` that only pushes it up from 0: pieces "open" and "pressed"."""
     return Pieces(
         {
-            "open": Piece(modes.matrix(0.0), lambda z: modes.place(z, row), lambda z: "pressed"),
+            "open": Piece(modes.matrix(0.0), lambda z: modes.displacement(z, row), lambda z: "pressed"),
             "pressed": Piece(
                 modes.matrix(0.0, spring=stiffness * np.outer(row, row)),
-                lambda z: -modes.place(z, row),
+                lambda z: -modes.displacement(z, row),
                 lambda z: "open",
             ),
         },

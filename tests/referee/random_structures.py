@@ -174,8 +174,8 @@ class Draw:
         total = np.array(self.load)
         total[self.driven] += self.amplitude * math.cos(self.frequency * t + self.angle)
         for row, stiffness, damping, cubic in self.springs:
-            stretch = row @ q
-            total -= row * (stiffness * stretch + damping * (row @ v) + cubic * stretch**3)
+            extension = row @ q
+            total -= row * (stiffness * extension + damping * (row @ v) + cubic * extension**3)
         return total
 
     def referee(self, longest_step: float) -> list[float]:

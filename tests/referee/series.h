@@ -71,7 +71,7 @@ static real product(const real *a, const real *b, int j) {
 /* Series of the motion, and of the linearised one, about the present time. */
 static void series(const body *b, const real *f, real *x, real u[2][ORDER + 1]) {
   const machine *m = b->law;
-  real stretch[ORDER + 1], square[ORDER + 1], s[ORDER + 1], c[ORDER + 1];
+  real extension[ORDER + 1], square[ORDER + 1], s[ORDER + 1], c[ORDER + 1];
   x[0] = b->x;
   x[1] = b->v;
   for (int k = 0; k < 2 && b->linearised; k++) {
@@ -85,9 +85,9 @@ static void series(const body *b, const real *f, real *x, real u[2][ORDER + 1]) 
     if (b->pressed)
       a -= m->wall_stiffness * (x[j] - (j == 0 ? (b->pressed > 0 ? m->upper : m->lower) : 0));
     if (m->cubic != 0) {
-      stretch[j] = (j == 0 ? m->rest : 0) + f[j] / m->spring - x[j];
-      square[j] = product(stretch, stretch, j);
-      a += m->cubic * product(stretch, square, j);
+      extension[j] = (j == 0 ? m->rest : 0) + f[j] / m->spring - x[j];
+      square[j] = product(extension, extension, j);
+      a += m->cubic * product(extension, square, j);
     }
     if (m->pendulum != 0) {
       if (j == 0) {
@@ -117,16 +117,16 @@ static void series(const body *b, const real *f, real *x, real u[2][ORDER + 1]) 
   }
 }
 
-/* Force on a body at rest in its place, as a series in time. */
+/* Force on a body at rest at its position, as a series in time. */
 static void holding(const body *b, const real *f, real *force) {
   const machine *m = b->law;
-  real stretch[ORDER + 1], square[ORDER + 1];
+  real extension[ORDER + 1], square[ORDER + 1];
   for (int j = 0; j <= ORDER; j++) {
     force[j] = f[j] + (j == 0 ? m->spring * (m->rest - b->x) - m->pendulum * R(sin)(b->x) : 0);
     if (m->cubic != 0) {
-      stretch[j] = (j == 0 ? m->rest - b->x : 0) + f[j] / m->spring;
-      square[j] = product(stretch, stretch, j);
-      force[j] += m->cubic * product(stretch, square, j);
+      extension[j] = (j == 0 ? m->rest - b->x : 0) + f[j] / m->spring;
+      square[j] = product(extension, extension, j);
+      force[j] += m->cubic * product(extension, square, j);
     }
   }
 }
@@ -152,11 +152,11 @@ static real force_at_rest(const body *b, real *rate) {
   return force[0];
 }
 
-/* By how much the force on a body at rest changes with its place. */
+/* By how much the force on a body at rest changes with its position. */
 static real force_slope(const body *b) {
   const machine *m = b->law;
   real f[ORDER + 1];
   drive_series(m, b->time, f);
-  const real stretch = m->rest - b->x + (m->spring != 0 ? f[0] / m->spring : 0);
-  return -m->spring - 3 * m->cubic * stretch * stretch - m->pendulum * R(cos)(b->x);
+  const real extension = m->rest - b->x + (m->spring != 0 ? f[0] / m->spring : 0);
+  return -m->spring - 3 * m->cubic * extension * extension - m->pendulum * R(cos)(b->x);
 }

@@ -31,7 +31,7 @@ contains
     integer, intent(in) :: i
     type(motion_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
-    character(len=*), parameter :: frictions(0:3) = [character(len=50) :: 'none', 'coulomb kinetic_coefficient=0.2', &
+    character(len=*), parameter :: frictions(0:3) = [character(len=51) :: 'none', 'coulomb kinetic_coefficient=0.2', &
       'viscous damping=0.4', 'coulomb_viscous kinetic_coefficient=0.1 damping=0.3']
     character(len=*), parameter :: contacts(0:4) = [character(len=60) :: 'newton restitution=0.5', 'newton restitution=0.9', &
       'newton_linear slope=0.1', 'newton_power restitution=0.9 yield_speed=0.1 falloff=0.25', &

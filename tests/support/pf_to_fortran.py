@@ -160,7 +160,7 @@ def read_suite(text: str, stem: str, name: str) -> Suite:
 
 
 def check(suite: Suite) -> None:
-    """Refuses what would silently test less than it says."""
+    """Refuses what would silently test less than it states."""
     if not suite.tests:
         raise PfError("1: no @test in this file")
     if suite.module.lower() != suite.name.lower():

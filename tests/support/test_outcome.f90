@@ -66,7 +66,7 @@ contains
     call record_failure(text)
   end subroutine record
 
-  !> Marks the running test as failed and says why, at once: an MPI test may hang afterwards.
+  !> Marks the running test as failed and reports why, at once: an MPI test may hang afterwards.
   subroutine record_failure(text)
     character(len=*), intent(in) :: text
     failed = .true.

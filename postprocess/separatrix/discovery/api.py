@@ -40,7 +40,7 @@ class Discovery:
         return tuple(self.verdict["effects"])
 
     def __str__(self) -> str:
-        """Say it as the command does."""
+        """The summary that the command prints."""
         return "\n".join(summary(self.verdict))
 
 
@@ -84,11 +84,11 @@ def discover(
     """
     case = as_case(case)
     effects = [effects] if isinstance(effects, str) else effects
-    with Progress(progress) as told:
+    with Progress(progress) as report:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,
             compare=compare,
-            progress=lambda stage, done: told("steps", round(1000 * done), 1000),
+            progress=lambda stage, done: report("steps", round(1000 * done), 1000),
         )  # fmt: skip
         if out is not None:
             require_writable(Path(out))
@@ -96,7 +96,7 @@ def discover(
         verdict, findings = investigate(case.model, _paths(records), _paths(hold_out), options, still)
         text = extended_case(verdict, findings) if findings.decision.corrected is not None else None
         files = {} if out is None else _write(Path(out), case, verdict, findings, options)
-        told("steps", 1000, 1000)
+        report("steps", 1000, 1000)
     return Discovery(verdict, None if text is None else Case.from_text(text, case.directory), files)
 
 

@@ -29,7 +29,7 @@ from separatrix.version import __version__
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     try:
-        with _ending_when_told():
+        with _ending_on_sigterm():
             chosen = _parser().parse_args(arguments)
             _run(chosen)
     except SeparatrixError as error:
@@ -45,10 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("separatrix-discover: interrupted before the end", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(place.filename).name}:{place.lineno}"
-        said = f"{type(error).__name__} in {where}: {error}"
-        print(f"separatrix-discover: internal error, please report it: {said}", file=sys.stderr)
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(frame.filename).name}:{frame.lineno}"
+        message = f"{type(error).__name__} in {where}: {error}"
+        print(f"separatrix-discover: internal error, please report it: {message}", file=sys.stderr)
         return INTERNAL
     return 0
 
@@ -58,7 +58,7 @@ class _TerminatedError(KeyboardInterrupt):
 
 
 @contextmanager
-def _ending_when_told() -> Iterator[None]:
+def _ending_on_sigterm() -> Iterator[None]:
     """Turn SIGTERM into an exception, so that nothing is left behind; handlers belong to the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -142,7 +142,7 @@ def summary(verdict: dict) -> list[str]:
         lines.append(
             f"  in any case {' and '.join(verdict['in_families'])}: the form is in doubt, not the family"
         )
-    lines += [f"  {name} sits {place}" for name, place in verdict["places"].items()]
+    lines += [f"  {name} acts {location}" for name, location in verdict["locations"].items()]
     lines += [
         f"  {path}{at_knot(verdict['parameters'][path])} = {with_error(verdict['parameters'][path])}"
         for path in of_effects(verdict)

@@ -37,11 +37,11 @@ class Options:
     gap_share: float = 0.3
     # log-likelihood by which a name must beat the next one: odds of 20 to 1
     separation: float = 3.0
-    # the same for two names of one motion, over `separation`: only what sticks tells them apart
+    # the same for two names of one motion, over `separation`: they differ only while the body sticks
     equivalent: float = 2.0
     # the same for a pair over each of its effects alone, over `separation`: pairs are chosen among many
     needed: float = 2.0
-    # log score that a held-out record may lose by a name: as much as separates two names
+    # log score that a held-out record may lose by a name: the separation of two names
     harm: float = -3.0
     # share of block bootstraps in which an effect has to pay for its parameters
     inclusion: float = 0.9
@@ -57,16 +57,15 @@ class Options:
     adequate_share: float = 0.8
     # p value of what is left below which no share is enough
     adequate_p: float = 1e-4
-    # root mean square over the noise of a sample below which what a flexible force would explain is no gap,
-    # and below which nothing is named: with samples enough everything is significant, imperfections of a rig
-    # too
+    # root mean square over the noise of a sample below which a flexible force explains no gap, and below
+    # which nothing is named: with enough samples even imperfections of a rig are significant
     least_gap: float = 0.05
     least_effect: float = 0.02
-    # share of the gap, in training and on held-out records, that may remain of one that is closed but for so
-    # little: what it leaves has another reason
+    # share of the gap, in training and on held-out records, that may remain of a closed one: a remainder so
+    # small has another cause
     remaining: float = 1e-2
-    # share of the gap, in training and on held-out records, that a force must close, linearised, for what it
-    # depends on to be told of a gap without a name
+    # share of the gap, in training and on held-out records, that a force must close, linearised, for the
+    # dependence of an unnamed gap to be reported
     characterised: float = 0.5
     # size of what counts as visible, in standard errors
     visible: float = 5.0

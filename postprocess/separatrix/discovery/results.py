@@ -30,7 +30,7 @@ _DRAFT = ".writing-"
 
 @contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
-    """Give a draft folder; at its end its files take the place of those in `folder`, and what it lacks goes.
+    """Give a draft folder, whose files finally replace those in `folder`; files that it lacks are removed.
 
     After an error nothing has changed.
     """
@@ -127,7 +127,7 @@ def extended_case(verdict: dict, findings: Findings) -> str:
         f"# Outcome: {verdict['outcome']}; records: {records}.",
     ]
     if verdict["alternatives"]:
-        lines.append(f"# Not told apart from: {', '.join(verdict['alternatives'])}.")
+        lines.append(f"# Not distinguished from: {', '.join(verdict['alternatives'])}.")
     for path in fitted.model.parameters:
         found = verdict["parameters"].get(path)
         if found:

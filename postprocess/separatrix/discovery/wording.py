@@ -42,7 +42,7 @@ def words(name: str) -> str:
 
 def of_effects(verdict: dict) -> list[str]:
     """Paths of the parameters of the effects of a verdict, those that the base machine has too included."""
-    several = verdict["places"]
+    several = verdict["locations"]
     return [
         path
         for path in verdict["parameters"]
@@ -92,7 +92,7 @@ def interval(one: dict, digits: int) -> str:
 
 
 def probability(value: float) -> str:
-    """A p value; what is too small for a number is said to be."""
+    """A p value, or a bound where it underflows."""
     return number(value, 2) if value > 0 else "below 1e-300"
 
 

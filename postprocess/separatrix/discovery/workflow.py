@@ -18,8 +18,8 @@ from separatrix.discovery.decision.with_imperfections import decide_with_imperfe
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.fitting.data import Data, fit_stages, gather, scales_of
 from separatrix.discovery.fitting.joint_effects import names_for
+from separatrix.discovery.fitting.locations import location_scales
 from separatrix.discovery.fitting.machine import on_other_records, with_values
-from separatrix.discovery.fitting.places import place_scales
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.sensed import gather_sensed
 from separatrix.discovery.measured.bodies import is_pair, is_structure, pair_as_structure, structure_of
@@ -74,7 +74,7 @@ def investigate(
     if not fitted.fit.good.any():
         raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
     data.base_starts = fitted.fit.starts
-    scales = scales or place_scales(fitted.problem, fitted.fit)
+    scales = scales or location_scales(fitted.problem, fitted.fit)
     if predicted is not None:
         _prepare_held_out(predicted, data, model, fitted, scales.mass)
     context = SearchContext(data, predicted, scales, options)
@@ -84,7 +84,7 @@ def investigate(
         context, decision = decide_with_imperfections(context, fitted)
         decision = hidden_state_tested(context, decision)
         decision.reasons += nearest(context, decision)
-        options.progress("asking what the rest of the gap depends on", 0.9)
+        options.progress("characterising the rest of the gap", 0.9)
         decision = with_law(context, characterised(context, decision))
     decision = with_function(context, decision)
     # its noise may have been measured again
@@ -141,7 +141,7 @@ def _prepared(record: Record, model, rest: Record | None, options: Options) -> P
             f"{record.file}: found columns {found}, allowed for a base machine of one body x, v"
         )
     for one in (record, rest):
-        if one is not None and not one.has_place:
+        if one is not None and not one.has_position:
             raise SeparatrixError(
                 f"{one.file}: found a speed and no x, allowed where the machine is written joint by joint "
                 "(body.NAME, spring.NAME, also of one body), without impacts: there each start is fitted"
@@ -181,8 +181,8 @@ def _split(
 
 def _all_different(records: list[Record]) -> None:
     """Refuse a record that is given twice: it would count twice, or predict itself."""
-    for place, one in enumerate(records):
-        for other in records[:place]:
+    for index, one in enumerate(records):
+        for other in records[:index]:
             if _same(one, other):
                 raise SeparatrixError(f"{one.file}: the same record as {other.file}", USAGE)
 
@@ -208,7 +208,7 @@ def _cut(record: Record, first: int, last: int, suffix: str) -> Record:
     sensors = {name: column[part] for name, column in record.sensors.items()}
     header = dict(record.header)
     if first and "phase" in header and "phase_origin_s" not in header:
-        # the header tells the crank angle at the first row of the whole record
+        # the header gives the crank angle at the first row of the whole record
         header["phase_origin_s"] = float(record.t[0])
     return Record(
         record.name + suffix,

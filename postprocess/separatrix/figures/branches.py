@@ -154,7 +154,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
             f"no orbits; dry friction holds {plain(str(result.attrs['rest_joints']).split('; ')[0])}"
         )
         if not np.isfinite(result["rest_x_low"].values).any():
-            ax.text(0.5, 0.5, "between which places is not known", ha="center", transform=ax.transAxes)
+            ax.text(0.5, 0.5, "between which positions is not known", ha="center", transform=ax.transAxes)
     caption = [
         *caption_pieces(result, look, describe_case(result)),
         f"{', '.join(counts)}; there may be others",

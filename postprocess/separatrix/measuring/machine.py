@@ -132,7 +132,7 @@ class Machine:
         Only of a map over x0 and v0.
         """
         one = self.attractor(number)
-        if self.names != ("x0", "v0") or one.numbers["any_place"] or one.numbers["two_bodies"]:
+        if self.names != ("x0", "v0") or one.numbers["any_position"] or one.numbers["two_bodies"]:
             return None
         if one.points.shape[1] < 2:
             # the section of a machine without a drive is where it turns round

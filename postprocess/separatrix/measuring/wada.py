@@ -84,8 +84,8 @@ def grid_method(
     Up to `most` of the cells with corners in two basins are taken. In each, segments between corners of
     different labels are bisected with new starts, `steps` times; of the halves those with different ends go
     on, one for each pair of labels. `shares` are the cells with all N basins after each step, with intervals
-    (Clopper and Pearson). A share that goes to 1 says Wada down to 2^-steps of a cell, and proves nothing
-    below.
+    (Clopper and Pearson). A share that goes to 1 indicates the Wada property down to 2^-steps of a cell; at
+    smaller distances nothing is shown.
     """
     basins = tuple(int(label) for label in np.unique(grid) if label > 0)
     cells = np.argwhere(cells_of_two_basins(grid))

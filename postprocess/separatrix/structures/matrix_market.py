@@ -35,7 +35,7 @@ def read_matrix_market(path: Path) -> sparse.csr_array:
     if not good or words[4] not in ("general", "symmetric", "skew-symmetric"):
         raise SeparatrixError(f"{path}:1: found {shown(text[:begin])}, allowed {_ALLOWED}")
     coordinate, symmetry = words[2] == "coordinate", words[4]
-    form, how = (WHOLE, "whole, as the header says integer") if words[3] == "integer" else (NUMBER, HOW)
+    form, how = (WHOLE, "whole, as the header states integer") if words[3] == "integer" else (NUMBER, HOW)
     at = begin + _IDLE.match(text[begin:]).end()
     line = 1 + text.count(b"\n", 0, at)
     end = text.find(b"\n", at) + 1 or len(text)

@@ -168,7 +168,7 @@ contains
     call atomic_store(self%words, word_refilling, 0_int64)
   end subroutine end_refill
 
-  !> Whether the node was told that nothing is left. The pool is empty then.
+  !> Whether the node was informed that nothing is left. The pool is empty then.
   logical function is_exhausted(self)
     class(node_t), intent(in) :: self
     is_exhausted = atomic_load(self%words, word_exhausted) /= 0

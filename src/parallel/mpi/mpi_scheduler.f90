@@ -145,7 +145,7 @@ contains
     integer :: nothing(0)
     if (.not. self%active) return
     if (self%node%is_stopped()) return
-    ! Only the first of a node tells rank 0, which sees its own node's word.
+    ! Only the first of a node informs rank 0, which sees the flag of its own node.
     if (.not. self%node%set_stop() .or. self%node%number == 1) return
     call MPI_Isend(nothing, 0, MPI_INTEGER, 0, tag_stop, self%comm, request)
     self%sending = [self%sending, request]

@@ -17,7 +17,7 @@ module parallel
 
   public :: start_team, join_team, make_scheduler
 
-  !> What `--version` says about MPI.
+  !> What `--version` reports about MPI.
   character(len=*), parameter, public :: mpi_name = 'MPI'
 
 contains
@@ -33,7 +33,7 @@ contains
       ! The default layer of OpenMPI 4.1 can lose data on a full disk without an error.
       call default_environment('OMPI_MCA_io', 'romio321')
       call allow_shared_memory()
-      ! Threads service to the bodies of a GPU; the first of them alone calls MPI.
+      ! Threads serve the bodies of a GPU; the first of them alone calls MPI.
       call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     end if
     call new_mpi_team(MPI_COMM_WORLD, ours, owns_mpi=.not. running)

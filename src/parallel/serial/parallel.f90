@@ -18,7 +18,7 @@ module parallel
 
   public :: start_team, join_team, make_scheduler
 
-  !> What `--version` says about MPI.
+  !> What `--version` reports about MPI.
   character(len=*), parameter, public :: mpi_name = 'none'
 
 contains

@@ -48,7 +48,7 @@ def main() -> int:
 
 
 def change(data: bytes, chance: random.Random) -> bytes:
-    """Flip bits, overwrite stretches, cut."""
+    """Flip bits, overwrite ranges, cut."""
     changed = bytearray(data)
     for _ in range(chance.randint(1, 6)):
         if not changed:

@@ -167,7 +167,7 @@ void give_up() {
 }
 } // namespace
 
-// In the place of csupport/guard.c, with less patience: HDF5 loops or crashes in a damaged heap of strings.
+// In place of csupport/guard.c, with less patience: HDF5 loops or crashes in a damaged heap of strings.
 extern "C" void separatrix_guard_begin(const char *text, int, int code) {
   guard_message = std::string(text) + "\n";
   guard_code = code;
@@ -187,7 +187,7 @@ extern "C" void separatrix_guard_end() {
   guard_code = 0;
 }
 
-// In the place of csupport/trial.c: everything is read in this process, where it is looked at.
+// In place of csupport/trial.c: everything is read in this process, where it is looked at.
 extern "C" int separatrix_fork() { return -1; }
 extern "C" int separatrix_crashed(int) { return 0; }
 

@@ -187,7 +187,7 @@ void Mutator::change_line(std::string &input) {
   input.insert(elsewhere == std::string::npos ? 0 : elsewhere + 1, line);
 }
 
-// Another number, or another word, in the place of one.
+// Another number, or another word, in place of one.
 void Mutator::change_number(std::string &input) {
   std::size_t from = input.find_first_of("0123456789", below(input.size()));
   if (from == std::string::npos)

@@ -48,7 +48,7 @@ def changed(path: Path, copy: Path, change: Callable, *what: str) -> Path | None
 
 
 def unsealed(change: Callable) -> Callable:
-    """The same change without the checksum that tells it."""
+    """The same change without the checksum that reveals it."""
 
     def change_and_unseal(file: h5py.File, name: str) -> None:
         change(file, name)
@@ -74,12 +74,12 @@ def replace(file: h5py.File, name: str, **how: object) -> None:
 
 
 def make_text(file: h5py.File, name: str) -> None:
-    """Text in the place of numbers."""
+    """Text in place of numbers."""
     replace(file, name, data=np.array(["one", "two"], dtype=h5py.string_dtype()))
 
 
 def make_numbers(file: h5py.File, name: str) -> None:
-    """Numbers in the place of text."""
+    """Numbers in place of text."""
     replace(file, name, data=np.arange(3.0))
 
 
@@ -114,7 +114,7 @@ def make_compound(file: h5py.File, name: str) -> None:
 
 
 def make_group(file: h5py.File, name: str) -> None:
-    """A group in the place of a dataset."""
+    """A group in place of a dataset."""
     del file[name]
     file.create_group(name)
 

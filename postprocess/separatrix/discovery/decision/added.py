@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A gap without a name, of which it is known on what it depends, as a law of the simulator: a table."""
+"""An unnamed gap whose dependence is known, added to the case as a tabulated law of the simulator."""
 
 from dataclasses import replace
 
@@ -16,9 +16,9 @@ from separatrix.discovery.fitting.members import MEMBERS
 
 
 def with_law(context: SearchContext, decision: Decision) -> Decision:
-    """The decision with what was characterised as a table, or with the reason why the simulator has none.
+    """The decision with the characterised force as a table, or with the reason why the simulator has none.
 
-    The table must close as much of the gap as what is characterised must, fitted and on held-out records.
+    The table must close as much of the gap as a characterised force, on fitted and on held-out records.
     """
     if decision.suspected is not None:
         found = _law(context, decision, decision.suspected)
@@ -47,7 +47,7 @@ def _law(context: SearchContext, decision: Decision, character: Character) -> Sc
         return f"the simulator has no law of a force that depends on {what}{_elsewhere(character)}"
     member = next((one for one in members if fits_machine(one, base.model)), None)
     if member is None:
-        return f"this machine has no place for effect.{members[0].effect}, a force that depends on {what}"
+        return f"this machine does not allow effect.{members[0].effect}, a force that depends on {what}"
     best = next(best_table(context, decision.rounds[0], member, strict=False), None)
     if best is None:
         return f"effect.{member.effect} could not be fitted to these records"

@@ -23,7 +23,7 @@ from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import evidence_of_imperfections
 from separatrix.discovery.fitting.sensed import SensedData
 
-# least eigenvalue of scaled normal equations that says something: of motions, and of forces, which are exact
+# least usable eigenvalue of scaled normal equations: of motions, and of forces, which are exact
 _USABLE, _EXACT = 1e-6, 1e-11
 # of the distance of the values of a constant that are tried, towards the best
 _HALVINGS = 3
@@ -34,9 +34,9 @@ _FADED = 1.3
 _AKIN, _NEARLY_ALL = 0.4, 0.9
 
 
-# share of the gap that must be closed, linearised, for a place among several bodies: a force at a wrong one
-# closes most of a large gap, too
-_AT_A_PLACE = 0.95
+# share of the gap that must be closed, linearised, for a location among several bodies: a force at a wrong
+# one closes most of a large gap, too
+_AT_LOCATION = 0.95
 
 
 @dataclass
@@ -66,8 +66,8 @@ class Character:
             f"and {held_out:.0f} % on held-out records (linearised)"
         )
 
-    def told(self) -> dict:
-        """What the verdict says of it."""
+    def as_dict(self) -> dict:
+        """The entry of the verdict."""
         name, unit = self.hypothesis.constant or ("", "")
         value, error = self.size or (None, None)
         return {
@@ -81,7 +81,7 @@ class Character:
 
 
 def characterised(context: SearchContext, decision: Decision) -> Decision:
-    """The decision with what is known of a gap without a name; as it was where nothing is known for sure."""
+    """The decision with what is known of an unnamed gap; unchanged where nothing is certain."""
     base, predicted = decision.rounds[0].base, decision.predicted
     if decision.outcome != "not-in-catalogue" or predicted is None or predicted.fit.excess <= 0:
         return decision
@@ -106,9 +106,10 @@ def characterised(context: SearchContext, decision: Decision) -> Decision:
 def hidden_state_tested(context: SearchContext, decision: Decision) -> Decision:
     """The decision without its names where a hidden state explains clearly more than they do.
 
-    It is no effect of the catalogue, and what it does a function of speed, place or phase does in part. A
-    right name leaves nothing to it: it has to explain more beside the names too, and than imperfections of a
-    rig."""
+    The catalogue has no hidden state, and a function of speed, position or phase reproduces it in part. A
+    right name leaves nothing to explain, so the state must explain more beside the names too, and more than
+    imperfections of the rig.
+    """
     base, predicted = decision.rounds[0].base, decision.predicted
     if not decision.accepted or predicted is None or predicted.fit.excess <= 0:
         return decision
@@ -128,11 +129,11 @@ def hidden_state_tested(context: SearchContext, decision: Decision) -> Decision:
     gap = replace(
         decision, outcome="not-in-catalogue", accepted=[], alternatives=[], rivals=[], equivalent=False
     )
-    told = characterised(context, gap)
-    if not told.characters or told.characters[0].hypothesis.depends_on != best.hypothesis.depends_on:
+    found = characterised(context, gap)
+    if not found.characters or found.characters[0].hypothesis.depends_on != best.hypothesis.depends_on:
         return decision
-    said = f"a hidden state explains more than {' and '.join(name.fitted.names)} (log-likelihood {lead:.3g})"
-    return replace(told, reasons=[said])
+    names = " and ".join(name.fitted.names)
+    return replace(found, reasons=[f"a hidden state explains more than {names} (log-likelihood {lead:.3g})"])
 
 
 def _motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
@@ -145,17 +146,17 @@ def _motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tup
 def _known(best: Character, context: SearchContext) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = context.options
-    least = _AT_A_PLACE if isinstance(context.training, SensedData) else options.characterised
+    least = _AT_LOCATION if isinstance(context.training, SensedData) else options.characterised
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > least
 
 
 def _likely(best: Character, context: SearchContext) -> bool:
-    """Whether it may be known once it is fitted: of a large gap the linearised share says little."""
+    """Whether a fit may establish it: for a large gap the linearised share is unreliable."""
     return best.p < context.options.detection_level and best.closed > context.options.characterised
 
 
 def _akin(one: Character, best: Character) -> bool:
-    """Whether a hypothesis differs in its second variable alone, which a best with a gap left cannot tell."""
+    """Whether only the second variable differs, which is not determined while the best leaves a gap."""
     return (
         one.hypothesis.depends_on[0] == best.hypothesis.depends_on[0]
         and one.evidence > _AKIN * best.evidence
@@ -174,13 +175,13 @@ def _best(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Charact
     tried = {float(one): _gain(training, hypothesis, one) for one in values}
     best = max(tried, key=tried.get)
     if values.size > 1:
-        place = int(np.searchsorted(values, best))
-        step = np.diff(values)[max(0, min(place, values.size - 2))]
+        index = int(np.searchsorted(values, best))
+        step = np.diff(values)[max(0, min(index, values.size - 2))]
         for _ in range(_HALVINGS):
             step /= 2
             tried |= {one: _gain(training, hypothesis, one) for one in (best - step, best + step)}
             best = max(tried, key=tried.get)
-    found = _judged(training, held_out, hypothesis, best)
+    found = _scored(training, held_out, hypothesis, best)
     if hypothesis.fades and best < _FADED * values[0]:
         found.evidence = -np.inf
     return found
@@ -204,8 +205,8 @@ def _movable(motion: Motion) -> np.ndarray:
     return ~motion.fit.at_bound | motion.problem.in_force
 
 
-def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant: float) -> Character:
-    """Fit a hypothesis to the training records and hold it against the others."""
+def _scored(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant: float) -> Character:
+    """Fit a hypothesis to the training records and score it on the held-out ones."""
     columns = [_columns(hypothesis, one, constant) for one in (training, held_out)]
     count = columns[0][0].shape[2]
     fit, p = training.fit, training.fit.evaluation.by_parameter.shape[2]
@@ -215,7 +216,7 @@ def _judged(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant
     values, after, rank = _solved(training, matrix, gradient, open_)
     gain, rank = after - before, rank - first
     excess, excess_held = max(fit.excess, 1.0), max(held_out.fit.excess, 1.0)
-    predicted = _foretold(training, held_out, columns[1], values, count)
+    predicted = _predicted_fall(training, held_out, columns[1], values, count)
     closed, closed_held = (gain - rank) / excess, predicted / excess_held
     noise = max(1.0, 1 + (excess - gain) / max(1.0, fit.samples))
     evidence = (0.5 * gain + 0.5 * predicted) / noise - rank - np.log(hypothesis.values.size)
@@ -257,7 +258,7 @@ def _scaled(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return matrix / np.outer(size, size), size
 
 
-def _foretold(
+def _predicted_fall(
     training: Motion, held_out: Motion, columns: tuple[np.ndarray, np.ndarray], values: np.ndarray, count: int
 ) -> float:
     """Fall of chi^2 on held-out records, less what their own coefficients gain by chance."""
@@ -270,12 +271,12 @@ def _foretold(
     known = [i for i, one in enumerate(training.problem.free) if one.record is None]
     first = training.fit.evaluation.by_parameter.shape[2]
     fixed = np.array([*shared, *range(p, p + count)], int)
-    told = np.concatenate([values[known], values[first : first + count]])
+    given = np.concatenate([values[known], values[first : first + count]])
     movable = np.array([*own, *range(p + count, matrix.shape[0])], int)
     open_ = np.ones(movable.size, bool)
     _, before, rank_before = _solved(held_out, matrix[np.ix_(own, own)], gradient[own], open_[: len(own)])
-    fall = 2 * told @ gradient[fixed] - told @ matrix[np.ix_(fixed, fixed)] @ told
-    left = gradient[movable] - matrix[np.ix_(movable, fixed)] @ told
+    fall = 2 * given @ gradient[fixed] - given @ matrix[np.ix_(fixed, fixed)] @ given
+    left = gradient[movable] - matrix[np.ix_(movable, fixed)] @ given
     _, after, rank = _solved(held_out, matrix[np.ix_(movable, movable)], left, open_)
     return float(fall + after - before) - (rank - rank_before)
 

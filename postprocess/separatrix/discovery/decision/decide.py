@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forward selection: what may be named, what cannot be told apart, what the catalogue lacks."""
+"""Forward selection: what may be named, what is indistinguishable, what the catalogue lacks."""
 
 from dataclasses import dataclass, field, replace
 
@@ -14,7 +14,7 @@ from separatrix.discovery.decision.gates import (
     score_ceiling,
     weigh_imperfections,
 )
-from separatrix.discovery.decision.misfit import CAUGHT, foretold_chi2, missed, misses
+from separatrix.discovery.decision.misfit import MOST_IN_LOCAL_MINIMUM, missed, misses, predicted_chi2
 from separatrix.discovery.decision.other_machine import other_units
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Round, SearchContext, run_round
@@ -32,7 +32,7 @@ from separatrix.discovery.fitting.rig import cleaned_prediction
 from separatrix.discovery.fitting.smooth import Function
 from separatrix.discovery.options import Options
 
-# how often the base is fitted again, from where how many candidates led, and the least fall of chi^2
+# refits of the base, number of leading candidates whose minima they start from, least fall of chi^2
 _RENEWALS = 3
 _LEADERS = 3
 _LOWER = 1.0
@@ -48,7 +48,7 @@ class Decision:
     outcome: str
     accepted: list[ScoredCandidate]
     alternatives: list[list[str]]
-    # the fits that could not be told from the accepted one
+    # fits that are indistinguishable from the accepted one
     rivals: list[ScoredCandidate]
     rounds: list[Round]
     base_ceiling: Ceiling
@@ -61,17 +61,17 @@ class Decision:
     characters: list = field(default_factory=list)
     # that force as a table of the simulator, which is no name; else why there is none
     added: ScoredCandidate | None = None
-    # what is told only if it closes the gap as a table
+    # hypothesis that is reported only if it closes the gap as a table
     suspected: object | None = None
     not_added: str = ""
-    # what the records tell of the function that the last effect is
+    # the last effect as a function, as far as the records determine it
     function: Function | None = None
 
     @property
     def in_families(self) -> list[str]:
         """Families that the best and all its rivals agree on, where nothing else is in doubt; else none.
 
-        Forms of one family that fit alike are one function within what the records tell of it.
+        Forms of one family that fit alike are the same function within the information of the records.
         """
         best = self.accepted[0] if self.accepted else None
         if (
@@ -106,7 +106,7 @@ def decide(context: SearchContext, base: Fitted, settled: bool = False) -> Decis
         if best.gates["detect"] and not decision.accepted:
             decision.reasons.append(
                 f"{best.name} gains more than chance does (p = {best.p:.1g}), but few segments carry that, "
-                "which may be in a wrong minimum: longer records would tell"
+                "which may be in a wrong minimum: longer records would decide"
             )
         return decision
     shaped = None if best.gates["adequate"] else _shaped(context, first)
@@ -122,7 +122,7 @@ def decide(context: SearchContext, base: Fitted, settled: bool = False) -> Decis
             # the base itself explains what the effect did
             return _without_name(context, decision)
     if best.gates["adequate"]:
-        return conclude(context, decision, *_with_more_foretold(context, decision, best, rivals))
+        return conclude(context, decision, *_with_more_predicted(context, decision, best, rivals))
     if shaped is None and found is not first:
         shaped = _shaped(context, found, first)
     if shaped is not None and not (_of_several(context, shaped[0]) and context.options.most_effects > 1):
@@ -132,14 +132,14 @@ def decide(context: SearchContext, base: Fitted, settled: bool = False) -> Decis
     rounds = list(decision.rounds)
     before = list(rounds[0].scored)
     *more, closed = with_more(context, rounds, best)
-    alone = None if closed else _warm_started_alone(context, rounds[0], before)
+    alone = None if closed else _alone_after_warm_start(context, rounds[0], before)
     if shaped is not None:
-        # what it is held against has them
+        # the set that it is compared with has them
         weigh_imperfections(context, shaped[0])
     if alone is not None and (shaped is None or alone[0].evidence > shaped[0].evidence):
         return conclude(context, decision, *alone)
     if shaped is not None:
-        # a table for each direction says what a law over the speed and one of the direction say with less
+        # two laws, of the speed and of the direction, may replace a table for each direction
         closed = closed and more[0].evidence > shaped[0].evidence
         if not closed and not _only_follows(context, shaped[0]):
             return conclude(context, decision, *shaped)
@@ -154,34 +154,33 @@ def decide(context: SearchContext, base: Fitted, settled: bool = False) -> Decis
     return _give_up(context, decision, best)
 
 
-def _warm_started_alone(
+def _alone_after_warm_start(
     context: SearchContext, found: Round, before: list[ScoredCandidate]
 ) -> tuple[ScoredCandidate, list[ScoredCandidate]] | None:
-    """An effect alone that closes the gap since several led it out of a wrong minimum, and its
-    rivals.
-    """
+    """A single effect that closes the gap after a warm start from several, and its rivals."""
     if all(any(one is other for other in before) for one in found.scored):
         return None
     best, rivals = _lead(context, found)
     return (best, rivals) if _detected(best) and best.gates["adequate"] else None
 
 
-def _with_more_foretold(
+def _with_more_predicted(
     context: SearchContext, decision: Decision, best: ScoredCandidate, rivals: list[ScoredCandidate]
 ) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
-    """An effect that leaves noise where it was fitted but misses a held-out record, and another beside it.
+    """Add another effect to one that leaves noise where it was fitted but misses a held-out record.
 
-    What two effects do together where they were fitted one may do alone, but not at another drive.
+    One effect may reproduce two at the drives that were fitted, but not at another drive.
     """
-    told = best.prediction
-    if told is None or context.options.quick or context.options.most_effects < 2 or best.leaves != NOISE:
+    prediction = best.prediction
+    options = context.options
+    if prediction is None or options.quick or options.most_effects < 2 or best.leaves != NOISE:
         return best, rivals
     if not _only_follows(context, best):
         return best, rivals
     rounds = list(decision.rounds)
     whole, others, closed = with_more(context, rounds, best)
     sure = closed and all(whole.gates.values())
-    share = closed_share(told, whole.prediction)
+    share = closed_share(prediction, whole.prediction)
     if not sure or share is None or share < _CLOSES:
         return best, rivals
     decision.rounds = rounds
@@ -189,7 +188,7 @@ def _with_more_foretold(
 
 
 def _shape_alone(context: SearchContext, decision: Decision, found: Round) -> Decision:
-    """A family as a function where none of its closed forms, nor any other effect, stands out of chance."""
+    """A family as a function where neither its closed forms nor another effect are significant."""
     shaped = _shaped(context, found) if decision.outcome == "not-in-catalogue" else None
     if shaped is None or _only_follows(context, shaped[0]):
         return decision
@@ -200,9 +199,9 @@ def _shape_alone(context: SearchContext, decision: Decision, found: Round) -> De
 def _shaped(
     context: SearchContext, found: Round, earlier: Round | None = None
 ) -> tuple[ScoredCandidate, list[ScoredCandidate]] | None:
-    """A family whose built-in shapes are wrong and that closes the gap as a function.
+    """A family whose closed forms have the wrong shape and that closes the gap as a function.
 
-    What a function predicts is its proof: one that helps no held-out record only follows the fitted ones.
+    A function must improve the prediction of held-out records; else it only follows the fitted ones.
     """
     base = ceiling(found.base.problem, found.base.fit, context.scales.mass)
     member = flexible_member(context, found, base, earlier)
@@ -222,8 +221,8 @@ def _shaped(
 def _of_several(context: SearchContext, one: ScoredCandidate) -> bool:
     """Whether a function may be the sum of several effects.
 
-    A table of friction for each direction says what two closed forms say with less; and what follows the
-    fitted records but not held-out ones may have taken over what another effect does.
+    Two closed forms may replace a table of friction for each direction with fewer parameters. A function that
+    follows the fitted but not the held-out records may have absorbed another effect.
     """
     if context.options.quick or one.prediction is None:
         return _of_two_directions(one)
@@ -235,11 +234,11 @@ def _only_follows(context: SearchContext, one: ScoredCandidate) -> bool:
 
     What imperfections of a rig may explain of those is taken off.
     """
-    told = one.prediction
-    if told is None or not misses(told, one.fitted.fit, context.options):
+    prediction = one.prediction
+    if prediction is None or not misses(prediction, one.fitted.fit, context.options):
         return False
-    told = replace(told, fit=cleaned_prediction(one.fitted, told))
-    return misses(told, one.fitted.fit, context.options)
+    prediction = replace(prediction, fit=cleaned_prediction(one.fitted, prediction))
+    return misses(prediction, one.fitted.fit, context.options)
 
 
 def _of_two_directions(one: ScoredCandidate) -> bool:
@@ -258,13 +257,13 @@ def _begun(context: SearchContext, first: Round) -> Decision:
 def _renewing(
     context: SearchContext, found: Round, at: float, settled: bool, everything: bool = False
 ) -> Round:
-    """The round again, for as long as it shows that its base can be fitted better."""
+    """Repeat the round as long as it shows that its base can be fitted better."""
     for _ in range(_RENEWALS):
         lower = renewed(context, found, settled)
         if lower is None:
             break
-        told = context.predict(lower, found.predicted)
-        found = run_round(context, lower, told, at, at + 0.1, found, everything)
+        predicted = context.predict(lower, found.predicted)
+        found = run_round(context, lower, predicted, at, at + 0.1, found, everything)
     return found
 
 
@@ -295,10 +294,10 @@ def _noise_renewed(context: SearchContext, best: ScoredCandidate) -> bool:
 
 
 def renewed(context: SearchContext, first: Round, settled: bool = False) -> Fitted | None:
-    """The base fitted again where candidates show that the noise is another or that it was not at its best.
+    """Refit the base where candidates show another noise or a lower minimum of the base.
 
-    A candidate may have left a minimum that the base was in: what the base reaches from
-    there is no merit of the candidate.
+    A candidate may have left a local minimum of the base; the fall of chi^2 that the base reaches from
+    there is not a gain of the candidate.
     """
     base = first.base
     lowest_misfit = sorted(first.scored, key=lambda one: -one.training)[:_LEADERS]
@@ -312,8 +311,8 @@ def renewed(context: SearchContext, first: Round, settled: bool = False) -> Fitt
         fits.append(minimise(base.problem, values, one.fitted.fit.starts))
     fits = [fit for fit in fits if fit.good.sum() >= fits[0].good.sum()]
     lowest = min(fits, key=lambda fit: fit.total)
-    warm_started = (best or lowest_misfit[0]).training
-    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * warm_started):
+    gain = (best or lowest_misfit[0]).training
+    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * gain):
         return None
     return Fitted(base.names, base.model, base.problem, lowest, base.added)
 
@@ -333,12 +332,12 @@ def conclude(
     failed = [gate for gate, passed in best.gates.items() if not passed]
     decision.reasons += [f"gate '{gate}' was not passed" for gate in failed]
     if "predicted" in failed:
-        size = foretold_chi2(best.prediction, best.fitted.fit)
+        size = predicted_chi2(best.prediction, best.fitted.fit)
         decision.reasons.append(
             f"held-out records are missed by more than the noise and what errors of the parameters would "
             f"explain: the reduced chi^2 left there is {size:.4g}"
         )
-    # what only fitted records say, over a base that is not at its minimum, may be what the base lacks to it
+    # evidence of the fitted records alone may only be the distance of the base from its minimum
     proven = best.gates.get("hold-out", False) or decision.rounds[0].base.fit.converged
     if not (best.gates["admissible"] and best.gates["converged"] and proven):
         return _without_name(context, decision)
@@ -362,7 +361,7 @@ def _without_name(context: SearchContext, decision: Decision) -> Decision:
         decision.reasons.append(_no_gap(context, decision))
     if wide:
         decision.outcome = "not-in-catalogue"
-        # of several bodies forces at several places explain a large gap
+        # with several bodies, forces at several locations explain a large gap
         several = isinstance(decision.rounds[0].base.problem, CoordinateProblem)
         name = "" if several else decision.base_ceiling.mostly
         what = f"forces that depend on {name}" if name else "free forces"
@@ -382,11 +381,11 @@ def _no_gap(context: SearchContext, decision: Decision) -> str:
 
 
 def _give_up(context: SearchContext, decision: Decision, best: ScoredCandidate) -> Decision:
-    """Effects stand out of chance, but none is all that is missing."""
+    """Effects are significant, but none explains all that is missing."""
     base = decision.rounds[0].base
     # over a base that is not at its minimum a gain may be its own
-    told = base.fit.converged and sizeable(2 * best.training, base.fit, context.options)
-    if told or any(_gap_of_base(context, decision)):
+    clear = base.fit.converged and sizeable(2 * best.training, base.fit, context.options)
+    if clear or any(_gap_of_base(context, decision)):
         decision.outcome = "not-in-catalogue"
         decision.reasons.append(
             "the best effects of the catalogue leave a gap that a flexible force would close"
@@ -402,10 +401,10 @@ def _give_up(context: SearchContext, decision: Decision, best: ScoredCandidate) 
 
 
 def _gap_of_base(context: SearchContext, decision: Decision) -> tuple[list[str], bool]:
-    """The records that the base machine misses, and whether a flexible force explains what is no trifle.
+    """The records that the base machine misses, and whether a flexible force explains a sizeable part.
 
-    Small imperfections of a rig count as noise. What a few segments carry that are followed far worse than
-    all others may be a wrong minimum of theirs.
+    Small imperfections of a rig count as noise. A gap of few segments that are followed far worse than the
+    others may be a wrong minimum of these.
     """
     base = decision.rounds[0].base
     fits = [(context.training, decision.base_ceiling.fit)]
@@ -414,13 +413,13 @@ def _gap_of_base(context: SearchContext, decision: Decision) -> tuple[list[str],
     left = [one for data, fit in fits for one in missed(data, fit, context.options)]
     wide = _wide(decision.base_ceiling, base.fit, context.options)
     in_local_minimum = suspicious(base.fit) if wide else np.zeros(0, int)
-    if 0 < in_local_minimum.size <= CAUGHT:
+    if 0 < in_local_minimum.size <= MOST_IN_LOCAL_MINIMUM:
         others = without_segments(base.fit, in_local_minimum)
         wide = _wide(ceiling(base.problem, others, context.scales.mass), others, context.options)
     return left, wide
 
 
 def _wide(gap: Ceiling, fit: Fit, options: Options) -> bool:
-    """Whether a flexible force explains more than chance and what is no trifle."""
+    """Whether a flexible force explains more than chance, and a sizeable part."""
     significant = gap.p < options.gap_share * options.detection_level
     return significant and sizeable(gap.closable, fit, options)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What to measure next: the experiments of the rig, by how far they would put a machine from its rivals.
+"""What to measure next: the experiments of the rig, ranked by how well they separate a machine from rivals.
 
-One machine is flown to its motion at another drive, the others from the same states, drive period by drive
-period. What the starts of these and the parameters can imitate, the parameters within what the records leave
-of their errors, is projected out; the rest over the noise is d', the size in standard errors. Of several
-rivals that one counts which is hardest to tell.
+One machine is simulated at another drive, and its rivals from the same states, drive period by drive period.
+The differences that starts and parameters can imitate, the latter within their errors, are projected out. The
+rest over the noise is d', the size in standard errors. Of several rivals the one that is hardest to
+distinguish counts.
 """
 
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ class Experiment:
     drive_ratio: float | None
     scale: float
     d_prime: float
-    # place of the rival that is hardest to tell
+    # index of the rival that is hardest to distinguish
     rival: int
     # of a joint that is driven along the motion of the first record: how many times as fast
     rate: float | None = None
@@ -57,7 +57,7 @@ class Experiment:
 
 
 def experiments(one: Fitted, others: list[Fitted]) -> list[Experiment]:
-    """What the rig allows, the most telling first; none where the force on the body must be known."""
+    """Feasible experiments, the most informative first; none where the force on the body must be known."""
     first = one.problem.prepared[0]
     if first.in_force:
         return _along_other_motions(one, others)
@@ -78,7 +78,7 @@ def experiments(one: Fitted, others: list[Fitted]) -> list[Experiment]:
 
 
 def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: float) -> list[float]:
-    """What tells a machine from others in a record at a drive ratio of the case, in standard errors."""
+    """Distance of a machine from others in a record at a drive ratio of the case, in standard errors."""
     first = one.problem.prepared[0]
     frequency = None if ratio is None else one.model.drive_frequency({"drive.ratio": ratio})
     length = 2 * np.pi / (frequency or first.natural or 2 * np.pi / (first.record.duration / _PERIODS))
@@ -140,19 +140,19 @@ def _directions(
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Paths of the machine, directions of what is free in it, and what the records know of these."""
     paths = list(values)
-    rows, places = [], []
-    for place, free in enumerate(one.problem.free):
+    rows, indices = [], []
+    for index, free in enumerate(one.problem.free):
         row = np.zeros(len(paths))
         if free.path == "nuisance:drive_scale":
             for path, size in one.problem.amplitudes.items():
                 row[paths.index(path)] = scale * size
         elif not free.is_nuisance:
-            for path, slope in free.slopes(one.fit.values[place]).items():
+            for path, slope in free.slopes(one.fit.values[index]).items():
                 row[paths.index(path)] = slope
         if row.any():
             rows.append(row)
-            places.append(place)
-    return paths, np.array(rows), _prior(one, places)
+            indices.append(index)
+    return paths, np.array(rows), _prior(one, indices)
 
 
 def _left(apart: np.ndarray, slopes: np.ndarray, count: int, seen: float, prior: np.ndarray) -> float:
@@ -169,9 +169,9 @@ def _left(apart: np.ndarray, slopes: np.ndarray, count: int, seen: float, prior:
     return _length(square, matrix, gradient)
 
 
-def _prior(one: Fitted, places: list[int]) -> np.ndarray:
+def _prior(one: Fitted, indices: list[int]) -> np.ndarray:
     """What the records know of some free parameters: the inverse of their covariance."""
-    covariance = one.covariance[np.ix_(places, places)]
+    covariance = one.covariance[np.ix_(indices, indices)]
     return inverse_scaled(covariance, np.diag(covariance) > 0, 1e-15)
 
 
@@ -186,11 +186,11 @@ def _along_other_motions(one: Fitted, others: list[Fitted]) -> list[Experiment]:
 
 
 def _apart_in_force(one: Fitted, other: Fitted, scale: float, rate: float) -> float:
-    """Size in standard errors of what tells the forces of two machines apart along a motion."""
+    """Difference of the forces of two machines along a motion, in standard errors."""
     first = one.problem.prepared[0]
     motion, measured, pieces = first.driven.scaled(scale, rate), first.record.force, first.record.pieces
     deviation = np.hypot(first.sigma, motion.inertia_error)
-    places = [i for i, free in enumerate(one.problem.free) if free.record is None]
+    indices = [i for i, free in enumerate(one.problem.free) if free.record is None]
 
     def force(fitted: Fitted, values: np.ndarray) -> np.ndarray:
         machine = fitted.problem.machine_values(0, values)
@@ -199,12 +199,12 @@ def _apart_in_force(one: Fitted, other: Fitted, scale: float, rate: float) -> fl
     try:
         base = force(one, one.fit.values)
         apart = force(other, other.fit.values) - base
-        slopes = [(force(one, moved) - base) / step for moved, step in _moved(one, places)]
+        slopes = [(force(one, moved) - base) / step for moved, step in _moved(one, indices)]
     except SeparatrixError:
         # no such machine there
         return 0.0
     columns = np.column_stack(slopes)
-    matrix, gradient = _prior(one, places) + columns.T @ columns, columns.T @ apart
+    matrix, gradient = _prior(one, indices) + columns.T @ columns, columns.T @ apart
     return _length(apart @ apart, matrix, gradient)
 
 
@@ -214,10 +214,10 @@ def _length(square: float, matrix: np.ndarray, gradient: np.ndarray) -> float:
     return float(np.sqrt(max(0.0, square - imitated)))
 
 
-def _moved(one: Fitted, places: list[int]) -> Iterator[tuple[np.ndarray, float]]:
+def _moved(one: Fitted, indices: list[int]) -> Iterator[tuple[np.ndarray, float]]:
     """Values of the machine with one parameter after the other moved by a step."""
-    for place in places:
-        free, values = one.problem.free[place], one.fit.values.copy()
-        step = _STEP * free.size * (1 if values[place] + _STEP * free.size <= free.upper else -1)
-        values[place] += step
+    for index in indices:
+        free, values = one.problem.free[index], one.fit.values.copy()
+        step = _STEP * free.size * (1 if values[index] + _STEP * free.size <= free.upper else -1)
+        values[index] += step
         yield values, step

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where no closed form closes a gap: the members of families that are functions, on as many knots as pay."""
+"""Families as tabulated functions, for gaps that no closed form closes; the evidence chooses the knots."""
 
 from collections.abc import Iterator
 
@@ -37,7 +37,7 @@ def flexible_member(
     if not fitted:
         return None
     if any(one.imperfections is not None for one in found.scored):
-        # what they are held against has them
+        # the candidates that they are compared with have them
         for one in fitted:
             weigh_imperfections(context, one)
     able = [one for one in fitted if admissible(one, found.base, context.options)[0]]
@@ -85,8 +85,8 @@ def best_table(
 ) -> Iterator[ScoredCandidate]:
     """The table of a family on as many knots as the evidence pays for; nothing where none converges.
 
-    What is no name need not converge where not `strict`: what it predicts is its proof. One that was fitted
-    on this base stands.
+    Without `strict` an unnamed table need not converge; its predictions decide. A table that was fitted on
+    this base is used again.
     """
     known = _begun(found, member.family)
     same = [
@@ -120,10 +120,10 @@ def _fit_table(
                 break
             context.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
             if made.fit.good.sum() < context.options.followed * found.base.fit.good.sum():
-                # what it lost would pass for a gain
+                # lost segments would appear as a gain
                 continue
             if not made.fit.converged:
-                # more knots than these records can tell apart, no function, or one far from its shape yet
+                # too many knots for these records, no function, or one still far from its shape
                 if best is not None and made.fit.total < best.fitted.fit.total + WORSE:
                     best.fitted.finer = made
                 if count > KNOTS[0] and _pointless(known, made, ahead):
@@ -138,7 +138,7 @@ def _fit_table(
                 best.fitted.finer = made
                 if _pointless(best.fitted, made, ahead):
                     break
-                # far from its shape yet: it follows the fitted records and predicts no others
+                # still far from its shape: it follows the fitted records and predicts no others
                 continue
             slow = best is not None and _pointless(best.fitted, made, ahead)
             best = one

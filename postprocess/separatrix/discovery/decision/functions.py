@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The function that the effect of a verdict is, and a named closed form held against it.
+"""The effect of a verdict as a function, and the comparison of a named closed form with it.
 
-What a form leaves may be no more than noise of a sample and yet show beyond doubt that the law has another
-form: then it is the family that is named.
+The residual of a form may be within the noise of a sample and still prove that the law has another form. Then
+the family is named.
 """
 
 from dataclasses import replace
@@ -22,10 +22,10 @@ from separatrix.discovery.fitting.smooth import function_of
 
 
 def with_function(context: SearchContext, decision: Decision) -> Decision:
-    """The decision with what the records tell of the function of its last effect.
+    """The decision with the function of its last effect, as far as the records determine it.
 
-    A closed form that this refutes yields to the table of its family, or is in doubt: then the one of more
-    evidence leads.
+    A closed form that the function refutes is replaced by the table of its family, or is in doubt; then the
+    one with more evidence is first.
     """
     fitted = decision.corrected.fitted if decision.corrected else None
     if fitted is None or isinstance(fitted.problem, CoordinateProblem):
@@ -33,11 +33,11 @@ def with_function(context: SearchContext, decision: Decision) -> Decision:
     bases = [one.base for one in decision.rounds if one.base.names == fitted.names[:-1]]
     if bases:
         decision.function = function_of(context.training, bases[-1], fitted)
-    return decision if context.options.partial else _held_against_it(context, decision)
+    return decision if context.options.partial else _compared_with_function(context, decision)
 
 
-def _held_against_it(context: SearchContext, decision: Decision) -> Decision:
-    """The decision with a closed form alone held against its function."""
+def _compared_with_function(context: SearchContext, decision: Decision) -> Decision:
+    """The decision after the comparison of a single closed form with its function."""
     best, function = decision.accepted[0] if decision.accepted else None, decision.function
     sure = decision.outcome == "named" or bool(decision.in_families)
     if best is None or function is None or not sure or len(best.fitted.names) != 1:
@@ -46,10 +46,12 @@ def _held_against_it(context: SearchContext, decision: Decision) -> Decision:
     if form is None or form["fits"]:
         return decision
     found = decision.rounds[0]
-    said = f"the function of {function.member.family} has another form than {best.name} (p = {form['p']:.1g})"
+    reason = (
+        f"the function of {function.member.family} has another form than {best.name} (p = {form['p']:.1g})"
+    )
     table = next(best_table(context, found, function.member), None)
     if table is None:
-        return replace(decision, outcome="ambiguous", reasons=[*decision.reasons, said])
+        return replace(decision, outcome="ambiguous", reasons=[*decision.reasons, reason])
     if best.imperfections is not None:
         weigh_imperfections(context, table)
     pass_gates(context, table, found.base, [], found.screened.tests)
@@ -71,6 +73,6 @@ def _held_against_it(context: SearchContext, decision: Decision) -> Decision:
         accepted=[first],
         rivals=rivals,
         alternatives=[list(one.fitted.names) for one in rivals],
-        reasons=[*decision.reasons, said],
+        reasons=[*decision.reasons, reason],
         equivalent=False,
     )

@@ -34,7 +34,7 @@ from separatrix.discovery.options import Options
 # beside how many
 _SHARE = 0.2
 _WEIGHED = 8
-# share of what imperfections of a rig explain that is known no better, as they are taken as linear
+# relative error of what imperfections of a rig explain, from their linearisation
 _UNSURE = 0.1
 
 
@@ -47,15 +47,15 @@ def choice(
 ) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """What `choose` takes from a pool, and its rivals.
 
-    Who was not asked to predict is asked now, and where the best leaves more than noise or has rivals the
-    leaders are weighed with imperfections of a rig beside them; then the choice is made again.
+    A chosen candidate without a prediction predicts now. If the best leaves more than noise or has rivals,
+    the leading candidates are weighed with imperfections of a rig, and the choice is repeated.
     """
     pool = list(pool)
     while True:
         best, rivals = choose(pool, context.options)
         if best.prediction is None and predicted is not None:
-            place = next(i for i, one in enumerate(pool) if one is best)
-            pool[place] = scored(base, predicted, best.fitted, context.predict(best.fitted, predicted))
+            index = next(i for i, one in enumerate(pool) if one is best)
+            pool[index] = scored(base, predicted, best.fitted, context.predict(best.fitted, predicted))
             continue
         leading = _leading(pool, best, predicted is not None)
         weighed = [one.imperfections is not None for one in leading]
@@ -67,21 +67,21 @@ def choice(
 
 
 def weigh_imperfections(context: SearchContext, one: ScoredCandidate) -> None:
-    """Give the rig of a candidate its imperfections, where that was not done.
+    """Fit imperfections of the rig beside a candidate, unless that was done.
 
-    What imperfections have moved its parameters by in training they do not predict with: held-out records are
-    predicted by the parameters beside them, where those predict better by themselves too.
+    Held-out records are predicted by the parameters as fitted beside the imperfections, if these parameters
+    alone predict better too.
     """
     if one.imperfections is not None:
         return
     one.imperfections = weight_of_imperfections(one.fitted, one.prediction)
     if one.prediction is None or one.imperfections[0] <= 0:
         return
-    told = context.predict_with_imperfections(one.fitted, one.prediction)
-    parts = gained_together(told, one.predicted)
+    prediction = context.predict_with_imperfections(one.fitted, one.prediction)
+    parts = gained_together(prediction, one.predicted)
     if parts.sum() > one.held_out:
-        one.prediction, one.held_out_parts, one.held_out = told, parts, float(parts.sum())
-        one.imperfections = weight_of_imperfections(one.fitted, told)
+        one.prediction, one.held_out_parts, one.held_out = prediction, parts, float(parts.sum())
+        one.imperfections = weight_of_imperfections(one.fitted, prediction)
 
 
 def _leading(pool: list[ScoredCandidate], best: ScoredCandidate, predicted: bool) -> list[ScoredCandidate]:
@@ -94,7 +94,7 @@ def _leading(pool: list[ScoredCandidate], best: ScoredCandidate, predicted: bool
 def best_of(pool: list[ScoredCandidate], options: Options) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
     """Return the settled candidate of most evidence, and all that it does not beat clearly for its misfit.
 
-    A fit that is not at its end may not be named, but what it gained so far may stand against a name.
+    A fit that has not converged may not be named, but its gain so far counts against a name.
     """
     order = sorted(pool, key=lambda one: -one.evidence)
     best = next((one for one in order if one.settled), order[0])
@@ -109,8 +109,8 @@ def pass_gates(
     if best.prediction is None or best.predicted is None:
         best.own = share_with_imperfections(best.fitted, base)
     else:
-        told = (best.prediction, best.predicted)
-        best.own, best.own_foretold = shares_with_imperfections((best.fitted, base), told)
+        predictions = (best.prediction, best.predicted)
+        best.own, best.own_predicted = shares_with_imperfections((best.fitted, base), predictions)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
     best.gates["converged"] = best.settled
     best.gates["detect"] = (
@@ -127,20 +127,18 @@ def pass_gates(
 
 
 def _within_imperfections(best: ScoredCandidate) -> bool:
-    """Whether what imperfections of a rig do not explain of a gain is within the errors of their being
-    linear.
-    """
+    """Whether imperfections of a rig explain a gain within the error of their linearisation."""
     gained = best.training + best.held_out
-    own = best.own * best.training + best.own_foretold * best.held_out
+    own = best.own * best.training + best.own_predicted * best.held_out
     return own < _UNSURE * (gained - own)
 
 
 def _of_some_size(best: ScoredCandidate, options: Options) -> bool:
-    """Whether what an effect explains, where it was fitted or predicted, is no imperfection of a rig."""
+    """Whether an effect explains more than imperfections of a rig, where it was fitted or predicted."""
     seen = sizeable(2 * best.own * best.training, best.fitted.fit, options, options.least_effect)
     if best.prediction is None:
         return seen
-    predicted = 2 * best.own_foretold * best.held_out
+    predicted = 2 * best.own_predicted * best.held_out
     return seen or sizeable(predicted, best.prediction.fit, options, options.least_effect)
 
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a missing force may depend on beyond the catalogue, as columns of a linear fit along the motion.
+"""Dependences of a missing force beyond the catalogue, as columns of a linear fit along the motion.
 
-Every hypothesis has columns whose coefficients belong to the machine and are predicted on other records, and
-columns whose coefficients each stretch of a record has for itself: an oscillation of unknown phase, what a
-hidden state began with.
+Every hypothesis has columns whose coefficients belong to the machine and are predicted on other records. It
+may have columns with separate coefficients for each interval of a record: an oscillation of unknown phase,
+the initial value of a hidden state.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,19 +17,19 @@ from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.motions import (
     after_impacts,
+    extensions,
     impacts_at,
     knots_of,
     products,
     scaled_motion,
     splines,
-    stretches,
 )
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns, kick_columns
 
 # drive periods, or periods of the natural frequency, over which an oscillation keeps its phase
-_STRETCH = 12
+_COHERENT_PERIODS = 12
 # frequencies of an oscillation over the natural frequency: of stiffness, friction or force; of restitution
 _WAVES, _SLOW_WAVES = (0.3, 4.0), (0.08, 0.6)
 # time constants, delays over the natural period; frequencies of an attached mass over the natural frequency
@@ -39,10 +39,10 @@ _GRID = 20
 _DAMPINGS = (0.005, 0.02, 0.08)
 # parts of a delay at the beginning of a record, before which the motion is not known
 _BEGINNINGS = 4
-# steps of a natural period in which a hidden state is integrated
+# integration steps of a hidden state per natural period
 _STEPS = 100
 _FEWEST_IMPACTS, _FEWEST_AFTER = 4, 100
-# shortest way after turning that is looked at, over the longest, and where its function may bend
+# shortest way after a turning point, over the longest, and knots of its function
 _SHORTEST_WAY, _WAY_KNOTS = 2e-3, 12
 
 Columns = np.ndarray | None
@@ -58,10 +58,10 @@ class Motion:
     # natural frequency [rad/s]
     natural: float
     # time over which an oscillation keeps its phase [s]
-    stretch: float
+    coherence_time: float
     t: np.ndarray
     phase: np.ndarray | None
-    # stretch of the spring at the samples [m]; None without a linear spring, or where it is the place
+    # extension of the spring at the samples [m]; None without a linear spring, or where it is the position
     spring: np.ndarray | None
     good: np.ndarray
 
@@ -105,10 +105,10 @@ def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
         t[rows] = prepared.samples.t[problem.segments.index[rows]] - prepared.samples.t[0]
         frequency = prepared.frequency or frequency
     phase = scaled_motion(problem, fit)["phase"]
-    stretch = _STRETCH * 2 * np.pi / frequency
-    spring = None if phase is None else stretches(problem, fit)
+    coherence_time = _COHERENT_PERIODS * 2 * np.pi / frequency
+    spring = None if phase is None else extensions(problem, fit)
     good = problem.segments.inside & fit.good[:, None]
-    return Motion(problem, fit, mass, natural, stretch, t, phase, spring, good)
+    return Motion(problem, fit, mass, natural, coherence_time, t, phase, spring, good)
 
 
 def hypotheses(training: Motion) -> Iterator[Hypothesis]:
@@ -126,7 +126,7 @@ def hypotheses(training: Motion) -> Iterator[Hypothesis]:
 
 
 def _smooth(training: Motion) -> Iterator[Hypothesis]:
-    """Functions of place, speed and phase of the drive."""
+    """Functions of position, speed and phase of the drive."""
     x, v = training.x[training.good], training.v[training.good]
     over_x, over_v, few_x, few_v = (
         knots_of(values, count) for values, count in ((x, 7), (v, 7), (x, 5), (v, 5))
@@ -140,12 +140,12 @@ def _smooth(training: Motion) -> Iterator[Hypothesis]:
     if training.spring is not None:
         over_s = knots_of(training.spring[training.good], 7)
 
-        def stretched(m: Motion) -> np.ndarray:
-            # of records whose machine cannot be asked nothing is predicted
+        def over_extension(m: Motion) -> np.ndarray:
+            # without a known extension nothing is predicted
             known = m.good if m.spring is not None else np.zeros_like(m.good)
             return splines(m.x if m.spring is None else m.spring, over_s, known)
 
-        yield _function(("extension",), stretched)
+        yield _function(("extension",), over_extension)
     yield _function(
         ("speed", "position"), lambda m: products(splines(m.v, few_v, m.good), splines(m.x, few_x, m.good))
     )
@@ -170,13 +170,13 @@ def _times(training: Motion) -> Iterator[Hypothesis]:
         yield _function(("slow time", *names), lambda m, f=factor: m.t[:, :, None] * f(m), f"a t{text}")
         yield Hypothesis(
             ("oscillating time", *names),
-            lambda m, w, f=factor: (None, _force(m, _in_stretches(m, _wave(m, w, f(m))))),
+            lambda m, w, f=factor: (None, _force(m, _in_intervals(m, _wave(m, w, f(m))))),
             f"a cos(w t + c){text}", ("frequency w", "rad/s"), values=waves,
         )  # fmt: skip
 
 
 def memories(training: Motion) -> Iterator[Hypothesis]:
-    """Hidden states: one that relaxes, one that is late, a mass on a spring of its own."""
+    """Hidden states: relaxation, a delay, an attached mass on a spring."""
     period = 2 * np.pi / training.natural
     yield Hypothesis(
         ("memory",),
@@ -208,7 +208,7 @@ def memories(training: Motion) -> Iterator[Hypothesis]:
 
 
 def _after_turning(training: Motion) -> Hypothesis:
-    """Friction that builds up over a way once the motion has turned: of a spring or a play in series."""
+    """Friction that builds up over a way after a turning point, by a spring or a play in series."""
     longest = float(_ways(training)[training.good].max())
     inner = longest * np.append(0.0, np.geomspace(_SHORTEST_WAY, 1.0, _WAY_KNOTS))
     knots = np.concatenate([[0.0] * 3, inner, [longest] * 3])
@@ -224,7 +224,7 @@ def _drifts(m: Motion) -> np.ndarray:
 
 
 def _ways(m: Motion) -> np.ndarray:
-    """Way since the known motion of a record turned round last [m], at the samples."""
+    """Way since the last turning point of the known motion of a record [m], at the samples."""
     found = np.zeros(m.x.shape)
     for number, prepared in enumerate(m.problem.prepared):
         rows = np.flatnonzero(m.problem.segments.record == number)
@@ -262,7 +262,7 @@ def _at_impacts(training: Motion) -> Iterator[Hypothesis]:
         yield _function(("time since impact",), after)
     yield Hypothesis(
         ("oscillating time", "impacts"),
-        lambda m, w: (None, kick(m, _in_stretches(m, _wave(m, w, rebounds(m))))),
+        lambda m, w: (None, kick(m, _in_intervals(m, _wave(m, w, rebounds(m))))),
         "a cos(w t + c) V", ("frequency w", "rad/s"),
         values=_frequencies(training, _SLOW_WAVES),
     )  # fmt: skip
@@ -278,8 +278,8 @@ def _force(m: Motion, values: np.ndarray) -> np.ndarray:
 
 
 def _frequencies(m: Motion, ends: tuple[float, float]) -> np.ndarray:
-    """As close as a stretch can tell apart."""
-    return np.arange(ends[0] * m.natural, ends[1] * m.natural, np.pi / (2 * m.stretch))
+    """Frequencies at the resolution of one coherence time."""
+    return np.arange(ends[0] * m.natural, ends[1] * m.natural, np.pi / (2 * m.coherence_time))
 
 
 def _wave(m: Motion, w: float, factors: np.ndarray) -> np.ndarray:
@@ -296,9 +296,9 @@ def _in_records(m: Motion, columns: np.ndarray) -> np.ndarray:
     return _apart(columns, m.problem.segments.record)
 
 
-def _in_stretches(m: Motion, columns: np.ndarray) -> np.ndarray:
-    """Columns of each stretch of each record by itself."""
-    part = np.floor(m.t[:, 0] / m.stretch).astype(int)
+def _in_intervals(m: Motion, columns: np.ndarray) -> np.ndarray:
+    """Separate columns for each coherent interval of each record."""
+    part = np.floor(m.t[:, 0] / m.coherence_time).astype(int)
     _, number = np.unique(np.stack([m.problem.segments.record, part]), axis=1, return_inverse=True)
     return _apart(columns, number)
 
@@ -338,19 +338,19 @@ def _relaxed(t: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
 
 
 def _late(t: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
-    """With the position at which it vanishes, which nobody knows."""
+    """The delayed position and the unknown position at which the force vanishes."""
     return np.stack([np.interp(t - tau, t, x) - x.mean(), np.ones_like(x)], axis=1)
 
 
 def _beginning(m: Motion, tau: float) -> np.ndarray:
-    """Tents over the first `tau` of a record, of which the delayed motion is not known."""
-    place = np.arange(_BEGINNINGS) * tau / (_BEGINNINGS - 1)
-    tents = np.maximum(0, 1 - np.abs(m.t[:, :, None] - place) * (_BEGINNINGS - 1) / tau)
+    """Tent functions over the first `tau` of a record, where the delayed motion is unknown."""
+    centre = np.arange(_BEGINNINGS) * tau / (_BEGINNINGS - 1)
+    tents = np.maximum(0, 1 - np.abs(m.t[:, :, None] - centre) * (_BEGINNINGS - 1) / tau)
     return tents * (m.t <= tau)[:, :, None]
 
 
 def _attached(t: np.ndarray, x: np.ndarray, w: float, zeta: float) -> np.ndarray:
-    """Stretch of the spring of a mass that hangs on the body."""
+    """Extension of the spring of an attached mass."""
     system = (np.array([[0, 1], [-w * w, -2 * zeta * w]]), np.array([[0], [w * w]]), np.array([[1.0, 0]]))
     a, b, c, d, _ = cont2discrete((*system, np.zeros((1, 1))), t[1] - t[0], method="foh")
     numerator, denominator = ss2tf(a, b, c, d)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a missing force of a machine of several bodies may depend on, and at which place it acts."""
+"""Dependences of a missing force of a machine of several bodies, and the location at which it acts."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ _KNOTS, _FEWER, _HARMONICS = 8, 4, 3
 
 @dataclass(frozen=True)
 class SensedMotion(Motion):
-    """Of several bodies; `places` (segments, length, 2 n) as measured, where there is a sensor.
+    """Of several bodies; `measured`: positions, velocities (segments, length, 2 n), fitted without a sensor.
 
-    A missing force is that of the true motion: where the gap is large, the fitted one is another.
+    A missing force depends on the true motion, from which the fitted one differs where the gap is large.
     """
 
-    places: np.ndarray | None = None
+    measured: np.ndarray | None = None
 
 
 def motion_at(one: Fitted | Prediction, data: SensedData) -> SensedMotion:
@@ -33,34 +33,34 @@ def motion_at(one: Fitted | Prediction, data: SensedData) -> SensedMotion:
     problem, fit = one.problem, one.fit
     good = problem.segments.inside & fit.good[:, None]
     time, phase = clock_of(problem, fit)
-    places = fit.evaluation.motion.copy()
+    measured = fit.evaluation.motion.copy()
     for number in range(len(problem.prepared)):
         rows = np.flatnonzero(problem.segments.record == number)
         seen = data.measured(number)[problem.segments.index[rows]]
-        places[rows] = np.where(np.isnan(seen), places[rows], seen)
-    return SensedMotion(problem, fit, 1.0, 1.0, 1.0, time, phase, None, good, places)
+        measured[rows] = np.where(np.isnan(seen), measured[rows], seen)
+    return SensedMotion(problem, fit, 1.0, 1.0, 1.0, time, phase, None, good, measured)
 
 
 def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
-    """All that are tried at all places; knots are those of the training records."""
+    """All hypotheses at all locations; knots are those of the training records."""
     structure = training.problem.structure
-    for place in structure.places:
-        s, u = _stretch(training, place.row), _speed(training, place.row)
+    for location in structure.locations:
+        s, u = _extension(training, location.row), _speed(training, location.row)
         if not np.std(s[training.good]) > 0:
             continue
-        of_speed, of_stretch = (knots_of(one[training.good], _KNOTS) for one in (u, s))
+        of_speed, of_extension = (knots_of(one[training.good], _KNOTS) for one in (u, s))
         coarse = [knots_of(one[training.good], _FEWER) for one in (u, s)]
-        row, name = place.row, place.name
+        row, name = location.row, location.name
 
         def over_speed(m: Motion, _: float, row=row, knots=of_speed) -> tuple:
             return _pushed(m, splines(_speed(m, row), knots, m.good), row), None
 
-        def over_stretch(m: Motion, _: float, row=row, knots=of_stretch) -> tuple:
-            return _pushed(m, splines(_stretch(m, row), knots, m.good), row), None
+        def over_extension(m: Motion, _: float, row=row, knots=of_extension) -> tuple:
+            return _pushed(m, splines(_extension(m, row), knots, m.good), row), None
 
         def over_both(m: Motion, _: float, row=row, knots=coarse) -> tuple:
             one, other = (
-                splines(f(m, row), k, m.good) for f, k in zip((_speed, _stretch), knots, strict=True)
+                splines(f(m, row), k, m.good) for f, k in zip((_speed, _extension), knots, strict=True)
             )
             forces = products(one, other)
             return _pushed(m, forces, row), None
@@ -70,8 +70,8 @@ def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
             return None, _pushed(m, drift * m.good[:, :, None], row)
 
         yield Hypothesis((f"speed at {name}",), over_speed)
-        yield Hypothesis((f"stretch at {name}",), over_stretch)
-        yield Hypothesis((f"speed at {name}", f"stretch at {name}"), over_both)
+        yield Hypothesis((f"extension at {name}",), over_extension)
+        yield Hypothesis((f"speed at {name}", f"extension at {name}"), over_both)
         yield Hypothesis((f"slow time at {name}",), drifting)
     if training.phase is not None:
         for body, row in zip(structure.names, np.eye(structure.n), strict=True):
@@ -95,9 +95,9 @@ def _pushed(motion: Motion, forces: np.ndarray, row: np.ndarray) -> np.ndarray:
     return columns_of(motion.problem, motion.fit, forces, row)
 
 
-def _stretch(motion: SensedMotion, row: np.ndarray) -> np.ndarray:
-    return motion.places[:, :, : row.size] @ row
+def _extension(motion: SensedMotion, row: np.ndarray) -> np.ndarray:
+    return motion.measured[:, :, : row.size] @ row
 
 
 def _speed(motion: SensedMotion, row: np.ndarray) -> np.ndarray:
-    return motion.places[:, :, row.size :] @ row
+    return motion.measured[:, :, row.size :] @ row

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What could not have been seen, and what is known to tell names of one motion apart."""
+"""Sizes of effects that these records could not show, and measurements that separate names of one motion."""
 
 from dataclasses import replace
 
@@ -14,21 +14,21 @@ from separatrix.discovery.fitting.screen import screen, signature
 from separatrix.discovery.wording import unit_of
 
 _LADDER = 4.0 ** np.arange(-3, 4)
-# usual sizes (some per cent of the machine's own) up to which a linearised size is told
+# usual sizes (some per cent of the machine's own) up to which a linearised size is reported
 _BELIEVED = 100.0
 _CALIBRATE = "calibrate the sensor at two known positions"
 _ADVICE = {
     frozenset(
         ("offset_force", "asymmetric_friction")
     ): "stop the drive and let the body stick: the middle between the "
-    "places where it breaks away in either direction is off by force/stiffness for a constant force, not for "
-    "friction that differs with the direction",
+    "positions where it breaks away in either direction is off by force/stiffness for a constant force, not "
+    "for friction that differs with the direction",
     frozenset(
         ("offset_force", "sensor_bias")
-    ): "measure the place of the barrier: the sensor's error shifts it, a force does not",
+    ): "measure the position of the barrier: the sensor's error shifts it, a force does not",
     frozenset(
         ("asymmetric_friction", "sensor_bias")
-    ): "measure the place of the barrier: the sensor's error shifts it, friction does not",
+    ): "measure the position of the barrier: the sensor's error shifts it, friction does not",
     frozenset(("sensor_gain", "sensor_bias")): _CALIBRATE,
     frozenset(("sensor_gain", "offset_force")): _CALIBRATE,
     frozenset(("sensor_gain", "asymmetric_friction")): _CALIBRATE,
@@ -39,7 +39,7 @@ _ADVICE = {
 def detectable(context: SearchContext, found: Round) -> dict[str, dict]:
     """Smallest size of each effect that these records would have shown at `visible` standard errors.
 
-    None, with a reason, where no size can be told.
+    None, with a reason, where no size can be given.
     """
     sizes = {
         name: {"size": None, "path": None, "unit": None, "reason": reason}
@@ -70,8 +70,8 @@ def detectable(context: SearchContext, found: Round) -> dict[str, dict]:
 
 def _by_ladder(context: SearchContext, found: Round, made: Candidate) -> float | None:
     """The size at which d' is what counts as visible, between the rungs of a ladder around the usual size."""
-    place = made.added[0]
-    usual = made.free[place].physical(made.free[place].value)
+    index = made.added[0]
+    usual = made.free[index].physical(made.free[index].value)
     if made.names[-1] == "second_barrier":
         depths = np.abs(context.scales.highest - context.scales.lowest) * 0.002 * _LADDER
         inward = 1 if usual < 0.5 * (context.scales.highest + context.scales.lowest) else -1
@@ -82,7 +82,7 @@ def _by_ladder(context: SearchContext, found: Round, made: Candidate) -> float |
     visible = []
     for rung in rungs:
         free = list(made.free)
-        free[place] = replace(free[place], value=float(np.log(rung) if free[place].positive else rung))
+        free[index] = replace(free[index], value=float(np.log(rung) if free[index].positive else rung))
         here = np.array([free[i].value for i in made.added])
         shown = signature(found.base.problem, found.base.fit, replace(made, free=free, forms=[here]))
         if shown is None:
@@ -101,7 +101,7 @@ def _by_ladder(context: SearchContext, found: Round, made: Candidate) -> float |
 
 
 def advice(one: Fitted, others: list[Fitted]) -> str:
-    """What is known to tell two names of one motion apart, where no drive does; '' where nothing is."""
+    """Known measurement that separates two names of one motion where no drive does; '' if there is none."""
     pairs = (frozenset((one.names[-1], other.names[-1])) for other in others if one.names and other.names)
     found = next((_ADVICE[pair] for pair in pairs if pair in _ADVICE), "")
     has_barrier = any(path.startswith("contact.") for path in one.model.parameters)

@@ -27,7 +27,7 @@ _LARGER = 2.0
 _ROUNDING = 0.2
 
 # segments that may be in a wrong minimum
-CAUGHT = 3
+MOST_IN_LOCAL_MINIMUM = 3
 # standard deviations of chi^2 that are no chance
 _CHANCE = 4.0
 
@@ -46,9 +46,9 @@ def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
 
 
 def missed(data: Data, fit: Fit, options: Options) -> list[str]:
-    """Return the records whose reduced chi^2 is that of no adequate model and no chance, in words.
+    """Return, in words, the records whose reduced chi^2 is neither that of an adequate model nor chance.
 
-    And those that the machine cannot be flown along at all.
+    Also those along which the machine cannot be simulated.
     """
     record = data.stages[data.last].record
     found = record_chi2(data, fit)
@@ -78,43 +78,41 @@ def unused(data: Data, fit: Fit, contacts: bool) -> list[str]:
         elif others:
             why.append(f"{others} have no derivatives at some samples")
         if why:
-            said = " and ".join(why)
-            notes.append(f"{one.record.name}: {lost.sum()} of {here.sum()} segments are not used: {said}")
+            reasons = " and ".join(why)
+            notes.append(f"{one.record.name}: {lost.sum()} of {here.sum()} segments are not used: {reasons}")
     return notes
 
 
-def misses(told: Prediction, fitted: Fit, options: Options) -> bool:
+def misses(prediction: Prediction, fitted: Fit, options: Options) -> bool:
     """Whether held-out records are missed, by more than chance and not in a few segments alone."""
-    kept, freedom = _followed(told)
-    # noise that was measured too large where it was fitted was so here
-    size = told.fit.chi2[kept].sum() / freedom / min(1.0, fitted.reduced_chi2)
+    kept, freedom = _followed(prediction)
+    # noise that was overestimated in training is overestimated here too
+    size = prediction.fit.chi2[kept].sum() / freedom / min(1.0, fitted.reduced_chi2)
     return bool(size > max(options.adequate_chi2, 1 + _CHANCE * np.sqrt(2 / freedom)))
 
 
-def refuted(told: Prediction, fitted: Fit, options: Options) -> bool:
-    """Whether held-out records are missed so far that no error of noise or parameters is the reason."""
-    _, freedom = _followed(told)
-    return foretold_chi2(told, fitted) > max(options.missed_chi2, 1 + _CHANCE * np.sqrt(2 / freedom))
+def refuted(prediction: Prediction, fitted: Fit, options: Options) -> bool:
+    """Whether held-out records are missed by more than errors of noise or parameters explain."""
+    _, freedom = _followed(prediction)
+    return predicted_chi2(prediction, fitted) > max(options.missed_chi2, 1 + _CHANCE * np.sqrt(2 / freedom))
 
 
-def foretold_chi2(told: Prediction, fitted: Fit) -> float:
+def predicted_chi2(prediction: Prediction, fitted: Fit) -> float:
     """Reduced chi^2 of held-out records over that in training, where it is above 1.
 
-    What an error of the parameters explains that is likely by what training says of them is taken off, and
-    the few segments that may be in a wrong minimum are left out.
+    The part that likely errors of the parameters explain is subtracted, and the few segments that may be in
+    a wrong minimum are left out.
     """
-    kept, freedom = _followed(told)
-    left = told.fit.chi2[kept].sum() - explained(told, kept)
+    kept, freedom = _followed(prediction)
+    left = prediction.fit.chi2[kept].sum() - explained(prediction, kept)
     return float(left / freedom / max(1.0, fitted.reduced_chi2))
 
 
-def _followed(told: Prediction) -> tuple[np.ndarray, float]:
-    """Held-out segments without a few that may be in a wrong minimum, and their degrees of
-    freedom.
-    """
-    fit, kept = told.fit, told.good.copy()
+def _followed(prediction: Prediction) -> tuple[np.ndarray, float]:
+    """Held-out segments without the few that may be in a wrong minimum, and their degrees of freedom."""
+    fit, kept = prediction.fit, prediction.good.copy()
     in_local_minimum = suspicious(fit)
-    if in_local_minimum.size <= CAUGHT:
+    if in_local_minimum.size <= MOST_IN_LOCAL_MINIMUM:
         kept[in_local_minimum] = False
     return kept, max(1.0, float((fit.counts - fit.unknowns)[kept].sum()))
 
@@ -122,8 +120,7 @@ def _followed(told: Prediction) -> tuple[np.ndarray, float]:
 def _limit(one: Prepared, options: Options) -> float:
     """Reduced chi^2 above which a record is missed.
 
-    Noise that nobody stated is itself an estimate, as its memory is, and rounding follows the motion instead
-    of chance.
+    Unstated noise and its memory are estimates themselves, and rounding follows the motion instead of chance.
     """
     rounding = one.resolution**2 / 12 > _ROUNDING * one.sigma**2
     return one.doubt * (options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2)
@@ -175,7 +172,7 @@ def _stated(one: Prepared, unit: str) -> str:
 
 
 def too_quiet(data: Data, fit: Fit) -> bool:
-    """Whether records scatter by far less than their noise is said to be."""
+    """Whether records scatter by far less than their stated noise."""
     found = record_chi2(data, fit)
     return any(
         data.prepared[number].sigma_stated and size < _TOO_LITTLE and freedom > _ENOUGH

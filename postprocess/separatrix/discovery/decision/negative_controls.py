@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Candidates that are known to be wrong: each effect as it would act in other segments than its own.
+"""Candidates that are known to be wrong: each effect with the segments of its signature exchanged.
 
-A negative control keeps the size and the shape of a signature and loses its bond to the motion. One that
-could be named would show that names come from what the base lacks altogether and not from the effect.
+A negative control keeps size and shape of a signature and loses its relation to the motion. A control that
+could be named would show that names follow from any misfit of the base and not from the effect.
 """
 
 from dataclasses import replace
@@ -17,9 +17,7 @@ from separatrix.discovery.options import Options
 
 
 def negative_controls(found: Round, options: Options) -> dict:
-    """Return the number of negative controls, the best one with its gain and p value, and whether it could
-    be named.
-    """
+    """The number of negative controls, the best with its gain and p value, and whether it could be named."""
     base = found.base
     made = [_exchanged(one, base.problem.segments.record) for one in found.signatures]
     made = [one for one in made if np.any(one.columns)]

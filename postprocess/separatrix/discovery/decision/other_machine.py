@@ -22,7 +22,7 @@ _FACTOR = 3.0
 _ALIKE, _UNITS = 0.8, 5.0
 # standard error of a mass over itself with which it is known
 _WELL = 0.1
-# share of a force that may be missed where its mass tells its units
+# share of a force that may be missed where its mass determines its units
 _LITTLE = 0.1
 _BARRIERS = ("contact.upper", "contact.lower")
 # reduced chi^2 of a record that a wrong drive would leave
@@ -61,14 +61,14 @@ def other_machine(data: Data, fitted: Fitted, options: Options) -> list[str]:
             strange.append(f"{one.path} {number(found, 3)} {unit} (case: {number(case, 3)})")
     if not strange:
         return []
-    said = ", ".join(strange)
-    return [f"the fitted machine is not that of the case: {said}: other units, or another machine"]
+    parameters = ", ".join(strange)
+    return [f"the fitted machine is not that of the case: {parameters}: other units, or another machine"]
 
 
 def other_units(data: Data, model) -> list[str]:
     """Measured forces that are a multiple of what the machine of the case takes along the motion.
 
-    The factor is that of the mass, where force and acceleration tell it, else that of the whole force.
+    The factor is that of the mass, where force and acceleration determine it, else that of the whole force.
     """
     notes = []
     for one in data.prepared:
@@ -89,7 +89,7 @@ def other_units(data: Data, model) -> list[str]:
             what = "the mass that force and acceleration give" if of_mass else "the force"
             notes.append(
                 f"{record.name}: {what} is {number(factor, 2)} times that of the machine of the case: "
-                "other units of force or place, or another machine"
+                "other units of force or position, or another machine"
             )
     return notes
 
@@ -116,10 +116,10 @@ def _mass(columns: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
 
 
 def other_drive(data: Data, base: Fitted) -> list[str]:
-    """Records that the base machine misses and that move at another frequency than the drive is said to."""
+    """Records that the base machine misses and that oscillate at another frequency than the stated drive."""
     notes = []
-    for place, (size, _) in record_chi2(data, base.fit).items():
-        one = data.prepared[place]
+    for index, (size, _) in record_chi2(data, base.fit).items():
+        one = data.prepared[index]
         if size < _MISSED or one.frequency is None:
             continue
         line, apart, share = strongest_line(one)
@@ -135,7 +135,7 @@ def other_drive(data: Data, base: Fitted) -> list[str]:
 
 
 def other_phase(data: Data, fitted: Fitted | Prediction) -> list[str]:
-    """Records whose headers say another phase of the drive than the one that the machine takes."""
+    """Records whose headers state another phase of the drive than the fitted one."""
     notes = []
     for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True):
         if one.path != "nuisance:phase":
@@ -152,7 +152,7 @@ def other_phase(data: Data, fitted: Fitted | Prediction) -> list[str]:
 
 
 def strongest_line(one: Prepared) -> tuple[float, float, float]:
-    """Strongest line of x in its longest stretch without gaps.
+    """Strongest line of x in its longest interval without gaps.
 
     Its frequency, how far lines must be apart to be two [rad/s], and its share of the power.
     """

@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names for effects of real machines, of which something always remains that no catalogue holds.
+"""Names for effects of real machines, whose gap no catalogue closes entirely.
 
-The strict decision names nothing while a gap remains. Asked for names in part, effects are added one by
-one (the first two together, if only that helps) as long as each passes every gate but the adequacy, which
-here is not to be had; the verdict says that it is not complete. Among wrong machines everything is
-significant in training, so held-out records choose: of the candidates that predict no worse than the best,
-the one with the fewest parameters is taken, and each effect must close a share of the gap there that no
-other effect closes.
+The strict decision names nothing while a gap remains. With names in part, effects are added one by one (the
+first two together, if only that helps) as long as each passes every gate but the adequacy. The verdict states
+that it is not complete. Among wrong machines everything is significant in training, so held-out records
+choose. Of the candidates that predict no worse than the best, the one with the fewest parameters is taken.
+Each effect must close a share of the held-out gap that no other effect closes.
 """
 
 from dataclasses import replace
@@ -79,7 +78,7 @@ def decide_in_part(context: SearchContext, base: Fitted) -> Decision:
 
 def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
     """What is left of the gap with the named effects, in words, by use of the records."""
-    said = ["named in part: what is left is not in the catalogue"]
+    reasons = ["named in part: what is left is not in the catalogue"]
     fits = [("fitted", context.training, whole.fitted, whole.fitted.fit.reduced_chi2)]
     if whole.prediction is not None:
         fits.append(("held-out", context.held_out, whole.prediction, whole.prediction.reduced_chi2))
@@ -89,20 +88,20 @@ def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
         what = (
             f"forces that depend on {depends_on} would close most of it"
             if depends_on
-            else "no force that depends on speed, place and time alone closes most of it, "
+            else "no force that depends on speed, position and time alone closes most of it, "
             "as where the body or its drive is flexible"
         )
-        said.append(f"a gap remains on the {use} record {names}, reduced chi^2 {left:.4g}: {what}")
-    return said
+        reasons.append(f"a gap remains on the {use} record {names}, reduced chi^2 {left:.4g}: {what}")
+    return reasons
 
 
 def nearest(context: SearchContext, decision: Decision) -> list[str]:
-    """Say which single effect passes where the strict decision names none."""
+    """The single effect that passes all gates but the adequacy where the strict decision names none."""
     if decision.outcome != "not-in-catalogue":
         return []
     found = _next(context, decision.rounds[0])
-    said = "passes every gate but the adequacy; --partial names what helps though a gap remains"
-    return [f"{found.name} {said}"] if found else []
+    hint = "passes every gate but the adequacy; --partial names what helps though a gap remains"
+    return [f"{found.name} {hint}"] if found else []
 
 
 def _next(context: SearchContext, found: Round) -> ScoredCandidate | None:
@@ -155,7 +154,7 @@ def _passing(context: SearchContext, found: Round, pool: list[ScoredCandidate]) 
     if not pool:
         return None
     best, rivals = choice(context, found.base, found.predicted, pool, preferred)
-    # the strict decision may have asked for these: a gap that remains is missed on held-out records, too
+    # the strict decision may have set these: a gap that remains is missed on held-out records, too
     for name in ("adequate", "predicted"):
         best.gates.pop(name, None)
     pass_gates(context, best, found.base, rivals, found.screened.tests)
@@ -178,7 +177,7 @@ def _clearly(one: ScoredCandidate, other: ScoredCandidate, options: Options) -> 
     if one.prediction is None:
         return one.evidence - other.evidence > margin(one, other, options)
     if other.prediction is None:
-        # so far behind that it was not asked to predict
+        # so far behind that it has no prediction
         return True
     over = scored(other.fitted, other.prediction, one.fitted, one.prediction)
     return any(low > 0 for low, _ in held_out_bounds(over, options).values())
@@ -208,7 +207,7 @@ def _all_needed(context: SearchContext, first: Round, one: ScoredCandidate) -> b
     for name in one.fitted.names:
         other = without(context, first, name, one.fitted.names)
         if other is None or (other.prediction is None and one.prediction is not None):
-            # it cannot be flown, or is so far behind that it was not asked to predict
+            # it cannot be simulated, or is so far behind that it has no prediction
             missed[name] = np.inf
             continue
         over = scored(other.fitted, other.prediction, one.fitted, one.prediction)

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much of a gap a machine closes, and what remains: sizes, which do not change with the rate of sampling.
 
-A gap is what chi^2 has beyond its degrees of freedom. Over the samples it is the mean square of the
-difference of motion and machine over that of the noise, however fast the motion was sampled; a test of
-significance sees any gap once there are samples enough.
+A gap is the excess of chi^2 over its degrees of freedom. Divided by the number of samples it is the mean
+square difference of motion and machine over that of the noise, for any sampling rate. A test of significance
+finds any gap once there are enough samples.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
 
-# size over the noise of a sample from which on it is worth to say what the remaining gap depends on
+# size over the noise of a sample from which on the dependence of the remaining gap is reported
 _WORTH_WORDS = 0.2
 
 
@@ -76,7 +76,7 @@ def _remains(
     closed = closed_share(_fit_of(before), _fit_of(after))
     size = float(np.sqrt(max(0.0, _fit_of(after).sample_chi2 - 1)))
     if size < _WORTH_WORDS or isinstance(after.problem, CoordinateProblem):
-        # of several bodies forces at several places explain what remains
+        # with several bodies, forces at several locations explain what remains
         return Remains(use, closed, size, "")
     return Remains(use, closed, size, (known or ceiling(after.problem, after.fit, mass)).mostly)
 

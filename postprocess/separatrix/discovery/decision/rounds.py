@@ -12,16 +12,16 @@ from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of, names_for
+from separatrix.discovery.fitting.locations import SensedScales
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import solve_scaled
-from separatrix.discovery.fitting.places import SensedScales
 from separatrix.discovery.fitting.refit import (
     Fitted,
     beaten,
     carried_on,
     crossed,
     gain_over,
-    in_place_of,
+    imitating,
     refit,
 )
 from separatrix.discovery.fitting.rig import cleaned, with_imperfections
@@ -34,12 +34,12 @@ _RELATED = 0.7
 _WORTH = 1.0
 _FEWEST = 2
 _BAD = 1.3
-# how many leaders are tried again from the best, and what they must have gained
+# number of leading candidates that are tried again from the best, and their least gain
 _CROSSED = 4
 _WORTH_CROSSING = 5.0
 _SHARE = 0.3
-# share of the best gain from which on an effect is tried that has no size at which it is absent: one form of
-# it says little of the others
+# share of the best gain from which on an effect that is absent at no size is tried: one form of it predicts
+# little of the others
 _CURVED = 0.05
 # behind the best by less than so many separations: fitted to the end
 _NEAR = 3.0
@@ -47,7 +47,7 @@ _NEAR = 3.0
 
 @dataclass
 class SearchContext:
-    """All that a search needs to know beside the machine."""
+    """Data, scales and options of a search."""
 
     training: Data
     held_out: Data | None
@@ -55,7 +55,7 @@ class SearchContext:
     options: Options
 
     def predict(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
-        """Score the held-out records; from where an `other` prediction ended there, too."""
+        """Score the held-out records, also from the end of an `other` prediction of them."""
         if self.held_out is None:
             return None
         free, fit = fitted.problem.free, fitted.fit
@@ -64,7 +64,7 @@ class SearchContext:
         return predict(self.held_out, fitted.model, free, known, misfit, other)
 
     def predict_with_imperfections(self, fitted: Fitted, other: Prediction) -> Prediction:
-        """The same by the parameters as they are beside imperfections of a rig in the training records."""
+        """The same by parameters that were fitted beside imperfections of a rig in the training records."""
         free, fit = fitted.problem.free, fitted.fit
         beside = with_imperfections(fitted.problem, fit)
         lower, upper = (np.array([getattr(one, side) for one in free]) for side in ("lower", "upper"))
@@ -113,13 +113,13 @@ def run_round(
 
     Those of `without` are not fitted.
 
-    An `earlier` round and its fits stand where its base was this very fit; the fits are carried on where the
-    base was fitted again.
+    The fits of an `earlier` round are used again if its base was this fit, and are continued if the base was
+    refitted.
     """
     options = context.options
     stands = earlier is not None and earlier.base is base
     if stands:
-        # those of now are held against those of then as they are by themselves
+        # earlier candidates are compared with new ones without imperfections
         known_alone = [replace(one, imperfections=None) for one in earlier.scored]
         found = replace(earlier, predicted=predicted, scored=known_alone)
     else:
@@ -132,9 +132,9 @@ def run_round(
     chosen = [name for name in choose(base, found.screened, options, everything) if name not in without]
     if stands:
         chosen = [name for name in chosen if name not in known]
-    # those that led before first: others may be out of the race at once
-    warm_started = list(known)
-    chosen.sort(key=lambda name: warm_started.index(name) if name in warm_started else len(warm_started))
+    # earlier leaders come first: the others may then be far behind at once
+    ranked = list(known)
+    chosen.sort(key=lambda name: ranked.index(name) if name in ranked else len(ranked))
     for number, name in enumerate(chosen):
         options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
         fitted = refit(
@@ -146,9 +146,9 @@ def run_round(
             options.quick,
             known.get(name),
         )
-        # what is far behind a machine that leaves only noise and predicts need not predict
-        told = None if _out_of_race(fitted, found, rival) else context.predict(fitted, _leading(found))
-        found.scored.append(_simplest(context, found, found.score(fitted, told)))
+        # a candidate far behind a machine that leaves only noise and predicts needs no prediction
+        prediction = None if _far_behind(fitted, found, rival) else context.predict(fitted, _leading(found))
+        found.scored.append(_simplest(context, found, found.score(fitted, prediction)))
         fitted = found.scored[-1].fitted
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
@@ -207,12 +207,12 @@ def _simplest(
 
 
 def _leading(found: Round) -> Prediction | None:
-    """What predicts the held-out records best so far: its starts there are the nearest."""
-    told = [one for one in found.scored if one.prediction is not None and one.held_out > 0]
-    return max(told, key=lambda one: one.held_out).prediction if told else found.predicted
+    """The best prediction of the held-out records so far, whose starts are the nearest."""
+    able = [one for one in found.scored if one.prediction is not None and one.held_out > 0]
+    return max(able, key=lambda one: one.held_out).prediction if able else found.predicted
 
 
-def _out_of_race(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:
+def _far_behind(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:
     if rival is None or not (rival.fit.like_noise(2) and beaten(fitted, rival)):
         return False
     return rival is found.base or any(one.fitted is rival and one.held_out >= 0 for one in found.scored)
@@ -224,7 +224,7 @@ def _beaten_by_noise(fitted: Fitted, base: Fitted) -> bool:
 
 
 def _fair(context: SearchContext, found: Round) -> None:
-    """Let the base predict also from where the best candidate began, and hold all against that."""
+    """Let the base predict from the starts of the best candidate too, and compare all with that."""
     if found.predicted is None or not found.scored or found.scored[0].held_out < _WORTH:
         return
     fairer = context.predict(found.base, found.scored[0].prediction)
@@ -236,41 +236,41 @@ def _fair(context: SearchContext, found: Round) -> None:
 
 
 def _carry_on(context: SearchContext, found: Round) -> None:
-    """Fit those near the best to their end and let them predict, however little they were thought worth."""
+    """Fit the candidates near the best to convergence and let them predict, whatever the screen promised."""
     order = found.scored
-    for place, one in enumerate(order):
+    for index, one in enumerate(order):
         near = order[0].evidence - one.evidence < _NEAR * context.options.separation
         done = one.fitted.fit.converged
         if near and not (done and (one.prediction is not None or context.held_out is None)):
             fitted = one.fitted
-            # of a base that leaves only noise the rest could be no name
+            # over a base that leaves only noise the remainder cannot be named
             if not done and not _beaten_by_noise(fitted, found.base):
                 fitted = carried_on(context.training, found.candidates[one.name], fitted, patient=True)
-            order[place] = found.score(fitted, context.predict(fitted, one.prediction))
+            order[index] = found.score(fitted, context.predict(fitted, one.prediction))
     found.rank()
 
 
 def _cross(context: SearchContext, found: Round) -> None:
-    """Try the leaders again from where the best one led: minima that only one of them left."""
+    """Try the leaders again from the machine of the best: it may have left a minimum of theirs."""
     order = found.scored
     if len(order) < 2 or context.options.quick or order[0].training < _WORTH_CROSSING:
         return
     best = order[0].fitted
-    for place in range(1, min(_CROSSED, len(order))):
-        one = order[place]
+    for index in range(1, min(_CROSSED, len(order))):
+        one = order[index]
         behind = order[0].evidence - one.evidence
         if behind < context.options.separation or one.evidence < _SHARE * order[0].evidence:
             continue
         better = crossed(context.training, one.fitted, best, found.candidates[one.name])
         if better is not one.fitted:
-            order[place] = found.score(better, context.predict(better, order[0].prediction))
+            order[index] = found.score(better, context.predict(better, order[0].prediction))
     found.rank()
 
 
 def _same_motion(context: SearchContext, found: Round) -> None:
-    """Let names of one motion follow the best of them: it is theirs too, unless sticking tells them apart.
+    """Start names of one motion from the best of them: they share its motion, unless sticking differs.
 
-    A name that is behind only because its fit ended in another minimum would be missed in a verdict.
+    A name whose fit ended in another minimum would be missed in a verdict.
     """
     order = found.scored
     best = next((one for one in order if effect_of(one.name).confused), None)
@@ -278,27 +278,27 @@ def _same_motion(context: SearchContext, found: Round) -> None:
         return
     if best.evidence < _SHARE * order[0].evidence:
         return
-    for place, one in enumerate(order):
+    for index, one in enumerate(order):
         behind = best.evidence - one.evidence
         if one.name not in effect_of(best.name).confused or behind < context.options.separation:
             continue
-        better = in_place_of(context.training, one.fitted, best.fitted, found.candidates[one.name])
+        better = imitating(context.training, one.fitted, best.fitted, found.candidates[one.name])
         if better is not one.fitted:
             one = found.score(better, context.predict(better, best.prediction))
-        order[place] = _simplest(context, found, one, doubtful=False)
+        order[index] = _simplest(context, found, one, doubtful=False)
     found.rank()
 
 
 def choose(base: Fitted, screened: Screened, options: Options, everything: bool = False) -> list[str]:
-    """Names to refit, best first: where the base is bad, the linear screen says little and all are tried."""
+    """Names to refit, best first; all of them where the base is too bad for the linear screen."""
     order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
     bad = base.fit.reduced_chi2 > _BAD and not options.quick
     if everything or (bad and cleaned(base.problem, base.fit).reduced_chi2 > _BAD):
         return order
     return [
         name
-        for place, name in enumerate(order)
-        if (place < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or place < _FEWEST))
+        for index, name in enumerate(order)
+        if (index < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or index < _FEWEST))
         or (
             screened.gain[name] > _WORTH
             and not options.quick

@@ -12,7 +12,7 @@ from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
 from separatrix.discovery.fitting.joint_effects import effect_of
-from separatrix.discovery.fitting.places import usual_speed
+from separatrix.discovery.fitting.locations import usual_speed
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.rig import share_with_imperfections
 from separatrix.discovery.options import Options
@@ -20,7 +20,7 @@ from separatrix.discovery.options import Options
 _BLOCKS = 2
 # fewer segments than this have no distribution of their own to draw from
 _FEW = 5
-# share of the mean information on an effect below which a segment says nothing of it
+# share of the mean information on an effect below which a segment has none
 _SILENT = 0.01
 # log-likelihood of an effect that no held-out record can show
 _DOUBTLESS = 10.0
@@ -29,7 +29,7 @@ _CHANCE = 0.05
 # share of what imperfections of a rig do that is not linear
 _LINEAR = 0.2
 # what imperfections add where they were not weighed
-_NO_FAULTS = (0.0, 0.0)
+_NO_IMPERFECTIONS = (0.0, 0.0)
 # share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
 _KINK_SHARE = 0.01
 
@@ -49,13 +49,13 @@ class ScoredCandidate:
     ceiling: Ceiling | None = None
     # share of the gain that small imperfections of a rig do not explain
     own: float = 1.0
-    # the same of what is gained on held-out records, and what the base predicted there
-    own_foretold: float = 1.0
+    # the same for the gain on held-out records, and the prediction of the base there
+    own_predicted: float = 1.0
     predicted: Prediction | None = None
     # what it leaves, if it is adequate
     leaves: str = ""
     # log-likelihood that imperfections of a rig beside it add, where it was fitted and where it predicted;
-    # None where that was not asked
+    # None where they were not weighed
     imperfections: tuple[float, float] | None = None
 
     @property
@@ -76,7 +76,7 @@ class ScoredCandidate:
 
         Where they were weighed, with imperfections of a rig beside it.
         """
-        return self.fitted_evidence + self.foretold_evidence
+        return self.fitted_evidence + self.predicted_evidence
 
     @property
     def own_evidence(self) -> float:
@@ -86,12 +86,12 @@ class ScoredCandidate:
     @property
     def fitted_evidence(self) -> float:
         """Of the records that were fitted."""
-        return self.training - self.parameters + (self.imperfections or _NO_FAULTS)[0]
+        return self.training - self.parameters + (self.imperfections or _NO_IMPERFECTIONS)[0]
 
     @property
-    def foretold_evidence(self) -> float:
+    def predicted_evidence(self) -> float:
         """Of the records that were predicted."""
-        return self.held_out + (self.imperfections or _NO_FAULTS)[1]
+        return self.held_out + (self.imperfections or _NO_IMPERFECTIONS)[1]
 
 
 def scored(
@@ -107,12 +107,12 @@ def scored(
 
 
 def lead(one: ScoredCandidate, other: ScoredCandidate) -> float:
-    """Evidence of one candidate over another, of the same base, held against each other."""
+    """Evidence of one candidate over another of the same base, compared directly."""
     if one.prediction is None or other.prediction is None:
         return one.evidence - other.evidence
     fitted = one.fitted_evidence - other.fitted_evidence
-    of_faults = (one.imperfections or _NO_FAULTS)[1] - (other.imperfections or _NO_FAULTS)[1]
-    return fitted + ahead(one.prediction, other.prediction) + of_faults
+    mine, theirs = ((each.imperfections or _NO_IMPERFECTIONS)[1] for each in (one, other))
+    return fitted + ahead(one.prediction, other.prediction) + (mine - theirs)
 
 
 def detection(one: ScoredCandidate, tested: float, inflation: float) -> float:
@@ -120,7 +120,7 @@ def detection(one: ScoredCandidate, tested: float, inflation: float) -> float:
 
     What small imperfections of the rig may explain of it is no gain.
     """
-    gained = one.own * one.training + one.own_foretold * one.held_out
+    gained = one.own * one.training + one.own_predicted * one.held_out
     return family_wise(2 * gained / inflation, one.parameters, tested)
 
 
@@ -139,10 +139,10 @@ def held_out_bounds(one: ScoredCandidate, options: Options) -> dict[int, tuple[f
     """
     bounds = {}
     random = np.random.default_rng([options.seed, 11])
-    tells = _telling(one)
+    informative = _informative(one)
     for number in np.unique(one.prediction.record):
         here = one.prediction.record == number
-        parts = one.held_out_parts[here & tells] / one.prediction.misfit
+        parts = one.held_out_parts[here & informative] / one.prediction.misfit
         if parts.size < _FEW:
             whole = float(one.held_out_parts[here].sum()) / one.prediction.misfit
             bounds[int(number)] = (whole - options.separation, whole + options.separation)
@@ -153,12 +153,11 @@ def held_out_bounds(one: ScoredCandidate, options: Options) -> dict[int, tuple[f
 
 
 def predicts(one: ScoredCandidate, options: Options) -> bool:
-    """Whether a held-out record by itself tells an effect from nothing, by the odds of a name, and not by one
-    segment alone.
+    """Whether one held-out record alone supports an effect by the odds of a name, and in several segments.
 
-    What a right base predicts is beaten by more than log(1/p) with a probability of p at most (Ville),
-    however unlike the segments are. It has to be beaten without the best segment too, or in so many of them
-    that this is no chance (sign test).
+    The prediction of a right base is beaten by more than log(1/p) with a probability of at most p (Ville),
+    for any mixture of segments. It must also be beaten without the best segment, or in a significant number
+    of segments (sign test).
     """
     records = np.unique(one.prediction.record)
     # any of several records may be the one
@@ -175,46 +174,46 @@ def predicts(one: ScoredCandidate, options: Options) -> bool:
 
 
 def beyond_doubt(one: ScoredCandidate, base: Fitted, options: Options) -> bool:
-    """Whether fitted records tell an effect of which held-out ones say nothing.
+    """Whether fitted records prove an effect on which held-out ones have no information.
 
-    They are predicted alike, or no worse than by chance where no gain is to be expected: half of the
-    information on the effect. Over a base that is not at its minimum they say something.
+    Held-out records are predicted alike, or no worse than by chance where the expected gain, half of the
+    information on the effect, is small. Over a base that is not at its minimum they do count.
     """
     parts, misfit = one.held_out_parts, one.prediction.misfit
     compared = np.count_nonzero(parts) > parts.size / 2
     alike = float(np.abs(parts).sum()) < options.separation * misfit
-    expected = float(_foretold_information(one).sum()) / 2
+    expected = float(_held_out_information(one).sum()) / 2
     silent = expected < options.separation and float(parts.sum()) > options.harm * misfit
     doubtless = one.training - one.parameters > _DOUBTLESS * misfit
     return bool(compared and (alike or silent) and base.fit.converged and doubtless)
 
 
-def _foretold_information(one: ScoredCandidate) -> np.ndarray:
-    """What each held-out segment says of what was added, over its size."""
+def _held_out_information(one: ScoredCandidate) -> np.ndarray:
+    """Information of each held-out segment on the added parameters, over their sizes."""
     fitted, prediction = one.fitted, one.prediction
     shared = [i for i, free in enumerate(fitted.problem.free) if free.record is None]
     added = [i for i in fitted.added if i in shared]
-    places = [shared.index(i) for i in added]
-    return _information(fitted, prediction.fit.reduced.matrix, added, places)
+    columns = [shared.index(i) for i in added]
+    return _information(fitted, prediction.fit.reduced.matrix, added, columns)
 
 
-def _telling(one: ScoredCandidate) -> np.ndarray:
+def _informative(one: ScoredCandidate) -> np.ndarray:
     """Whether both machines follow a held-out segment and it has information on what was added."""
-    prediction, information = one.prediction, _foretold_information(one)
-    tells = np.zeros(information.size, bool)
+    prediction, information = one.prediction, _held_out_information(one)
+    informative = np.zeros(information.size, bool)
     for number in np.unique(prediction.record):
         here = prediction.record == number
-        tells[here] = information[here] > _SILENT * information[here].mean()
-    return tells & (one.held_out_parts != 0)
+        informative[here] = information[here] > _SILENT * information[here].mean()
+    return informative & (one.held_out_parts != 0)
 
 
 def _information(
-    fitted: Fitted, matrix: np.ndarray, added: Sequence[int], places: Sequence[int] | None = None
+    fitted: Fitted, matrix: np.ndarray, added: Sequence[int], columns: Sequence[int] | None = None
 ) -> np.ndarray:
-    """What each segment says of the added parameters, over their sizes; `places` of them in the matrix."""
+    """Information of each segment on the added parameters, over their sizes; `columns`: in the matrix."""
     sizes = np.array([_size(fitted, i) for i in added])
-    places = added if places is None else places
-    return (matrix[:, places, places] * sizes**2).max(axis=1, initial=0.0)
+    columns = added if columns is None else columns
+    return (matrix[:, columns, columns] * sizes**2).max(axis=1, initial=0.0)
 
 
 def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> np.ndarray:
@@ -230,8 +229,8 @@ def stable(one: ScoredCandidate, base: Fitted, options: Options) -> float:
     """Share of block bootstraps of the segments in which the effect pays for its parameters.
 
     Only segments that have information on the effect are drawn; where they are few, it has to pay without the
-    best of them. Held-out segments are drawn too where the training records themselves tell the effect from
-    nothing. All gains are over the misfit.
+    best of them. Held-out segments are drawn too where the training records alone support the effect. All
+    gains are over the misfit.
     """
     fit = one.fitted.fit
     added = np.array(one.fitted.added)
@@ -242,15 +241,15 @@ def stable(one: ScoredCandidate, base: Fitted, options: Options) -> float:
     if not added.size:
         return 0.0
     information = _information(one.fitted, fit.reduced.matrix, added)
-    tells = information > _SILENT * information.mean()
-    rest = min(0.0, float(parts[~tells].sum()))
+    informative = information > _SILENT * information.mean()
+    rest = min(0.0, float(parts[~informative].sum()))
     proven = one.held_out_parts.size and gain - one.parameters > options.separation
-    if tells.sum() < _FEW:
+    if informative.sum() < _FEW:
         predicted = one.held_out_parts.sum() / one.prediction.misfit if proven else 0.0
-        others = parts[tells].sum() - parts[tells].max(initial=0.0)
+        others = parts[informative].sum() - parts[informative].max(initial=0.0)
         return float(others + rest + predicted > one.parameters)
     random = np.random.default_rng([options.seed, 12])
-    sums = rest + _block_sums(parts[tells], random, options.bootstraps)
+    sums = rest + _block_sums(parts[informative], random, options.bootstraps)
     if proven:
         sums = sums + _block_sums(one.held_out_parts / one.prediction.misfit, random, options.bootstraps)
     return float(np.mean(sums > one.parameters))
@@ -267,32 +266,32 @@ def _size(fitted: Fitted, i: int) -> float:
     return 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
 
 
-def _together_clear(fitted: Fitted, places: list[int]) -> bool:
+def _together_clear(fitted: Fitted, columns: list[int]) -> bool:
     """Whether the 95 % region of several parameters is without zero, though the interval of each may have it.
 
-    The values of a table all move with a constant that another parameter of the machine can take over.
+    The values of a table share a constant that another parameter of the machine can absorb.
     """
     variance = np.diag(fitted.covariance)
-    places = [i for i in places if not fitted.problem.free[i].positive and variance[i] > 0]
-    if len(places) < 2:
+    columns = [i for i in columns if not fitted.problem.free[i].positive and variance[i] > 0]
+    if len(columns) < 2:
         return False
-    size = np.sqrt(variance[places])
+    size = np.sqrt(variance[columns])
     information = np.linalg.pinv(
-        fitted.covariance[np.ix_(places, places)] / np.outer(size, size), hermitian=True
+        fitted.covariance[np.ix_(columns, columns)] / np.outer(size, size), hermitian=True
     )
-    values = fitted.fit.values[places] / size
-    return bool(values @ information @ values > chi2.ppf(0.95, len(places)))
+    values = fitted.fit.values[columns] / size
+    return bool(values @ information @ values > chi2.ppf(0.95, len(columns)))
 
 
 def clear_of(best: ScoredCandidate, other: ScoredCandidate, options: Options) -> bool:
-    """Whether a candidate beats another one clearly, also where that is given small imperfections of the rig.
+    """Whether a candidate clearly beats another one, even if that has small imperfections of the rig.
 
     Records that were fitted and records that were not must not clearly contradict each other.
     """
     least = margin(best, other, options)
     over = lead(best, other)
     fitted = best.fitted_evidence - other.fitted_evidence
-    if any(best.imperfections or _NO_FAULTS) and any(other.imperfections or _NO_FAULTS):
+    if any(best.imperfections or _NO_IMPERFECTIONS) and any(other.imperfections or _NO_IMPERFECTIONS):
         # both have them already, as far as they are linear
         unsure = _LINEAR * max(sum(best.imperfections), sum(other.imperfections))
         return over >= least and min(fitted, over - fitted) > -max(least, unsure)
@@ -308,7 +307,7 @@ def margin(best: ScoredCandidate, other: ScoredCandidate, options: Options) -> f
 
 
 def equivalent(one: ScoredCandidate, other: ScoredCandidate) -> bool:
-    """Whether what two fits do not share is two names of the same motion."""
+    """Whether two fits differ only by two names of the same motion."""
     mine, theirs = set(one.fitted.names), set(other.fitted.names)
     left, right = mine - theirs, theirs - mine
     return len(left) == len(right) == 1 and right.pop() in effect_of(left.pop()).confused
@@ -362,7 +361,7 @@ def adequate(one: ScoredCandidate, options: Options) -> str:
         return NOISE
     if _all_closed(one, options):
         return LITTLE
-    # no force explains more: the noise is larger than it was said or measured to be
+    # no force explains more: the noise is larger than stated or measured
     noisier = one.ceiling.p > options.detection_level and share >= options.adequate_share
     return LARGER_NOISE if noisier and fit.sample_chi2 <= options.missed_chi2 else ""
 
@@ -374,9 +373,7 @@ def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None
 
 
 def _all_closed(one: ScoredCandidate, options: Options) -> bool:
-    """Whether the gap is closed but for a share that has another reason, where it was fitted and
-    predicted.
-    """
+    """Whether the gap is closed but for a small share of another cause, where it was fitted and predicted."""
     left = max(one.ceiling.closable, one.ceiling.fit.excess, 0.0)
     if left > options.remaining * (2 * one.training + left):
         return False

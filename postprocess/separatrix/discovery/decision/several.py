@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More than one effect: found one by one, fitted jointly, and each held against leaving it out."""
+"""More than one effect: found one by one, fitted jointly, and each compared with leaving it out."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -26,7 +26,7 @@ from separatrix.discovery.fitting.screen import screen, signature
 _PAIRS = 6
 # share of what is left of the gap that an effect must close for another one to be looked for on top of it
 _CLOSES = 0.5
-# share of the evidence of an effect alone from which on another of its family is tried in its place
+# share of the evidence of an effect alone from which on another of its family replaces it in a trial
 _SHARE = 0.3
 
 
@@ -35,9 +35,9 @@ def with_more(
 ) -> tuple[ScoredCandidate, list[ScoredCandidate], bool]:
     """The best several effects, their rivals, and whether they close the gap together.
 
-    On top of the best effect a second is tried, and the pairs that the screen finds; then a third, and so on,
-    as long as each is needed and closes most of what was left. Each is held against others of its family in
-    its place. The rounds are added to `rounds`.
+    A second effect is tried on top of the best one, and the pairs that the screen finds; then a third, and
+    so on, as long as each is needed and closes most of the remainder. Others of its family are tried instead
+    of each. The rounds are added to `rounds`.
     """
     first, found = rounds[0], best
     close: list[ScoredCandidate] = []
@@ -69,7 +69,7 @@ def _grown(context: SearchContext, rounds: list[Round], found: ScoredCandidate) 
     """Sets of effects with one more than `found`; pairs of any two as well."""
     first = rounds[0]
     limit = hopeless(first.base)
-    # what comes nowhere near the records alone, as a soft barrier where impacts are hard, is no second effect
+    # an effect that alone is far from the records, as a soft barrier for hard impacts, is no second effect
     lost = frozenset(one.name for one in first.scored if one.fitted.fit.far_off(limit))
     rounds.append(run_round(context, found.fitted, found.prediction, 0.8, 0.9, without=lost))
     sets = [over_base(context, first.base, first.predicted, one) for one in rounds[-1].scored]
@@ -88,7 +88,7 @@ def _grown(context: SearchContext, rounds: list[Round], found: ScoredCandidate) 
 def _swapped(
     context: SearchContext, first: Round, whole: ScoredCandidate, tried: list[ScoredCandidate]
 ) -> Iterator[ScoredCandidate]:
-    """The set with one effect in the place of another of its family, where nobody tried that."""
+    """The set with one effect replaced by another of its family, where that is untried."""
     known = {frozenset(one.fitted.names) for one in tried}
     alone = {one.name: one for one in first.scored}
     for name in whole.fitted.names:
@@ -117,13 +117,14 @@ def _closes_most(before: ScoredCandidate, after: ScoredCandidate) -> bool:
 def _warm_started_by(
     context: SearchContext, first: Round, whole: ScoredCandidate, part: ScoredCandidate
 ) -> ScoredCandidate:
-    """Let each effect alone, and `part` of a set, follow the set that closes the gap; return that part.
+    """Warm-start each single effect, and `part` of a set, from the set that closes the gap; return that part.
 
-    What a set is held against must not be in a minimum that the set left. Those alone are put into the round.
+    A set must not be compared with a machine in a minimum that the set left. The single effects are put into
+    the round.
     """
-    for place, one in enumerate(first.scored):
+    for index, one in enumerate(first.scored):
         if one.name in whole.fitted.names:
-            first.scored[place] = _followed(context, first, whole, one)
+            first.scored[index] = _followed(context, first, whole, one)
     first.rank()
     if len(part.fitted.names) > 1:
         return _followed(context, first, whole, part)
@@ -133,7 +134,7 @@ def _warm_started_by(
 def _followed(
     context: SearchContext, first: Round, whole: ScoredCandidate, one: ScoredCandidate
 ) -> ScoredCandidate:
-    """A part of a set from where the set ended, if there is more evidence of it."""
+    """A part of a set fitted from the end of the set, if that has more evidence."""
     better = warm_started_by(context.training, one.fitted, whole.fitted)
     if better is one.fitted:
         return one
@@ -144,8 +145,7 @@ def _followed(
 
 
 def _all_needed(context: SearchContext, first: Round, whole: ScoredCandidate, part: ScoredCandidate) -> bool:
-    """Whether each effect of a set is worth it over the set without it, on held-out records too, as far as
-    those say anything of it."""
+    """Whether each effect of a set is worth its addition, also on held-out records that depend on it."""
     least = context.options.needed * context.options.separation
     for name in whole.fitted.names:
         if set(part.fitted.names) == {*whole.fitted.names} - {name}:
@@ -157,7 +157,7 @@ def _all_needed(context: SearchContext, first: Round, whole: ScoredCandidate, pa
         if other is None:
             # it cannot be fitted
             continue
-        # the gates of a part are those of what it predicted so far
+        # the gates of a part refer to its prediction so far
         other = replace(other)
         weigh_imperfections(context, other)
         if whole.evidence - other.evidence < least:

@@ -21,7 +21,7 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_effects import effect_of, place_of
+from separatrix.discovery.fitting.joint_effects import effect_of, location_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
 from separatrix.discovery.fitting.refit import WORSE, Fitted
@@ -32,7 +32,7 @@ from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
 
-# experiments that are told, rivals that they are to tell apart
+# experiments that are reported, rivals that they should separate
 _EXPERIMENTS, _RIVALS = 5, 4
 
 
@@ -72,10 +72,10 @@ def verdict_of(findings: Findings) -> dict:
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
-        "places": _places(final, named, decision),
+        "locations": _locations(final, named, decision),
         "families": [effect_of(name).family for name in final.names],
         "function": _function(decision.function, final),
-        "character": [one.told() for one in decision.characters],
+        "character": [one.as_dict() for one in decision.characters],
         "gates": best.gates if best else {},
         "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
@@ -101,22 +101,22 @@ def verdict_of(findings: Findings) -> dict:
     }
 
 
-def _places(final: Fitted, named: list[str], decision: Decision) -> dict[str, str]:
-    """Where the effects of the verdict sit in a machine of several bodies, in words; none of one body."""
+def _locations(final: Fitted, named: list[str], decision: Decision) -> dict[str, str]:
+    """Locations of the effects of the verdict in a machine of several bodies, in words; none of one body."""
     if not isinstance(final.problem, CoordinateProblem):
         return {}
     structure = decision.rounds[0].base.problem.structure
     every = [*named, *(name for names in decision.alternatives for name in names)]
     found = {}
     for name in every:
-        where = place_of(name)
-        known = [one.text() for one in structure.places if one.name == where or where in one.joints]
+        where = location_of(name)
+        known = [one.text() for one in structure.locations if one.name == where or where in one.joints]
         found[name] = known[0] if known else where
     return found
 
 
 def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
-    """What to measure next where the name is in doubt: known advice, experiments by what they would tell."""
+    """What to measure next where the name is in doubt: known advice, experiments by their d'."""
     if findings.decision.outcome != "ambiguous":
         return {"separating_experiment": "", "experiments": []}
     if isinstance(final.problem, CoordinateProblem):
@@ -125,12 +125,12 @@ def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     others = rivals[:_RIVALS] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
     found = [one for one in experiments(final, others) if one.d_prime > 1][:_EXPERIMENTS]
-    # a name that no other record bears out needs one that does, also where it has rivals
+    # a name that no held-out record confirms needs one that does, also where it has rivals
     use = "training" if findings.decision.accepted[0].gates.get("hold-out", True) else "held out"
     texts = [f"{one.text(name, names)}{'; hold it out' if use == 'held out' else ''}" for one in found]
-    said = [one for one in (advice(final, rivals), *texts[:1]) if one]
+    proposals = [one for one in (advice(final, rivals), *texts[:1]) if one]
     return {
-        "separating_experiment": "; or ".join(said),
+        "separating_experiment": "; or ".join(proposals),
         "experiments": [
             asdict(one) | {"rival": names[one.rival], "use": use, "text": text}
             for one, text in zip(found, texts, strict=True)
@@ -192,10 +192,10 @@ def _hump(one: Part, member: Member) -> str:
     """The value that is farthest outside of those at the ends, in words, if it is outside by its error."""
     ends = sorted((one.value[0], one.value[-1]))
     outside = np.maximum(one.value - ends[1], ends[0] - one.value)
-    place = int(np.argmax(outside))
-    if not outside[place] > 2 * one.error[place]:
+    knot = int(np.argmax(outside))
+    if not outside[knot] > 2 * one.error[knot]:
         return ""
-    return f" through {one.value[place]:.4g} at {one.at[place]:.3g} {member.unit}"
+    return f" through {one.value[knot]:.4g} at {one.at[knot]:.3g} {member.unit}"
 
 
 def d_prime(found: Round) -> dict[str, float]:
@@ -213,7 +213,7 @@ def _candidate(one: ScoredCandidate) -> dict:
         "imperfections": None if one.imperfections is None else sum(one.imperfections),
         "evidence": one.evidence,
         "reduced_chi2": fit.sample_chi2,
-        # what is worse than the base has not found its minimum, at which the effect does nothing
+        # a fit worse than the base has not found its minimum, which includes the effect of size zero
         "converged": fit.converged and one.training > -WORSE,
         "starts": one.fitted.tries,
         "values": {
@@ -254,8 +254,8 @@ def _notes(findings: Findings) -> list[str]:
     contact = any(path.startswith("contact.") for path in findings.base.model.parameters)
     for _, data, fitted in fits:
         notes += unused(data, fitted.fit, contact)
-    placed = any(one.record.has_place for one in context.training.prepared)
-    if contact and placed and not any(one.impacts.size for one in context.training.smoothed):
+    positions = any(one.record.has_position for one in context.training.prepared)
+    if contact and positions and not any(one.impacts.size for one in context.training.smoothed):
         hits = sum(len(one) for one in fit.evaluation.impacts if one is not None)
         why = (
             ": they do not stand out of the stated noise"
@@ -267,7 +267,7 @@ def _notes(findings: Findings) -> list[str]:
 
 
 def _of_accepted(best: ScoredCandidate) -> list[str]:
-    """What the numbers of an accepted effect do not say by themselves."""
+    """Qualifications of the numbers of an accepted effect."""
     notes = []
     if best.leaves == LITTLE:
         notes.append(
@@ -282,8 +282,8 @@ def _of_accepted(best: ScoredCandidate) -> list[str]:
         )
     if best.prediction is not None and best.prediction.with_imperfections:
         notes.append(
-            "held-out records are predicted, and their gap is told, by the parameters as they are beside "
-            "small imperfections of the rig; those of the verdict and of extended.toml are as fitted"
+            "held-out records and their gap are predicted with parameters that were fitted beside small "
+            "imperfections of the rig; those of the verdict and of extended.toml are fitted without them"
         )
     return notes
 
@@ -301,8 +301,8 @@ def _final(findings: Findings) -> list[tuple[str, Data, Fitted | Prediction]]:
 def _records(findings: Findings) -> list[dict]:
     found = []
     for use, data, fitted in _final(findings):
-        for place, one in enumerate(data.prepared):
-            machine = fitted.problem.machine_values(place, fitted.fit.values)
+        for index, one in enumerate(data.prepared):
+            machine = fitted.problem.machine_values(index, fitted.fit.values)
             found.append(
                 {
                     "name": one.record.name,
@@ -329,7 +329,7 @@ def _parameters(fitted: Fitted) -> dict:
     for one, value, error, held in zip(
         fitted.problem.free, fitted.fit.values, errors, fitted.fit.at_bound, strict=True
     ):
-        if one.is_fault or (one.is_nuisance and one.record is not None):
+        if one.is_imperfection or (one.is_nuisance and one.record is not None):
             continue
         parameter = fitted.model.parameters.get(one.path)
         known = error > 0 and not held
@@ -340,18 +340,18 @@ def _parameters(fitted: Fitted) -> dict:
                 "standard_error": one.slope(value) * float(error) if known else None,
                 "interval_95": sorted((low[path], high[path])) if known else None,
                 "at": _knot_of(path, fitted),
-                "note": "" if known else "at its bound" if held else "these records say nothing about it",
+                "note": "" if known else "at its bound" if held else "these records do not determine it",
                 "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
             }
     return found
 
 
 def _knot_of(path: str, fitted: Fitted) -> str:
-    """The knot that a value of a table stands at, in words; '' of other parameters."""
-    table, bracket, place = path.partition("[")
+    """The knot of a tabulated value, in words; '' of other parameters."""
+    table, bracket, index = path.partition("[")
     for member in MEMBERS if bracket else ():
         if member.knots and table in [f"effect.{member.effect}.{key}" for key in member.values]:
-            knot = fitted.model.parameters[f"effect.{member.effect}.{member.knots}[{place}"]
+            knot = fitted.model.parameters[f"effect.{member.effect}.{member.knots}[{index}"]
             return f"{member.variable} {knot.value:.4g} {member.unit}"
     return ""
 

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where records and model disagree: the force that is missing in each bin of time, phase, place, speed and
-event.
+"""Where records and model disagree: the missing force in bins of time, phase, position, speed and impacts.
 
-In each bin one constant force is fitted to what the base machine left over, starts and parameters of the base
-projected out. Its error comes from resampling blocks of segments; flags are corrected for the number of bins
+In each bin one constant force is fitted to the residual of the base machine, with starts and parameters
+projected out. Its error comes from resampling blocks of segments. Flags are corrected for the number of bins
 (Benjamini and Hochberg).
 """
 
@@ -31,21 +30,21 @@ _LOW, _SINCE = "low speed", "time since the last impact"
 _IMPACT_BINS, _FEWEST_IMPACTS = 4, 3
 _LEVEL = 0.01
 _BLOCK = 2
-# share of what the best map explains from which on another tells as much
+# share of what the best map explains from which on another map is as good
 _NEARLY = 0.9
 # the same for a map of the variable of a named effect
 _MOST = 0.75
 # maps over the variable that a family of effects depends on
-_SPEED, _PLACE, _PLANE, _PHASE = "velocity", "position", "position and velocity", "drive phase"
+_SPEED, _POSITION, _PLANE, _PHASE = "velocity", "position", "position and velocity", "drive phase"
 _OF_FAMILY = {
     "friction over speed": (_SPEED, _LOW),
     "friction before sliding": (_LOW, _PLANE),
     "friction over position": (_PLANE,),
-    "spring over extension": (_PLACE,),
-    "force over position": (_PLACE,),
+    "spring over extension": (_POSITION,),
+    "force over position": (_POSITION,),
     "restitution over impact speed": (IMPACT_SPEED,),
     "contact over penetration": (IMPACT_SPEED, _SINCE),
-    "contact over position": (_PLACE,),
+    "contact over position": (_POSITION,),
     "drive over phase": (_PHASE,),
 }
 
@@ -65,9 +64,9 @@ class Map:
 
 
 def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[str] = ()) -> list[Map]:
-    """Missing forces in the bins of all maps; of maps that tell much alike, those of `named` effects."""
+    """Missing forces in the bins of all maps; of maps that explain as much, those of `named` effects."""
     if isinstance(fitted.problem, CoordinateProblem):
-        return _maps_at_places(fitted, options)
+        return _maps_at_locations(fitted, options)
     problem, fit = fitted.problem, fitted.fit
     state = scaled_motion(problem, fit)
     evaluation = fit.evaluation
@@ -76,7 +75,7 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
     units = units_of(fitted.model.parameters)
     maps = [
         *_times(problem, inside),
-        _bins(_PLACE, units.position, x, inside, 10),
+        _bins(_POSITION, units.position, x, inside, 10),
         _bins(_SPEED, units.velocity, v, inside, 10),
         _bins(_LOW, units.velocity, np.where(np.abs(v) < 0.2 * state["speed"], v, np.nan), inside, 6),
     ]
@@ -98,7 +97,7 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
     own = {name for effect in named for name in _OF_FAMILY.get(effect_of(effect).family, ())}
     gains = _gains(fitted, columns, [member.shape[2] for member in tables])
-    flags &= np.repeat(_telling(maps, gains, own), [member.shape[2] for member in tables])
+    flags &= np.repeat(_reported(maps, gains, own), [member.shape[2] for member in tables])
     found, first = [], 0
     for name, unit, edges, other, member in maps:
         part = slice(first, first + member.shape[2])
@@ -108,29 +107,29 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
     return found
 
 
-def _maps_at_places(fitted: Fitted, options: Options) -> list[Map]:
-    """Missing forces between the ends of every place of several bodies, over its stretch and its speed."""
+def _maps_at_locations(fitted: Fitted, options: Options) -> list[Map]:
+    """Missing forces at every location of several bodies, over its extension and its speed."""
     problem, fit = fitted.problem, fitted.fit
     inside, n = problem.segments.inside & fit.good[:, None], problem.structure.n
     motion = fit.evaluation.motion
     maps, columns = [], []
-    for place in problem.structure.places:
-        of_place = (
-            (_PLACE, "m", motion[:, :, :n] @ place.row),
-            (_SPEED, "m/s", motion[:, :, n:] @ place.row),
+    for location in problem.structure.locations:
+        of_location = (
+            (_POSITION, "m", motion[:, :, :n] @ location.row),
+            (_SPEED, "m/s", motion[:, :, n:] @ location.row),
         )
-        for name, unit, values in of_place:
-            one = _bins(f"{name} of {place.name}", unit, values, inside, 8)
+        for name, unit, values in of_location:
+            one = _bins(f"{name} of {location.name}", unit, values, inside, 8)
             if one is not None:
                 maps.append(one)
-                columns.append(columns_of(problem, fit, one[4], place.row))
+                columns.append(columns_of(problem, fit, one[4], location.row))
     if not maps:
         return []
     whole = np.concatenate(columns, axis=2)
     force, error = _forces(fitted, whole, options)
     sizes = [one[4].shape[2] for one in maps]
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
-    flags &= np.repeat(_telling(maps, _gains(fitted, whole, sizes), set()), sizes)
+    flags &= np.repeat(_reported(maps, _gains(fitted, whole, sizes), set()), sizes)
     ends = np.cumsum([0, *sizes])
     return [
         Map(name, unit, "N", edges, other, force[a:b], error[a:b], flags[a:b])
@@ -139,7 +138,7 @@ def _maps_at_places(fitted: Fitted, options: Options) -> list[Map]:
 
 
 def _times(problem, inside: np.ndarray) -> list[tuple | None]:
-    """Bins of time: of each record by itself, since they are of different days."""
+    """Bins of time for each record by itself, as records may be of different days."""
     found = []
     count = max(4, 12 // len(problem.prepared))
     for number, prepared in enumerate(problem.prepared):
@@ -159,10 +158,10 @@ def _bins(name: str, unit: str, values: np.ndarray, inside: np.ndarray, count: i
     edges = np.unique(np.quantile(values[usable], np.linspace(0, 1, count + 1)))
     if edges.size < 3:
         return None
-    place = np.clip(
+    index = np.clip(
         np.searchsorted(edges, np.where(usable, values, edges[0]), side="right") - 1, 0, edges.size - 2
     )
-    member = ((place[:, :, None] == np.arange(edges.size - 1)) & usable[:, :, None]).astype(float)
+    member = ((index[:, :, None] == np.arange(edges.size - 1)) & usable[:, :, None]).astype(float)
     return name, unit, edges, None, member
 
 
@@ -184,8 +183,8 @@ def _impacts(problem, fit, units: Units) -> tuple | None:
     edges = np.unique(np.quantile(before[hit], np.linspace(0, 1, _IMPACT_BINS + 1)))
     if edges.size < 3:
         return None
-    place = np.clip(np.searchsorted(edges, before, side="right") - 1, 0, edges.size - 2)
-    member = (place[:, :, None] == np.arange(edges.size - 1)) * at[:, :, None]
+    index = np.clip(np.searchsorted(edges, before, side="right") - 1, 0, edges.size - 2)
+    member = (index[:, :, None] == np.arange(edges.size - 1)) * at[:, :, None]
     return IMPACT_SPEED, units.velocity, edges, None, member
 
 
@@ -235,14 +234,14 @@ def _gains(fitted: Fitted, columns: np.ndarray, sizes: list[int]) -> np.ndarray:
     return np.array(gains)
 
 
-def _telling(maps: list[tuple], gains: np.ndarray, own: set[str]) -> np.ndarray:
-    """Which maps are told: the simplest of those that explain nearly as much as any other.
+def _reported(maps: list[tuple], gains: np.ndarray, own: set[str]) -> np.ndarray:
+    """Which maps are reported: the simplest of those that explain nearly as much as any other.
 
-    Where a motion repeats itself, the place, the speed and the phase of a missing force go together: there
-    the maps of the variable that a named effect depends on, `own`, are told if they explain most of it too.
+    In a periodic motion, position, speed and phase of a missing force are correlated. Then the maps of the
+    variable that a named effect depends on, `own`, are reported if they explain most of it too.
     """
     if gains.max() <= 0:
-        # nothing is missing, or noise is said to be more than there is
+        # nothing is missing, or the stated noise is too large
         return np.zeros(gains.size, bool)
     near = gains >= _NEARLY * gains.max()
     mine = np.array([one[0] in own for one in maps]) & (gains >= _MOST * gains.max())
@@ -266,16 +265,16 @@ def sentences(maps: list[Map]) -> list[dict]:
     """Flagged regions in words and numbers, the clearest of each map first."""
     found = []
     for one in maps:
-        for place in np.flatnonzero(one.flagged)[np.argsort(-np.abs(one.force / one.error)[one.flagged])][:3]:
-            region = _region(one, int(place))
+        for index in np.flatnonzero(one.flagged)[np.argsort(-np.abs(one.force / one.error)[one.flagged])][:3]:
+            region = _region(one, int(index))
             found.append(
                 {
                     "map": one.name,
                     "region": region,
-                    "force": float(one.force[place]),
-                    "error": float(one.error[place]),
+                    "force": float(one.force[index]),
+                    "error": float(one.error[index]),
                     "unit": one.force_unit,
-                    "text": f"a {quantity_of(one.name)} of {one.force[place]:.3g} +- {one.error[place]:.2g} "
+                    "text": f"a {quantity_of(one.name)} of {one.force[index]:.3g} +- {one.error[index]:.2g} "
                     f"{one.force_unit} is missing {region['text']}",
                 }
             )
@@ -283,13 +282,13 @@ def sentences(maps: list[Map]) -> list[dict]:
 
 
 def quantity_of(name: str) -> str:
-    """What a map says is missing."""
+    """The quantity that is missing in a map."""
     return "speed after impacts" if name == IMPACT_SPEED else "force"
 
 
-def _region(one: Map, place: int) -> dict:
+def _region(one: Map, index: int) -> dict:
     if one.other_edges is None:
-        low, high = float(one.edges[place]), float(one.edges[place + 1])
+        low, high = float(one.edges[index]), float(one.edges[index + 1])
         return {
             "from": low,
             "to": high,
@@ -297,7 +296,7 @@ def _region(one: Map, place: int) -> dict:
             "text": f"at {one.name} {low:.3g} to {high:.3g} {one.unit}",
         }
     columns = one.other_edges.size - 1
-    i, j = divmod(place, columns)
+    i, j = divmod(index, columns)
     x, v = one.edges[i : i + 2], one.other_edges[j : j + 2]
     of_x, of_v = one.unit.split(", ")
     return {

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The search again where small imperfections of the rig hide what is missing: with those fitted as well.
+"""Repeats the search with fitted imperfections of the rig where these may hide what is missing.
 
-A search holds every effect against imperfections that are linear beside the machine as it was fitted without
-them.
-Where they explain hundreds of times what an effect does, the error of that hides it, or is taken for another.
+A search compares every effect with imperfections that are linearised about a machine fitted without them.
+Where they explain hundreds of times as much as an effect, the error of this linearisation hides the effect or
+passes for another.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import FAULT
+from separatrix.discovery.fitting.joint_forces import IMPERFECTION_SIZE
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import (
@@ -27,19 +27,18 @@ from separatrix.discovery.fitting.rig import (
     weight_of_imperfections,
 )
 
-# log-likelihood in training, and its share of the gap, from which on imperfections of a rig may hide an
-# effect
+# log-likelihood in training, and its share of the gap, from which imperfections of a rig may hide an effect
 _HIDING, _HIDING_SHARE = 10.0, 0.3
-# how often the motion that they act along is that of the machine beside them
+# iterations of the motion along which they act: it is that of the machine fitted beside them
 _TIMES = 2
 # progress of the second search
 _BEGUN, _ENDED = 0.85, 0.89
 
 
 def decide_with_imperfections(context: SearchContext, base: Fitted) -> tuple[SearchContext, Decision]:
-    """Decide; again with the imperfections of the rig fitted where that gave no name and they explain much.
+    """Decide; without a name, decide again with fitted imperfections of the rig if they explain much.
 
-    The second answer stands if it is a name; what it was asked on comes with it.
+    The second decision, with its context, is returned if it is a name.
     """
     first = decide(context, base)
     if not _may_hide(context, first):
@@ -61,23 +60,19 @@ def _sure(decision: Decision) -> bool:
 
 
 def _small(one: ScoredCandidate) -> bool:
-    """Whether no imperfection beside a machine is as large as imperfections may be: what asks for more is
-    none.
-    """
+    """Whether no fitted imperfection is at its largest size; a larger one is not an imperfection."""
     pairs: list[tuple[Problem, Fit]] = [(one.fitted.problem, one.fitted.fit)]
     if one.prediction is not None:
         pairs.append((one.prediction.problem, one.prediction.fit))
     return not any(
-        held and free.is_fault
+        held and free.is_imperfection
         for problem, fit in pairs
         for free, held in zip(problem.free, fit.at_bound, strict=True)
     )
 
 
 def _may_hide(context: SearchContext, decision: Decision) -> bool:
-    """Whether there is no name and imperfections explain much of what the machine leaves where it was
-    fitted.
-    """
+    """Whether there is no name and imperfections explain much of the residual in training."""
     base = decision.rounds[0].base
     if _sure(decision) or context.options.quick or isinstance(base.problem, CoordinateProblem):
         return False
@@ -88,11 +83,9 @@ def _may_hide(context: SearchContext, decision: Decision) -> bool:
 
 
 def _with_imperfections(
-    context: SearchContext, base: Fitted, told: Prediction | None
+    context: SearchContext, base: Fitted, prediction: Prediction | None
 ) -> tuple[SearchContext, Fitted] | None:
-    """Records with imperfections of their rig, and the machine fitted to them beside those; None if it is
-    lost.
-    """
+    """Records with imperfections of their rig, and the machine fitted beside these; None if the fit fails."""
     machine, values, followed = base.problem.free, base.fit.values, base.fit.good.sum()
     progress = context.options.progress
     options = replace(
@@ -103,8 +96,9 @@ def _with_imperfections(
         tables = imperfections_of(base.problem, base.fit, usual)
         training, held_out = context.training.with_imperfections(tables), context.held_out
         if held_out is not None:
-            told = told if turn == 0 else context.predict(base, told)
-            held_out = held_out.with_imperfections(imperfections_of(told.problem, told.fit, usual))
+            prediction = prediction if turn == 0 else context.predict(base, prediction)
+            tables_ahead = imperfections_of(prediction.problem, prediction.fit, usual)
+            held_out = held_out.with_imperfections(tables_ahead)
         problem = training.problem(base.model, training.last, [*machine, *as_nuisances(tables)])
         values = np.concatenate([values, np.zeros(len(problem.free) - values.size)])
         fit = minimise(problem, values, base.fit.starts, patient=True)
@@ -117,11 +111,11 @@ def _with_imperfections(
 
 
 def in_words(fitted: Fitted) -> list[str]:
-    """How large the imperfections are that were fitted beside a machine, in a sentence; none if none were."""
+    """The sizes of imperfections that were fitted beside a machine, in a sentence; none if none were."""
     sizes = {
-        (one.path, one.record): FAULT * abs(value)
+        (one.path, one.record): IMPERFECTION_SIZE * abs(value)
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
-        if one.is_fault
+        if one.is_imperfection
     }
     if not sizes:
         return []

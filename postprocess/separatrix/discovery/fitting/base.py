@@ -17,7 +17,7 @@ from separatrix.discovery.measured.signals import white_noise
 _PHASES = 12
 _RENEWED = 0.03
 _RENEWED_MEMORY = 0.06
-# reduced chi^2 above which correlated residuals say more about the model than about the noise
+# reduced chi^2 above which correlated residuals are due to the model rather than the noise
 _MISFIT = 1.5
 # share of the segments
 _HARDLY_ANY = 0.1
@@ -26,7 +26,7 @@ _SAME_SENSOR = 1.5
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
-    """Fit all parameters that the records can say something about; sets noise and memory of the records."""
+    """Fit all parameters that the records can determine; sets noise and memory of the records."""
     free = _free(data, model)
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
@@ -54,7 +54,7 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
 def _follows_better(fit: Fit, best: Fit) -> bool:
     """Whether a fit loses no segment of the best one and is closer, or the best one follows hardly any.
 
-    A fit that has wandered off to where it follows nothing has no misfit.
+    A fit that follows no segment has no misfit.
     """
     kept, now = best.good.sum(), fit.good.sum()
     if kept < _HARDLY_ANY * best.good.size:
@@ -88,7 +88,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
     if not problem.in_force and any(one.record.v is not None for one in data.prepared):
-        # the products of velocities in stretches are not kept
+        # products of velocities in condensed blocks are not kept
         memory = found.memory if found.of_samples else None
         speeds = noise_of(problem, fit, 1, mass, memory).factors
         for number, prepared in enumerate(data.prepared):
@@ -96,7 +96,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
                 prepared.velocity_sigma *= speeds.get(number, 1.0)
     scatter = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
-    # values of stretches scatter by more than samples do where the noise has memory: that is no misfit
+    # with memory of the noise, values of blocks scatter by more than samples: that is no misfit
     known = found.of_samples or misfit < _MISFIT
     if not known and found.memory:
         # nor are small imperfections of a rig
@@ -137,20 +137,20 @@ def find_phases(data: Data, model, free: list[Free]) -> None:
             data.prepared[i].phase = float(turn)
         problem, fit = fit_stages(data, model, free, values, stages=[0], most=4)
         record = problem.segments.record
-        # a start that cannot be flown is no fit
+        # a start that cannot be simulated is no fit
         lost = np.where(fit.evaluation.failed, 1e12, np.minimum(fit.chi2, 1e12))
         trials.append([float(np.sum(lost[record == i])) for i in missing])
     best = np.argmin(np.array(trials), axis=0)
     for one, phase in zip(data.prepared, original, strict=True):
         one.phase = phase
-    for place, i in enumerate(missing):
-        data.prepared[i].phase = float(best[place] * 2 * np.pi / _PHASES)
+    for column, i in enumerate(missing):
+        data.prepared[i].phase = float(best[column] * 2 * np.pi / _PHASES)
 
 
 def limit_noise(source: Data, target: Data) -> bool:
-    """Give records far noisier than those that are fitted the noise of the same sensor; whether any was.
+    """Limit the noise of far noisier records to that of the sensor of the fitted ones; whether any changed.
 
-    Where the base machine lacks an effect it hides in the noise of records too short to measure it again.
+    A missing effect would hide in the noise of records that are too short to measure the noise again.
     """
     if isinstance(source, SensedData):
         # nothing of theirs is measured on short records alone

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The effects that can be named: their parameters, sizes to start from, and what they cannot be told from.
+"""The effects that can be named: their parameters and the sizes to start from.
 
-A size to start from is a few per cent of what the machine's own forces, lengths and speeds are in the
-records.
+A size to start from is a few per cent of the machine's own forces, lengths and speeds in the records.
 """
 
 import re
@@ -44,7 +43,7 @@ def _asymmetry(scales: Scales) -> dict[str, list[float]]:
 
 
 ON_REQUEST = {
-    "cubic_damping": "it is tried where it is asked for: few records tell it from viscous and quadratic_drag",
+    "cubic_damping": "it is tried on request: few records distinguish it from viscous and quadratic_drag",
 }
 """Effects that are not tried by themselves, and why."""
 
@@ -57,7 +56,7 @@ STARTS: dict[str, Starts] = {
         "excess": [0.05 * s.force],
         "velocity": [0.15 * s.speed, 0.04 * s.speed, 0.5 * s.speed],
     },
-    # a body that does not stick without it shows nothing of a small one
+    # a small one has no effect on a body that does not stick without it
     "static_excess": lambda s: {"force": [share * s.force for share in (0.1, 0.03, 0.3)]},
     "dahl": lambda s: {"stiffness": [s.friction / (share * s.length) for share in (0.02, 0.005, 0.1)]},
     "asymmetric_friction": _asymmetry,
@@ -95,7 +94,7 @@ class Candidate:
     names: tuple[str, ...]
     model: object
     free: list[Free]
-    # places of the parameters of the last effect in `free`
+    # indices of the parameters of the last effect in `free`
     added: tuple[int, ...]
     starts: list[np.ndarray]
     # forms of the effect to screen: absent but for its shape, or of usual size where it is never absent
@@ -111,10 +110,10 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
         return f"the machine has no {effect.needs}"
     sizes = STARTS[name](scales)
     if name == "second_barrier":
-        place = _free_side(model, scales)
-        if isinstance(place, str):
-            return place
-        sizes = {"position": place}
+        positions = _free_side(model, scales)
+        if isinstance(positions, str):
+            return positions
+        sizes = {"position": positions}
     first = {key: float(values[0]) for key, values in sizes.items()}
     try:
         extended = _opened(model, name, sizes, scales).with_effect(name, first)
@@ -130,15 +129,15 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
             added.append(Free(path, float(np.log(value)), *ends, 0.1, positive=True))
         else:
             added.append(Free(path, value, lower, upper, abs(value) or 1.0))
-    place = tuple(range(len(whole), len(whole) + len(added)))
+    indices = tuple(range(len(whole), len(whole) + len(added)))
     starts = _starts(effect, sizes, added)
     linear = np.array([key in effect.amplitudes for key in first])
     forms = np.unique(np.where(linear, 0.0, np.array(starts)), axis=0)
-    return Candidate((*names, name), extended, whole + added, place, starts, list(forms), linear)
+    return Candidate((*names, name), extended, whole + added, indices, starts, list(forms), linear)
 
 
 def _opened(model, name: str, sizes: dict[str, list[float]], scales: Scales):
-    """The model; where a barrier is added, its starts lie where all places that are tried leave room."""
+    """The model; if a barrier is added, with starts that all its trial positions allow."""
     if name != "second_barrier":
         return model
     reach = 0.2 * (scales.highest - scales.lowest)
@@ -184,7 +183,7 @@ def _has(model, need: str) -> bool:
 
 
 def _free_side(model, scales: Scales) -> list[float] | str:
-    """Places for a second barrier: inside of the extreme of the records on the side without one."""
+    """Positions for a second barrier: inside of the extreme of the records on the side without one."""
     upper, lower = ("contact.upper" in model.parameters, "contact.lower" in model.parameters)
     if upper == lower:
         return "the machine has no side without a barrier" if upper else "the machine has no barrier"

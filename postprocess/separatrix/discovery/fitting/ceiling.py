@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the most flexible machine could still explain: forces that depend smoothly on speed, place, phase and
-time.
+"""What a flexible machine could still explain: forces that are smooth in speed, position, phase and time.
 
-A family of forces (and of kicks at impacts) is tried at once on what a fit left over, linearised. Under a
-right model the gain of a family is a chi^2 of its rank. The family of pieces gives each segment forces of its
-own and so sees what no function of the state can say.
+A family of forces (and of kicks at impacts) is fitted to the residual of a fit, linearised. Under a right
+model its gain is a chi^2 of its rank. The family of pieces gives each segment forces of its own and so
+detects what no function of the state describes.
 """
 
 from dataclasses import dataclass
@@ -31,7 +30,7 @@ from separatrix.discovery.fitting.screen import project
 
 _PIECES = 5
 _USABLE = 1e-6
-# share of what free forces close from which on a force of one thing closes most of it
+# share of the gain of free forces from which on a force of one variable closes most of the gap
 _MOST = 0.5
 
 
@@ -65,7 +64,7 @@ class Ceiling:
 
     @property
     def mostly(self) -> str:
-        """What a force depends on that explains most of what any force does; '' if no one thing does."""
+        """The dependence of a force that explains most of what any force does; '' if none does."""
         free = max(one.gain for one in self.families)
         of_one = [one for one in self.families if one.name != "pieces" and one.gain > _MOST * free]
         return max(of_one, key=lambda one: one.gain).name if of_one else ""

@@ -12,9 +12,9 @@ from separatrix.discovery.measured.segments import Segments, padded_table
 from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
 
 _TOLERANCE = 1e-10
-# of the distance of samples, and of a radian of the drive, over which an acceleration is the slope of v
+# share of the sampling interval, and of a radian of the drive, over which an acceleration is the slope of v
 _SHARE, _INSTANT = 0.25, 1e-3
-# of a number of a joint, by which its force is differentiated
+# relative step of a parameter of a joint by which its force is differentiated
 _STEP = 1e-6
 
 
@@ -120,7 +120,7 @@ class CoordinateProblem(Problem):
         shown = padded_table(motion[0], inside)
         failed |= np.any(inside[:, :, None] & ~np.isfinite(shown), axis=(1, 2))
         out.failed[rows] = failed
-        watched = self.structure.names.index(prepared.place)
+        watched = self.structure.names.index(prepared.observed)
         if out.motion is None:
             out.motion = np.zeros((*self.segments.inside.shape, 2 * n))
         out.motion[rows] = shown
@@ -203,15 +203,15 @@ class CoordinateProblem(Problem):
             return joint_force(
                 structure, sensor.of, motion, jacobian, (active, given, directions), self.model
             )
-        place = structure.names.index(sensor.of)
+        body = structure.names.index(sensor.of)
         if sensor.kind in "xv":
-            column = place + n * (sensor.kind == "v")
+            column = body + n * (sensor.kind == "v")
             return motion[0][:, column], None if jacobian is None else jacobian[0][:, column]
         weights = np.array([-1.5, 2.0, -0.5]) / part["instant"]
-        found = sum(w * one[:, n + place] for w, one in zip(weights, motion, strict=True))
+        found = sum(w * one[:, n + body] for w, one in zip(weights, motion, strict=True))
         if jacobian is None:
             return found, None
-        return found, sum(w * one[:, n + place] for w, one in zip(weights, jacobian, strict=True))
+        return found, sum(w * one[:, n + body] for w, one in zip(weights, jacobian, strict=True))
 
 
 def joint_force(
@@ -232,14 +232,14 @@ def joint_force(
         for name, parameter in model.parameters.items()
         if name.startswith(f"{path}.")
     }
-    places = {name.rpartition(".")[2]: i for i, name in enumerate(active) if name.startswith(f"{path}.")}
-    own |= {key: given[i] for key, i in places.items()}
-    force, by_place, by_speed = _force(joint.law, own, s, u)
+    indices = {name.rpartition(".")[2]: i for i, name in enumerate(active) if name.startswith(f"{path}.")}
+    own |= {key: given[i] for key, i in indices.items()}
+    force, by_extension, by_speed = _force(joint.law, own, s, u)
     if jacobian is None:
         return force, None
-    slopes = by_place[:, None] * np.einsum("kij,i->kj", jacobian[0][:, :n], joint.row)
+    slopes = by_extension[:, None] * np.einsum("kij,i->kj", jacobian[0][:, :n], joint.row)
     slopes += by_speed[:, None] * np.einsum("kij,i->kj", jacobian[0][:, n:], joint.row)
-    for key, i in places.items():
+    for key, i in indices.items():
         step = _STEP * max(abs(own[key]), 1e-6)
         moved = (_force(joint.law, {**own, key: own[key] + step}, s, u)[0] - force) / step
         slopes[:, : len(directions)] += moved[:, None] * directions[:, i]
@@ -247,18 +247,18 @@ def joint_force(
 
 
 def _force(law: str, own: dict[str, float], s: np.ndarray, u: np.ndarray) -> tuple:
-    """Force of a joint and its slopes over place and speed."""
+    """Force of a joint and its slopes over extension and speed."""
     if law in ("linear", "polynomial"):
-        stretch = s - own.get("free_length", 0.0)
+        extension = s - own.get("free_length", 0.0)
         k, k2, k3, c = (own.get(key, 0.0) for key in ("stiffness", "quadratic", "cubic", "damping"))
-        force = k * stretch + k2 * stretch**2 + k3 * stretch**3 + c * u
-        return force, k + 2 * k2 * stretch + 3 * k3 * stretch**2, np.full(s.shape, c)
+        force = k * extension + k2 * extension**2 + k3 * extension**3 + c * u
+        return force, k + 2 * k2 * extension + 3 * k3 * extension**2, np.full(s.shape, c)
     k, c = own["stiffness"], own.get("damping", 0.0)
-    force, by_place, by_speed = np.zeros(s.shape), np.zeros(s.shape), np.zeros(s.shape)
+    force, by_extension, by_speed = np.zeros(s.shape), np.zeros(s.shape), np.zeros(s.shape)
     for key, side in (("upper", 1.0), ("lower", -1.0)):
         depth = side * (s - own.get(key, side * np.inf))
         push = k * depth + side * c * u
         touches = (depth > 0) & ((push > 0) | (own.get("tension", 0.0) > 0))
         force[touches] = side * push[touches]
-        by_place[touches], by_speed[touches] = k, c
-    return force, by_place, by_speed
+        by_extension[touches], by_speed[touches] = k, c
+    return force, by_extension, by_speed

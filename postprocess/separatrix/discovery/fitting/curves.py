@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Members of a family of effects that are functions: values at knots instead of one built-in shape.
+"""Members of a family of effects that are functions: values at knots instead of one closed form.
 
 The number of knots is chosen by the evidence.
 """
@@ -22,11 +22,11 @@ from separatrix.library import effects
 
 KNOTS = (3, 5, 8, 12)
 """Numbers of knots that are tried, one after the other."""
-# impacts that a knot takes
+# impacts per knot
 _IMPACTS = 3
 # least range of the variable beside its largest value
 _NARROW = 0.05
-# share of the range in which knots lie evenly; the rest of them goes where the motion is
+# weight of even knots; the rest is that of the quantiles of the motion
 _EVEN = 0.5
 
 
@@ -72,10 +72,10 @@ def fit_member(
     alike: bool,
     ahead: Fitted | None = None,
 ) -> Fitted | None:
-    """The base machine with a table in place of an effect, fitted from a `known` machine; None if none.
+    """The base machine with a table in place of an effect, fitted from a `known` machine; None if impossible.
 
-    Where the table has values of both directions and they are `alike`, they are fitted as one. What cannot
-    come near a machine `ahead` any more is not fitted to its end.
+    Values of both directions that are `alike` are fitted as one. A fit that cannot come near a machine
+    `ahead` any more is not continued.
     """
     begun = begun_at(member, known, base, knots)
     made = None if begun is None else with_table(data, base, member, known, knots, begun, alike)

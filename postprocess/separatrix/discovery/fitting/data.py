@@ -25,15 +25,15 @@ from separatrix.errors import SeparatrixError
 STAGES = (0.2, 0.5, 1.0)
 FEWEST = 10
 """Samples of a segment at least."""
-# share of segments that may be wrong and the others still right
+# share of wrong segments up to which the others determine the machine
 _FEW = 0.25
 # natural periods that a segment may last where the drive is slow
-_MOST_SWINGS = 1.5
+_MOST_NATURAL_PERIODS = 1.5
 # squares by which a fit is far behind another, whatever its suspicious segments may gain
 _SQUARES_BEHIND = 60.0
-# standard errors within which an impact happens when the smoother says
+# standard errors within which the smoother gives the time of an impact
 _TIMES = 3.0
-# of the mean time between impacts, how far beside one nothing is compared at most
+# share of the mean time between impacts within which nothing is compared beside one, at most
 _BESIDE = 0.03
 # standard errors of the speed within which a body may be at rest
 _SLOW = 3.0
@@ -107,14 +107,14 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
     smoothed, lengths = [], []
     for one in prepared:
         record = one.record
-        swing = swing_samples(record.x)
-        smoothed.append(_smoothed(one, swing))
+        oscillation = oscillation_samples(record.x)
+        smoothed.append(_smoothed(one, oscillation))
         if seconds is not None:
             length = seconds / record.interval
         elif one.period_samples is not None:
-            length = periods * min(one.period_samples, _MOST_SWINGS * _natural_samples(one))
+            length = periods * min(one.period_samples, _MOST_NATURAL_PERIODS * _natural_samples(one))
         else:
-            length = periods * swing
+            length = periods * oscillation
         lengths.append(int(np.clip(length, FEWEST, record.t.size / 3)))
     stages = [
         cut([one.samples for one in prepared], smoothed, [max(FEWEST, int(share * n)) for n in lengths])
@@ -122,7 +122,7 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
     ]
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
-            raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no stretch to be fitted")
+            raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no interval to be fitted")
     return Data(prepared, smoothed, stages)
 
 
@@ -131,12 +131,12 @@ def _natural_samples(one: Prepared) -> float:
     return 2 * np.pi / one.natural / one.record.interval if one.natural else np.inf
 
 
-def _smoothed(one: Prepared, swing: float) -> Smoothed:
-    """Smooth a record; one sampled far faster than it moves is seen at fewer samples, and condensed."""
+def _smoothed(one: Prepared, oscillation: float) -> Smoothed:
+    """Smooth a record; one that is sampled far faster than it moves is thinned, and condensed."""
     record = one.record
     if one.in_force:
-        return _known_motion(one, swing)
-    period = min(one.period_samples or np.inf, _natural_samples(one), swing)
+        return _known_motion(one, oscillation)
+    period = min(one.period_samples or np.inf, _natural_samples(one), oscillation)
     every = stride(period, record.t.size)
     if every == 1:
         seen = smooth(record.t, record.x, one.sigma, one.period_samples)
@@ -146,12 +146,12 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
     seen = smooth(record.t[at], record.x[at], one.sigma, period / every)
     one.samples = condense(record, period, one.sigma, _events(record.t.size, at, seen))
     factor = one.samples.factor
-    within, as_much = "", " that say as much"
+    within, equal = "", " of equal information"
     if factor > 1:
-        within, as_much = f" within {factor:.0f} times the noise", ""
+        within, equal = f" within {factor:.0f} times the noise", ""
     one.notes.append(
-        f"{record.t.size} samples, {period:.0f} per period of the motion: stretches in which it is "
-        f"smooth{within} are condensed to {one.samples.t.size} values{as_much}"
+        f"{record.t.size} samples, {period:.0f} per period of the motion: intervals in which it is "
+        f"smooth{within} are condensed to {one.samples.t.size} values{equal}"
     )
     one.samples.blind = _blind(one, seen)
     return seen
@@ -160,8 +160,8 @@ def _smoothed(one: Prepared, swing: float) -> Smoothed:
 def _blind(one: Prepared, seen: Smoothed) -> np.ndarray | None:
     """Rows whose velocity is left out, because an impact lies nearer than its time is known.
 
-    A sample on the wrong side of a jump misses by hundreds of its noise, and no derivative tells which way
-    the impact would have to move. The time of an impact is known as well as place over speed.
+    A sample on the wrong side of a jump misses by hundreds of its noise, and no derivative shows in which
+    direction the impact should move. The error of the time of an impact is that of position over speed.
     """
     samples, v = one.samples, one.samples.v
     if v is None:
@@ -181,16 +181,16 @@ def _blind(one: Prepared, seen: Smoothed) -> np.ndarray | None:
     return blind & single
 
 
-def _known_motion(one: Prepared, swing: float) -> Smoothed:
+def _known_motion(one: Prepared, oscillation: float) -> Smoothed:
     """Smooth a record whose force is compared, and keep its motion."""
     record = one.record
-    found = smooth(record.t, record.x, one.motion_sigma, swing, stride(swing, record.t.size))
+    found = smooth(record.t, record.x, one.motion_sigma, oscillation, stride(oscillation, record.t.size))
     one.driven = driven(found, record.v, one.velocity_sigma, one.mass, record.pieces)
     return found
 
 
 def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.ndarray, float]:
-    """Samples around impacts; those where the body may turn round or stick; the usual acceleration."""
+    """Samples around impacts; those where the body may turn or stick; the usual acceleration."""
     hit, slow = np.zeros(at.size, bool), np.zeros(at.size, bool)
     hit[seen.impacts] = True
     hit[np.minimum(seen.impacts + 1, at.size - 1)] = True
@@ -203,13 +203,13 @@ def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.
     return hit[nearest], slow[nearest], float(np.median(np.abs(seen.state[:, 2])) / 0.6745)
 
 
-def swing_samples(x: np.ndarray) -> int:
-    """Samples of a swing of a record."""
+def oscillation_samples(x: np.ndarray) -> int:
+    """Samples of one oscillation of a record."""
     return 4 * _correlation_samples(x)
 
 
 def _correlation_samples(x: np.ndarray) -> int:
-    """Samples until the autocorrelation of a record first crosses zero: a quarter of a period of a swing."""
+    """Samples until the autocorrelation of a record first crosses zero: a quarter of an oscillation."""
     centred = x - x.mean()
     spectrum = np.abs(rfft(centred, next_fast_len(2 * x.size, real=True))) ** 2
     correlation = irfft(spectrum)[: x.size]

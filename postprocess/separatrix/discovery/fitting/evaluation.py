@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an evaluation of all segments gives."""
+"""Result of an evaluation of all segments."""
 
 from dataclasses import dataclass
 
@@ -35,5 +35,5 @@ class Evaluation:
     unknowns: int = 2
     # that the motion takes [N], where it is compared
     force: np.ndarray | None = None
-    # of several bodies: places, then velocities of all coordinates (segments, length, 2 n)
+    # of several bodies: positions, then velocities of all coordinates (segments, length, 2 n)
     motion: np.ndarray | None = None

@@ -24,19 +24,19 @@ _STRONGEST = 1e8
 _FINE = 0.03
 # damping of the first step
 _MILD = 1e-4
-# gain that is next to nothing, also as a share of chi^2, and how many such steps in a row end a fit; a
-# patient one goes on for less
+# gain that is negligible, also as a share of chi^2, and number of such steps in a row that end a fit; a
+# patient fit uses the tolerance instead
 _LITTLE = 0.1
 _LITTLE_SHARE = 3e-5
-_STALLS = 2
-_PATIENT_STALLS = 4
-# decrement within which a fit ends that only leads to another
+_WITHOUT_GAIN = 2
+_PATIENT_WITHOUT_GAIN = 4
+# decrement at which a fit that only starts another one ends
 _ROUGH = 0.5
-# derivatives are kept where a step gained its promise within this share, and the decrement falls by so much
+# derivatives are kept while a step gains its promise within this share and the decrement falls by this factor
 _AS_PROMISED = 0.25
 _FALLS = 10.0
-# iterations before a fit may be given up; what it must be behind, in squares and in decrements
-_HEARD = 3
+# iterations before a fit may be abandoned; distance behind at which it is, in squares and in decrements
+_FEWEST_ITERATIONS = 3
 _LOST = 100.0
 _OVER = 5.0
 _SPARED = 3
@@ -58,11 +58,11 @@ class Fit:
     movable: np.ndarray
     # in a minimum that is known not to be the lowest
     in_local_minimum: bool = False
-    # whether steps of every length were tried from there and gained next to nothing
+    # whether steps of every length from there gained a negligible amount
     exhausted: bool = False
-    # what condensed stretches leave over, and its degrees of freedom
+    # residual squares of condensed blocks, and their degrees of freedom
     left_over: tuple[np.ndarray, np.ndarray] | None = None
-    # of each segment: its start, or none where the motion is known
+    # unknowns of each segment: its start, or none where the motion is known
     unknowns: int = 2
 
     @property
@@ -84,7 +84,7 @@ class Fit:
 
     @property
     def good(self) -> np.ndarray:
-        """Segments that were flown and whose impacts are steady."""
+        """Segments that were simulated and whose impacts are steady."""
         return self.evaluation.steady & ~self.evaluation.failed & (self.counts > 0)
 
     @property
@@ -106,7 +106,7 @@ class Fit:
 
     @property
     def sample_chi2(self) -> float:
-        """Sum of squares per degree of freedom of all samples, those of condensed stretches included."""
+        """Sum of squares per degree of freedom of all samples, those of condensed blocks included."""
         squares, freedom = self.condensed(self.good)
         return (self.total + squares) / max(1.0, self.freedom + freedom)
 
@@ -122,7 +122,7 @@ class Fit:
         return self.total + squares - self.freedom - freedom
 
     def condensed(self, rows: np.ndarray) -> tuple[float, float]:
-        """Sum of squares of what condensed stretches of some segments leave over, degrees of freedom."""
+        """Residual sum of squares of the condensed blocks of some segments, and degrees of freedom."""
         if self.left_over is None:
             return 0.0, 0.0
         return tuple(float(one[rows].sum()) for one in self.left_over)
@@ -156,22 +156,21 @@ def minimise(
 ) -> Fit:
     """Minimise squares (or Huber's loss, `robust`); stop early above `hopeless` times the wanted chi^2.
 
-    A `patient` fit goes on where steps gain next to nothing, for machines that a verdict depends on; a
-    `rough` one only leads to another and ends within a standard error. A fit that is behind the sum of
-    squares `beat` by far more than it can still gain is given up. `begun`: the evaluation at values and
-    starts, if it is known.
+    A `patient` fit, for machines that a verdict depends on, continues with negligible gains. A `rough` one
+    only starts another and ends within a standard error. A fit that is behind the sum of squares `beat` by
+    far more than it can still gain is abandoned. `begun`: the evaluation at values and starts, if known.
     """
     movable = np.ones(values.size, bool) if fixed is None else ~fixed
     tolerance = max(tolerance, _ROUGH) if rough else tolerance
     descent = _Descent(problem, values, starts, movable, robust, begun)
-    iterations = stalled = 0
+    iterations = without_gain = 0
     begun_anew = exhausted = False
-    most_stalls = _PATIENT_STALLS if patient else _STALLS
+    most_without_gain = _PATIENT_WITHOUT_GAIN if patient else _WITHOUT_GAIN
     while iterations < most:
         iterations += 1
         if not descent.look(tolerance, rough):
             break
-        if beat is not None and iterations > _HEARD and descent.behind(beat):
+        if beat is not None and iterations > _FEWEST_ITERATIONS and descent.behind(beat):
             break
         mild = descent.damping <= _MILD
         if not descent.step():
@@ -181,15 +180,15 @@ def minimise(
             descent.damping, begun_anew = _MILD, True
             continue
         little = tolerance if patient else max(_LITTLE, _LITTLE_SHARE * descent.before)
-        stalled = stalled + 1 if descent.gain < little else 0
-        if stalled >= most_stalls:
+        without_gain = without_gain + 1 if descent.gain < little else 0
+        if without_gain >= most_without_gain:
             exhausted = begun_anew
             if exhausted:
                 break
-            descent.damping, stalled, begun_anew = _MILD, most_stalls - 1, True
-        elif not stalled:
+            descent.damping, without_gain, begun_anew = _MILD, most_without_gain - 1, True
+        elif not without_gain:
             begun_anew = False
-        if hopeless is not None and iterations > _HEARD and descent.hopeless(hopeless):
+        if hopeless is not None and iterations > _FEWEST_ITERATIONS and descent.hopeless(hopeless):
             break
     if not rough:
         descent.renew()
@@ -198,10 +197,10 @@ def minimise(
 
 
 class _Descent:
-    """Where a minimisation is, and its damped steps.
+    """State of a minimisation and its damped steps.
 
-    Derivatives cost far more than residuals: they are kept from step to step for as long as steps gain what
-    they promise and the decrement falls by `_FALLS` each time.
+    Derivatives cost far more than residuals, so they are kept while steps gain what they promise and the
+    decrement falls by `_FALLS` each time.
     """
 
     def __init__(
@@ -265,7 +264,7 @@ class _Descent:
                 self.damping = max(10 * self.damping, 1e-6)
             if self.kept is None:
                 return False
-            # the imperfection may be that of the old derivatives
+            # the outdated derivatives may be the cause
             self.renew()
             self.look(0.0, rough=False)
 
@@ -302,7 +301,7 @@ class _Descent:
 
 
 def blocking(problem: Problem, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Segments that lose more by a Gauss-Newton step than it promises in all: they bar its way."""
+    """Segments that lose more by a Gauss-Newton step than it promises in total, and so block it."""
     descent = _Descent(problem, values, starts, np.ones(values.size, bool), False, None)
     descent.look(0.0, rough=False)
     start_step, step, promised = gauss_newton_step(descent.blocks, descent.open, _MILD)
@@ -313,7 +312,7 @@ def blocking(problem: Problem, values: np.ndarray, starts: np.ndarray) -> np.nda
 
 
 def without_segments(fit: Fit, rows: np.ndarray) -> Fit:
-    """The same fit without what it says of some segments, which are no good ones."""
+    """The same fit with some segments marked as not good."""
     steady = fit.evaluation.steady.copy()
     steady[rows] = False
     return replace(fit, evaluation=replace(fit.evaluation, steady=steady))

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The force that a known motion takes: mass times acceleration less the forces of the machine along it.
+"""The force that a known motion needs: mass times acceleration less the forces of the machine along it.
 
-The forces of the machine are those of the simulator: of a flight from each sample, so short that nothing
-changes on it, under the measured force, so that the body is not stopped. Only friction with a memory needs
-the whole path: its state follows from Dahl's equation, which has a closed form between turning points.
+The simulator gives the forces of the machine, by a flight from each sample that is too short for any change,
+under the measured force, so that the body does not stop. Only friction with memory needs the whole path: its
+state follows from Dahl's equation, which has a closed form between turning points.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from separatrix.errors import SeparatrixError
 _INSTANT, _SHARE = 1e-7, 1e-2
 _TOLERANCE = 1e-12
 _DAHL = "effect.dahl.stiffness"
-_OVER_PLACE = ("effect.position_dependent_friction.", "effect.friction_position_curve.")
+_OVER_POSITION = ("effect.position_dependent_friction.", "effect.friction_position_curve.")
 
 
 def force_needed(
@@ -27,7 +27,7 @@ def force_needed(
     acceleration = _accelerations(model, values, motion, measured)
     force = _value(model, values, "body.mass") * (motion.a - acceleration) + measured
     if _DAHL in model.parameters:
-        share = _share_of_place(model, values, motion, measured)
+        share = _share_at_position(model, values, motion, measured)
         force = force + share * _unslipped(model, values, motion, pieces)
     return np.where(motion.moves, force, 0.0)
 
@@ -46,7 +46,7 @@ def _accelerations(model, values: dict[str, float], motion: Driven, measured: np
         derivatives=False, tolerance=_TOLERANCE,
     )  # fmt: skip
     if np.any(flown.reason != 0):
-        raise SeparatrixError("a place or speed of the record that the machine cannot have")
+        raise SeparatrixError("a position or speed of the record that the machine cannot have")
     found = np.zeros(motion.v.size)
     found[rows] = (flown.v[1::2] - motion.v[rows]) / time
     return found
@@ -64,7 +64,7 @@ def _unslipped(model, values: dict[str, float], motion: Driven, pieces: list[tup
     more = _value(model, values, "effect.asymmetric_friction.coulomb")
     found = np.zeros(motion.x.size)
     for first, last in pieces:
-        # what was before the record is not known: a long slip
+        # the motion before the record is unknown: a long slip is assumed
         behind, level, before = 0.0, 0.0, None
         for a, b, sign, begun in motion.strokes(first, last):
             if before is not None:
@@ -81,15 +81,15 @@ def _slipping(sign: int, dry: float, more: float) -> float:
     return sign * max(dry + sign * more, 0.0)
 
 
-def _share_of_place(model, values: dict[str, float], motion: Driven, measured: np.ndarray) -> np.ndarray:
-    """By how much friction is larger or smaller at each place than the law says."""
-    if not any(path.startswith(_OVER_PLACE) for path in model.parameters):
+def _share_at_position(model, values: dict[str, float], motion: Driven, measured: np.ndarray) -> np.ndarray:
+    """Friction at each sample over that of the law without dependence on position."""
+    if not any(path.startswith(_OVER_POSITION) for path in model.parameters):
         return np.ones(motion.x.size)
     path = "friction.kinetic_coefficient"
     more = {**values, path: _value(model, values, path) + 1.0}
     changed = _accelerations(model, more, motion, measured) - _accelerations(model, values, motion, measured)
     gravity = _value(model, values, "body.gravity")
-    # without a weight there is no friction that a place could change
+    # without weight there is no friction that could depend on position
     return np.abs(changed) / gravity if gravity > 0 else np.ones(motion.x.size)
 
 
@@ -101,10 +101,10 @@ def _value(model, values: dict[str, float], path: str) -> float:
 
 
 def force_argument(record, first: np.ndarray):
-    """Force of a record for segments that begin at the places `first`, in samples.
+    """Force of a record for segments that begin at the offsets `first`, in samples.
 
-    Time is counted in samples, so that the place in the force is right after a gap too; one sample more than
-    there are leaves room for the last times, which need not be quite even.
+    Time is counted in samples, so that offsets in the force are right after a gap too. One more sample leaves
+    room for the last times, which need not be quite even.
     """
     if record.force is None:
         return None

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An effect of several laws, as dry and viscous asymmetry, fitted with one of them alone.
 
-What the records say nothing of predicts other records badly, and the whole effect would lose to another of
-its one law.
+A law that the records do not determine predicts other records badly, and the whole effect would lose to
+another effect with the other law alone.
 """
 
 from collections.abc import Iterator

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well a fitted machine predicts records that the fit never saw.
 
-Only what belongs to the record itself is fitted to it: the starts of its segments, the zero of its crank, its
-clock, the curve of its sensor where imperfections of the rig are fitted. The score of a segment is the
+Only quantities of the record itself are fitted to it: the starts of its segments, the zero of its crank, its
+clock, and the curve of its sensor where imperfections of the rig are fitted. The score of a segment is the
 logarithm of its predictive density, with the uncertainty of the fitted parameters.
 
-Where the machine is wrong, its parameters count as less known, and the worse of two wrong machines would be
-forgiven more; what is held against such a machine is compared by squared errors alone.
+The parameters of a wrong machine count as less certain, which would favour the worse of two wrong machines.
+Candidates over such a machine are compared by squared errors alone.
 """
 
 from dataclasses import dataclass, replace
@@ -48,7 +48,7 @@ class Prediction:
 
     @property
     def sample_chi2(self) -> float:
-        """The same per degree of freedom of all samples, those of condensed stretches included."""
+        """The same per degree of freedom of all samples, those of condensed blocks included."""
         squares, freedom = self.fit.condensed(self.good)
         return float((self.fit.chi2[self.good].sum() + squares) / max(1.0, self._freedom + freedom))
 
@@ -68,9 +68,9 @@ class Prediction:
 
 @dataclass
 class Known:
-    """What training records say of the parameters of a machine: values, covariance; which they do not show.
+    """Training result for the parameters of a machine: values, covariance, and which are undetermined.
 
-    Those are fitted to the held-out records: without an impact in training, nobody can predict how one ends.
+    The latter are fitted to the held-out records: without an impact in training, none can be predicted.
     """
 
     values: np.ndarray
@@ -104,10 +104,10 @@ def predict(
 
 
 def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
-    """What `one` predicts better by segment, so that the sum is that of all segments together.
+    """Gain of `one` in predicting each segment; the sum is the joint gain of all segments.
 
-    What a common error of the parameters costs or gains in every segment of a record is shared out among
-    them; what several records say alike counts once, and is taken from each by what it says.
+    The effect of a common error of the parameters is distributed over the segments of a record. Information
+    that several records share counts once, and is deducted from each in proportion to its gain.
     """
     parts = gained(one, other)
     seen = parts != 0
@@ -127,12 +127,11 @@ def gained_together(one: Prediction, other: Prediction) -> np.ndarray:
 
 
 def gained(one: Prediction, other: Prediction) -> np.ndarray:
-    """What `one` predicts better than `other` by segment, in units of log density; 0 where one fails.
+    """Gain of `one` over `other` in predicting each segment, in units of log density; 0 where one fails.
 
-    The difference of the scores. Where the `other` misses the records by far more than the noise, its density
-    means nothing, and it is the difference of squared errors (the comparison of Diebold and Mariano), both
-    machines taken as fitted. The machine that all candidates are held against chooses the measure, so that
-    what they gain can be compared.
+    The difference of the scores. If `other` misses the records by far more than the noise, its density is
+    meaningless, and the difference of squared errors counts (Diebold and Mariano), both machines as fitted.
+    The machine that all candidates are compared with chooses the measure, so that gains are comparable.
     """
     wrong = other.misfit > _MISFIT
     parts = 0.5 * (other.fit.chi2 - one.fit.chi2) if wrong else one.score - other.score
@@ -142,11 +141,11 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
 def ahead(
     one: Prediction, other: Prediction, misfit: float | None = None, rows: np.ndarray | None = None
 ) -> float:
-    """What `one` predicts better than `other` in all segments, or in some rows, in units of log density.
+    """Gain of `one` over `other` in predicting all segments, or some rows, in units of log density.
 
-    Where both leave only noise, the density is that of all segments together: a parameter that is hardly
-    known errs in all of them alike, which counts once. The larger misfit of both chooses the measure, or one
-    that is given.
+    If both leave only noise, the density is that of all segments together: the error of an uncertain
+    parameter is common to all of them and counts once. The larger misfit of both chooses the measure, or a
+    given one.
     """
     both = one.good & other.good
     if rows is not None:
@@ -175,14 +174,14 @@ def _fit_own(
     if settled is None:
         settled, own = model, np.ones(values.size, bool)
     # what the machine has no parameter for
-    own |= np.array([one.is_fault for one in free], bool)
+    own |= np.array([one.is_imperfection for one in free], bool)
     kept = [one for one, mine in zip(free, own, strict=True) if mine]
     fit = None
     if guess is not None:
         problem = data.problem(settled, data.last, kept)
-        warm_started = _records_own(guess, kept, values[own])
-        fit = minimise(problem, warm_started, guess.fit.starts, most=12, fixed=fixed[own])
-    # a guess that leads all segments to a minimum needs no way from short ones
+        begun = _records_own(guess, kept, values[own])
+        fit = minimise(problem, begun, guess.fit.starts, most=12, fixed=fixed[own])
+    # a guess from which all segments converge needs no shorter segments first
     if fit is None or not fit.converged or suspicious(fit).size:
         stages = list(range(len(data.stages)))
         problem, other = fit_stages(
@@ -222,7 +221,7 @@ def _with(model, known: list[tuple[Free, float]]):
 
 
 def explained(one: Prediction, rows: np.ndarray) -> float:
-    """What of chi^2 of some segments an error of the parameters explains that is likely by what is known."""
+    """Part of chi^2 of some segments that likely errors of the parameters explain."""
     reduced = one.fit.reduced
     matrix, gradient = (table[rows].sum(axis=0)[None] for table in (reduced.matrix, reduced.gradient))
     return float(_explained(matrix, gradient, one.covariance)[0][0])

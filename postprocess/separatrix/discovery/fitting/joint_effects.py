@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Effects that can be named in machines of several bodies: each at a place, as a law of the case file.
+"""Effects that can be named in machines of several bodies: each at a location, as a law of the case file.
 
-An effect adds a joint, or gives one that is there a law that contains its own; so a case with it is an
-ordinary one. A row of the table is an effect; its name in a verdict is `EFFECT@PLACE`.
+An effect adds a joint, or gives an existing one a law that contains its own, so the result is an ordinary
+case. A row of the table is an effect; its name in a verdict is `EFFECT@LOCATION`.
 """
 
 from collections.abc import Callable
@@ -13,12 +13,12 @@ from itertools import product
 import numpy as np
 
 from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.locations import LocationScales, SensedScales
 from separatrix.discovery.fitting.machine import Free, bounds_of
-from separatrix.discovery.fitting.places import PlaceScales, SensedScales
 from separatrix.discovery.measured.bodies import (
     GROUND,
     Joint,
-    Place,
+    Location,
     Structure,
     edited,
     is_structure,
@@ -29,51 +29,51 @@ from separatrix.library import Effect, effects
 
 AT = "@"
 _FAR = 20.0
-# of the usual impact speed, above which a stop yields
+# share of the usual impact speed above which a stop yields
 _YIELDS = 0.5
-# what a spring with a play in series must not have
+# keys that a spring with free play in series must not have
 _NO_PLAY = ("free_length", "modulation", "modulation_cosine", "modulation_sine")
 
 
 @dataclass(frozen=True)
 class JointEffect:
-    """One effect: its family, what it changes of a case at a place, and the parameters that this frees.
+    """One effect: its family, its change of a case at a location, and the parameters that this frees.
 
-    `change` (case, place, joint, scales) edits the case and returns the path of the joint whose `keys` are
-    fitted, their values to start from: several of each are tried. `of` is the kind and law of the joint that
-    it needs there, '' for none. Numbers of that joint may go over to the path that `change` returns.
+    `change` (case, location, joint, scales) edits the case and returns the path of the joint whose `keys` are
+    fitted, with one or more values to start from. `of` is the kind and law of the joint that it needs there,
+    '' for none. Parameters of that joint may move to the path that `change` returns.
     """
 
     name: str
     meaning: str
     family: str
-    change: Callable[[dict, Place, Joint | None, PlaceScales], str]
-    keys: Callable[[PlaceScales], dict[str, list[float]]]
+    change: Callable[[dict, Location, Joint | None, LocationScales], str]
+    keys: Callable[[LocationScales], dict[str, list[float]]]
     amplitudes: tuple[str, ...]
     sizes: tuple[str, ...] = ()
     of: tuple[str, str] = ("", "")
     acts: str = "flight"
-    # numbers of the joint that are those of the returned path now
+    # parameters of the joint that move to the returned path
     moved: tuple[str, ...] = ()
-    # a key and the one that is minus it
+    # a key and the key with minus its value
     mirrored: tuple[str, str] = ("", "")
 
 
-def _new(family: str, **law: object) -> Callable[[dict, Place, Joint | None, PlaceScales], str]:
-    """A further joint at the place."""
+def _new(family: str, **law: object) -> Callable[[dict, Location, Joint | None, LocationScales], str]:
+    """A further joint at the location."""
 
-    def change(case: dict, place: Place, _: Joint | None, scales: PlaceScales) -> str:
+    def change(case: dict, location: Location, _: Joint | None, scales: LocationScales) -> str:
         name = f"added_{len(case.setdefault(family, {})) + 1}"
-        case[family][name] = {"between": list(place.ends), **law}
+        case[family][name] = {"between": list(location.ends), **law}
         return f"{family}.{name}"
 
     return change
 
 
-def _relaw(law: str, **more: object) -> Callable[[dict, Place, Joint | None, PlaceScales], str]:
-    """Another law of a joint that is there, which contains that of the case."""
+def _relaw(law: str, **more: object) -> Callable[[dict, Location, Joint | None, LocationScales], str]:
+    """Another law of an existing joint, which contains that of the case."""
 
-    def change(case: dict, _: Place, joint: Joint, scales: PlaceScales) -> str:
+    def change(case: dict, _: Location, joint: Joint, scales: LocationScales) -> str:
         family, name = joint.path.split(".")
         case[family][name] |= {"law": law, **more}
         return joint.path
@@ -81,11 +81,11 @@ def _relaw(law: str, **more: object) -> Callable[[dict, Place, Joint | None, Pla
     return change
 
 
-def _load(case: dict, place: Place, _: Joint | None, scales: PlaceScales) -> str:
-    return f"body.{place.ends[1]}"
+def _load(case: dict, location: Location, _: Joint | None, scales: LocationScales) -> str:
+    return f"body.{location.ends[1]}"
 
 
-def _softened(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
+def _softened(case: dict, location: Location, joint: Joint, scales: LocationScales) -> str:
     family, name = joint.path.split(".")
     table = case[family][name]
     ends = {key: table[key] for key in ("upper", "lower") if key in table}
@@ -101,8 +101,8 @@ def _softened(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> st
     return joint.path
 
 
-def _played(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
-    """The spring acts from both ends of a play on, its damper always."""
+def _played(case: dict, location: Location, joint: Joint, scales: LocationScales) -> str:
+    """The spring acts beyond both ends of the free play, its damper always."""
     family, name = joint.path.split(".")
     table = case[family][name]
     if any(np.any(table.get(key, 0.0)) for key in _NO_PLAY):
@@ -121,8 +121,8 @@ def _played(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
     return f"contact.{added}"
 
 
-def _sprung(case: dict, place: Place, joint: Joint, scales: PlaceScales) -> str:
-    """Friction with a spring in place of the friction, whose force is found anew: without, it may be 0."""
+def _sprung(case: dict, location: Location, joint: Joint, scales: LocationScales) -> str:
+    """Elastic friction in place of the friction, whose force is refitted: without elasticity it may be 0."""
     family, name = joint.path.split(".")
     table = case[family].pop(name)
     added = f"added_{len(case[family]) + 1}"
@@ -157,12 +157,13 @@ JOINT_EFFECTS = {
             ("static_force",), ("stribeck_velocity",),
         ),
         JointEffect(
-            "cubic_spring", "a force that grows with the cube of the stretch", "spring over extension",
+            "cubic_spring", "a force that grows with the cube of the extension", "spring over extension",
             _new("spring", law="polynomial", stiffness=0.0, cubic=0.0),
             lambda s: {"cubic": [0.02 * s.force / s.length**3]}, ("cubic",),
         ),
         JointEffect(
-            "quadratic_spring", "a force that grows with the square of the stretch", "spring over extension",
+            "quadratic_spring", "a force that grows with the square of the extension",
+            "spring over extension",
             _new("spring", law="polynomial", stiffness=0.0, quadratic=0.0),
             lambda s: {"quadratic": [0.02 * s.force / s.length**2]}, ("quadratic",),
         ),
@@ -210,15 +211,15 @@ JOINT_EFFECTS = {
 
 
 def effect_of(name: str) -> Effect:
-    """What is known of an effect of one body, or of one at a place of several."""
+    """Properties of an effect of one body, or of one at a location of several."""
     if AT not in name:
         return effects()[name]
     row = JOINT_EFFECTS[name.partition(AT)[0]]
     return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", {})
 
 
-def place_of(name: str) -> str:
-    """The place in the name of an effect, '' of one body."""
+def location_of(name: str) -> str:
+    """The location in the name of an effect, '' of one body."""
     return name.partition(AT)[2]
 
 
@@ -234,20 +235,20 @@ def names_for(model, asked: tuple[str, ...] | None) -> list[str]:
         return [name for name in STARTS if not asked or name in asked]
     structure = structure_of(model)
     return [
-        f"{kind}{AT}{place}"
+        f"{kind}{AT}{location}"
         for kind, row in JOINT_EFFECTS.items()
         if not asked or kind in asked
-        for place in _places(row, structure)
+        for location in _locations(row, structure)
     ]
 
 
-def _places(row: JointEffect, structure: Structure) -> list[str]:
-    """Places at which an effect may act: where there is such a joint, or where any force may be."""
+def _locations(row: JointEffect, structure: Structure) -> list[str]:
+    """Locations at which an effect may act: those of its kind of joint, or all."""
     if row.of[0]:
         return [joint.path for joint in structure.joints if _is(joint, row)]
     if row.name == "offset_force":
-        return [one.name for one in structure.places if one.ends[0] == GROUND]
-    return [one.name for one in structure.places]
+        return [one.name for one in structure.locations if one.ends[0] == GROUND]
+    return [one.name for one in structure.locations]
 
 
 def _is(joint: Joint, row: JointEffect) -> bool:
@@ -263,8 +264,8 @@ def candidate_of(
     kind, _, where = name.partition(AT)
     row, structure = JOINT_EFFECTS[kind], structure_of(model)
     joint = structure.joint(where) if row.of[0] else None
-    ends = joint.ends if joint else structure.place(where).ends
-    place = Place(where, ends, joint.row if joint else structure.place(where).row, ())
+    ends = joint.ends if joint else structure.location(where).ends
+    location = Location(where, ends, joint.row if joint else structure.location(where).row, ())
     size = scales.at(where)
     if size is None:
         return "nothing moves there in these records"
@@ -278,7 +279,7 @@ def candidate_of(
 
     def change(case: dict) -> None:
         nonlocal path
-        path = row.change(case, place, joint, size)
+        path = row.change(case, location, joint, size)
 
     keys = row.keys(size)
     try:

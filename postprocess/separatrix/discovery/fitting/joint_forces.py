@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Families of forces at the places of a machine of several bodies, and the small imperfections of its rig.
+"""Families of forces at the locations of a machine of several bodies, and the small imperfections of its rig.
 
-As in `ceiling` and `rig` those of one body: what a flexible machine could explain of what a fit left over,
-and what is no missing effect.
+The counterparts of `ceiling` and `rig` for one body: what a flexible machine could explain of a residual, and
+what is not a missing effect.
 """
 
 import numpy as np
@@ -18,20 +18,20 @@ _ALL_HARMONICS = 6
 # impacts of a contact from which on its kicks are tried
 _FEWEST_IMPACTS = 4
 POWERS = 4
-"""Of the speed before an impact, of which kicks are made: from 0 on."""
-FAULT = 5e-4
-"""Standard deviation of a imperfection of a rig over the signal: half of the largest that is usual."""
+"""Number of powers of the speed before an impact in kicks, from 0 on."""
+IMPERFECTION_SIZE = 5e-4
+"""Standard deviation of an imperfection of a rig over the signal: half of the largest usual one."""
 
 
 def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
-    """Columns of families of forces by name: over speed, stretch and time at places, phase, kicks."""
+    """Columns of families of forces by name: over speed, extension and time at locations, phase, kicks."""
     structure, n = problem.structure, problem.structure.n
     good = problem.segments.inside & fit.good[:, None]
     motion = fit.evaluation.motion
     found = {}
     time, phase = clock_of(problem, fit)
-    for place in structure.places:
-        s, u = motion[:, :, :n] @ place.row, motion[:, :, n:] @ place.row
+    for location in structure.locations:
+        s, u = motion[:, :, :n] @ location.row, motion[:, :, n:] @ location.row
         if not np.std(s[good]) > 0:
             continue
         over = {
@@ -41,7 +41,7 @@ def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
             * good[:, :, None],
         }
         for name, forces in over.items():
-            found[f"{name} at {place.name}"] = columns_of(problem, fit, forces, place.row)
+            found[f"{name} at {location.name}"] = columns_of(problem, fit, forces, location.row)
     if phase is not None:
         waves = [f(k * phase) for k in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
         forces = np.stack(waves, axis=2) * good[:, :, None]
@@ -77,9 +77,7 @@ def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
 
 
 def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
-    """Columns of small imperfections of a rig: sensors that are not quite linear, further harmonics of a
-    drive.
-    """
+    """Columns of small imperfections of a rig: slightly nonlinear sensors, further harmonics of a drive."""
     count, length = problem.segments.inside.shape
     good = problem.segments.inside & fit.good[:, None]
     columns = []
@@ -91,26 +89,27 @@ def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
                 signal[rows] = sensor.values[problem.segments.index[rows]]
         part = slice(channel * length, (channel + 1) * length)
         seen = good & (fit.evaluation.used[:, part] > 0)
-        swing = float(np.std(signal[seen])) if seen.any() else 0.0
-        if swing == 0:
+        deviation = float(np.std(signal[seen])) if seen.any() else 0.0
+        if deviation == 0:
             continue
-        u = (signal - np.mean(signal[seen])) / swing
+        u = (signal - np.mean(signal[seen])) / deviation
         for power in (2, 3):
             table = np.zeros((count, fit.evaluation.residual.shape[1], 1))
-            table[:, part, 0] = seen * FAULT * swing * u**power / sigmas_of(problem, name)[:, None]
+            sigma = sigmas_of(problem, name)[:, None]
+            table[:, part, 0] = seen * IMPERFECTION_SIZE * deviation * u**power / sigma
             columns.append(table)
     _, phase = clock_of(problem, fit)
     n = problem.structure.n
     for body in problem.structure.driven if phase is not None else ():
         if body not in problem.structure.names:
             continue
-        place = problem.structure.names.index(body)
+        index = problem.structure.names.index(body)
         steps = np.diff(problem.sample_times(), axis=1)
         usable = good[:, 1:] & (steps > 0)
-        speeds = fit.evaluation.motion[:, :, n + place]
+        speeds = fit.evaluation.motion[:, :, n + index]
         rates = np.diff(speeds, axis=1)[usable] / steps[usable]
-        usual = problem.structure.mass[place] * float(np.median(np.abs(rates))) / 0.6745
+        usual = problem.structure.mass[index] * float(np.median(np.abs(rates))) / 0.6745
         waves = [f(k * phase) for k in range(1, _ALL_HARMONICS + 1) for f in (np.sin, np.cos)]
-        forces = FAULT * usual * np.stack(waves, axis=2) * good[:, :, None]
-        columns.append(columns_of(problem, fit, forces, np.eye(n)[place]))
+        forces = IMPERFECTION_SIZE * usual * np.stack(waves, axis=2) * good[:, :, None]
+        columns.append(columns_of(problem, fit, forces, np.eye(n)[index]))
     return problem.whitened(np.concatenate(columns, axis=2))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a small force at any place of a machine of several bodies does to its sensors, linearised.
+"""Linearised response of the sensors of a machine of several bodies to a small force at any location.
 
 As in `response`: a force f along a row of the coordinates moves the start by the integral of T^-1 M^-1 f, T
 being the derivative of the motion by the start, and a sensor by its derivatives by the start.
@@ -58,11 +58,11 @@ def sigmas_of(problem: CoordinateProblem, name: str) -> np.ndarray:
 
 
 def back_to_start(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """The change of the start (segments, length, 2 n, n) that speeds at each sample amount to, and where."""
+    """Change of the start (segments, length, 2 n, n) equivalent to speeds at a sample, and its validity."""
     transition, n = fit.evaluation.transition, problem.structure.n
     inside = problem.segments.inside & fit.good[:, None]
     finite = np.isfinite(transition).all(axis=(2, 3)) & inside
-    # in units in which places and speeds are alike
+    # in units in which positions and speeds are of equal size
     moved = fit.evaluation.motion[inside]
     lengths, speeds = moved[:, :n].std(), moved[:, n:].std()
     size = np.concatenate([np.full(n, lengths or 1.0), np.full(n, speeds or 1.0)])

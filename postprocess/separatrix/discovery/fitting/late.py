@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sensor of the place that is late, beside a velocity that is not.
+"""A delayed position sensor, beside a velocity without delay.
 
-`sensor_delay` is a delay of x. The library begins a segment where the body was when the first sample was
-shown, a delay before the time of that sample, and gives the velocity of that instant; what is recorded as v
-at a time is the velocity of the body a delay later.
+`sensor_delay` is a delay of x. The library begins a segment at the state that the first sample shows, a delay
+before the time of that sample, and gives the velocity of that instant. The recorded v of a time is the
+velocity of the body a delay later.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ import numpy as np
 from separatrix.errors import SeparatrixError
 
 DELAY = "effect.sensor_delay.delay"
-# of the time of a first sample, by which the acceleration of the start is taken
+# share of the time of a first sample over which the acceleration of the start is taken
 _SHORT = 1e-3
 
 
 @dataclass
 class Flown:
-    """A flight: what is shown of x, and of v where that is not late, each with its derivatives."""
+    """A flight: delayed x and undelayed v, each with its derivatives."""
 
     shown: object
     v: np.ndarray
@@ -37,13 +37,13 @@ def flown_late(
     frequency: float,
     **more,
 ) -> Flown:
-    """Segments (arguments of `Model.segments`) of a machine with a late sensor, and velocities at `times`.
+    """Segments (arguments of `Model.segments`) of a machine with a delayed sensor, and velocities at `times`.
 
-    `frequency` is that of the drive [rad/s]. Before its start a body, which is away from impacts and turning
-    points there, has the acceleration of its start.
+    `frequency` is that of the drive [rad/s]. Before its start, which is away from impacts and turning points,
+    a body has the acceleration of its start.
     """
-    place = active.index(DELAY)
-    delay, count = float(given[place]), times.size
+    index = active.index(DELAY)
+    delay, count = float(given[index]), times.size
     segment = np.repeat(np.arange(len(start)), np.diff(first))
     if abs(delay) > np.max(times, initial=0.0):
         raise SeparatrixError(f"{DELAY}: found {delay:.3g} s, allowed less than a segment lasts")
@@ -69,7 +69,7 @@ def flown_late(
     n = len(more["directions"])
     # by the delay with the start as it is: what comes later is what an earlier start would lead to
     later_start = start[segment, 1] * jacobian[:, n] + acceleration * jacobian[:, n + 1]
-    along = np.asarray(more["directions"])[:, place]
+    along = np.asarray(more["directions"])[:, index]
     jacobian[:, :n] += np.outer(later_start + frequency * jacobian[:, n + 2], along)
     return Flown(shown, v, jacobian)
 

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is free in a fit: parameters of the machine, drive scale; phase, clock and zero of each record; small
-imperfections of the rig."""
+"""Free quantities of a fit: parameters of the machine, drive scale; phase, clock and zero of each record;
+imperfections of the rig.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-# Not fitted: a scale of all forces, or what an offset force cannot be told from.
+# not fitted: a scale of all forces, or a parameter equivalent to an offset force
 _FIXED = (
     "body.gravity",
     "restoring.free_length",
@@ -17,7 +18,7 @@ _FIXED = (
     "drive.interval",
 )
 _FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding")
-_KNOTS = ("speed[", "place[", "stretch[", "penetration[")
+_KNOTS = ("speed[", "position[", "extension[", "penetration[")
 SENSOR_BIAS = "effect.sensor_bias.bias"
 SENSOR_ZERO = "nuisance:sensor_zero"
 IMPERFECTION = "nuisance:imperfection_of_rig:"
@@ -25,7 +26,7 @@ _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
 _UNBOUNDED = 1e100
-# by which the mass may differ from that of the case where the force is compared
+# factor by which the mass may differ from that of the case where the force is compared
 _MASS_FACTOR = 5.0
 
 
@@ -46,8 +47,7 @@ class Free:
     positive: bool = False
     # each record has its own beside it
     varies: bool = False
-    # standard error of a nuisance about 0 that a measurement of its own leaves, or that such imperfections
-    # have
+    # standard error of a nuisance about 0, from its own measurement or of such imperfections
     error: float | None = None
     # another path of the machine that has the same value, or minus that
     also: str | None = None
@@ -86,16 +86,16 @@ class Free:
         return self.path.startswith("nuisance:")
 
     @property
-    def is_fault(self) -> bool:
+    def is_imperfection(self) -> bool:
         """Whether this is the size of a small imperfection of the rig, which adds to what is measured."""
         return self.path.startswith(IMPERFECTION)
 
 
 def base_parameters(model, measured_force: bool, in_force: bool = False) -> list[Free]:
-    """The parameters of the base machine that a record can say something about.
+    """The parameters of the base machine that a record can determine.
 
-    Where the force is compared (`in_force`) the mass stays near that of the case, of which a slow joint says
-    little.
+    Where the force is compared (`in_force`) the mass stays near that of the case, as a slow joint hardly
+    determines it.
     """
     free = []
     for path, parameter in model.parameters.items():
@@ -187,7 +187,7 @@ def sensor_zeros(free: list[Free], count: int) -> list[Free]:
 
 def on_other_records(free: list[Free], prepared: list) -> list[Free]:
     """What is free on other records: what `free` has for all of them, and what each record has of its own."""
-    # what was learned of a imperfection that all records share is not to be learned again
+    # a common imperfection was fitted in training and is not fitted again
     own = [replace(one, error=None) for one in free if one.record is None]
     if prepared[0].frequency:
         own += record_nuisances(prepared)
@@ -196,7 +196,7 @@ def on_other_records(free: list[Free], prepared: list) -> list[Free]:
         if not one.record.part:
             own += [Free(SENSOR_ZERO, 0.0, size=bias.size, record=i) for bias in free if bias.varies]
         # its curve, about its own middle, also of a part: what one range shows is another one there
-        curves = (one for one in free if one.is_fault and one.record is not None)
+        curves = (one for one in free if one.is_imperfection and one.record is not None)
         own += dict.fromkeys(replace(one, record=i, value=0.0) for one in curves)
     return own
 

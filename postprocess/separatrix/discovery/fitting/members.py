@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The families of effects that may be functions: what each is over, what a fitted machine says it is."""
+"""The families of effects that may be functions: their variables, and the function of a fitted machine."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.fitting.motions import stretches
+from separatrix.discovery.fitting.motions import extensions
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.library import effects
 
-# share of the largest speed below which bounces die out and say little
+# share of the largest speed below which bounces die out and carry little information
 _SLOW = 0.03
 # time over which a force is measured, in natural periods or seconds
 _INSTANT = 1e-5
@@ -27,15 +27,15 @@ class Member:
     effect: str
     knots: str
     values: tuple[str, ...]
-    # what the function is of, in which unit, and what it gives
+    # variable of the function, its unit, and the quantity that it gives
     variable: str
     unit: str
     quantity: str
-    # free parameter of the machine that a constant in the table would only repeat, and whether the table
-    # changes it by a share of it
+    # free parameter of the machine that is equivalent to a constant of the table, and whether the table is
+    # relative to it
     anchor: str | None
     by_share: bool
-    # parameters of the machine that the table takes the place of
+    # parameters of the machine that the table replaces
     replaces: str | None
     # force that it explains, by the names of the ceiling
     explains: str
@@ -78,21 +78,21 @@ def _speeds(fitted: Fitted) -> np.ndarray:
     return np.sort(np.abs(fitted.fit.evaluation.v[_inside(fitted)]))
 
 
-def _places(fitted: Fitted) -> np.ndarray:
-    """Places of the fitted motion at the samples [m] at which it slides."""
+def _sliding_positions(fitted: Fitted) -> np.ndarray:
+    """Positions of the fitted motion at the samples where it slides [m]."""
     inside = _inside(fitted)
     x, speed = fitted.fit.evaluation.x[inside], np.abs(fitted.fit.evaluation.v[inside])
     return np.sort(x[speed > _SLOW * speed.max(initial=0)])
 
 
 def _everywhere(fitted: Fitted) -> np.ndarray:
-    """Places of the fitted motion at the samples [m]."""
+    """Positions of the fitted motion at the samples [m]."""
     return np.sort(fitted.fit.evaluation.x[_inside(fitted)])
 
 
-def _stretches(fitted: Fitted) -> np.ndarray:
-    """Stretches of the spring at the samples [m]; none without a linear spring."""
-    found = stretches(fitted.problem, fitted.fit)
+def _extensions(fitted: Fitted) -> np.ndarray:
+    """Extensions of the spring at the samples [m]; none without a linear spring."""
+    found = extensions(fitted.problem, fitted.fit)
     return np.zeros(0) if found is None else np.sort(found[_inside(fitted)])
 
 
@@ -126,10 +126,10 @@ def _known_friction(known: Fitted, base: Fitted, speeds: np.ndarray) -> list[np.
     return [friction_at(known, speeds, direction, base) for direction in (1.0, -1.0)]
 
 
-def _known_over_place(known: Fitted, base: Fitted, places: np.ndarray) -> list[np.ndarray]:
+def _known_over_position(known: Fitted, base: Fitted, positions: np.ndarray) -> list[np.ndarray]:
     values = _values(known)
     slope = values.get("effect.position_dependent_friction.slope", 0.0)
-    return [values["friction.kinetic_coefficient"] * np.maximum(1 + slope * places, 0)]
+    return [values["friction.kinetic_coefficient"] * np.maximum(1 + slope * positions, 0)]
 
 
 def _known_spring(known: Fitted, base: Fitted, at: np.ndarray) -> list[np.ndarray]:
@@ -250,13 +250,13 @@ MEMBERS = (
         None, False, "friction.", "speed", _speeds, _known_friction, ("speed",), from_zero=True,
     ),
     Member(
-        "friction_position_curve", "position", ("change",), "position", "m", "coefficient of kinetic friction",
-        "friction.kinetic_coefficient", True, None, "speed and position", _places, _known_over_place,
-        ("speed", "position"),
+        "friction_position_curve", "position", ("change",), "position", "m",
+        "coefficient of kinetic friction", "friction.kinetic_coefficient", True, None, "speed and position",
+        _sliding_positions, _known_over_position, ("speed", "position"),
     ),
     Member(
         "spring_curve", "extension", ("force",), "extension", "m", "force beyond the spring of the case (N)",
-        None, False, "restoring.", "position", _stretches, _known_spring, ("extension",),
+        None, False, "restoring.", "position", _extensions, _known_spring, ("extension",),
     ),
     Member(
         "force_curve", "position", ("force",), "position", "m", "force beyond the spring of the case (N)",

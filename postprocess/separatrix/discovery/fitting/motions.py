@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a missing force may be a function of, along a fitted motion: place, speed, phase, time, impacts."""
+"""Variables of a missing force along a fitted motion: position, speed, phase, time, impacts."""
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline
@@ -9,7 +9,7 @@ from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.library import effects
 
-# angles of the crank at which the foot of the spring is asked for
+# crank angles at which the position of the foot of the spring is computed
 _ANGLES = np.linspace(0, 2 * np.pi, 65)
 # time over which a force is measured, in natural periods or seconds
 _INSTANT = 1e-5
@@ -18,7 +18,7 @@ _INSTANT = 1e-5
 def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
     """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1.
 
-    Where no segment could be flown nothing is scaled.
+    Without any simulated segment nothing is scaled.
     """
     inside = problem.segments.inside
     x, v = fit.evaluation.x.copy(), fit.evaluation.v.copy()
@@ -51,8 +51,8 @@ def products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
 
 
-def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
-    """Stretch of the spring at the samples [m]; None where there is no linear spring that can be asked."""
+def extensions(problem: Problem, fit: Fit) -> np.ndarray | None:
+    """Extension of the spring at the samples [m]; None without a linear spring or where it is unknown."""
     if "restoring.stiffness" not in problem.model.parameters:
         return None
     found = np.zeros(problem.segments.inside.shape)
@@ -61,7 +61,7 @@ def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
         if not rows.size:
             continue
         stamps = prepared.samples.t[problem.segments.index[rows]]
-        slack = _slack_places(problem, fit, number)
+        slack = _slack_positions(problem, fit, number)
         if not np.isfinite(slack).all():
             return None
         where = CubicSpline(_ANGLES, slack, bc_type="periodic")
@@ -70,11 +70,11 @@ def stretches(problem: Problem, fit: Fit) -> np.ndarray | None:
     return found
 
 
-def _slack_places(problem: Problem, fit: Fit, number: int) -> np.ndarray:
-    """Places at which the spring pulls nothing [m], at the crank angles `_ANGLES` of a record.
+def _slack_positions(problem: Problem, fit: Fit, number: int) -> np.ndarray:
+    """Positions at which the spring is slack [m], at the crank angles `_ANGLES` of a record.
 
-    From the force on a body in the middle of the motion when only the spring acts; no numbers where the
-    machine cannot be flown there.
+    They follow from the force on a body in the middle of the motion when only the spring acts; NaN where the
+    machine cannot be simulated there.
     """
     model, x = problem.model, float(np.median(fit.evaluation.x[problem.segments.inside]))
     values = problem.machine_values(number, fit.values)
@@ -83,7 +83,7 @@ def _slack_places(problem: Problem, fit: Fit, number: int) -> np.ndarray:
         acts = first == "effect" and last.split("[")[0] in effects()[middle[0]].amplitudes
         if (first == "friction" and last.endswith(("coefficient", "damping"))) or acts:
             values[path] = 0.0
-        # free play is no force of its own, but moves the places by half of it
+        # free play is no force of its own, but shifts these positions by half of it
         if path == "effect.backlash.gap":
             values[path] = 0.0
     time = _INSTANT / max(1.0, model.drive_frequency({}))

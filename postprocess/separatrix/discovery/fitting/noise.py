@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Size and memory of the noise of records, from what segments of half a period leave over.
+"""Size and memory of the noise of records, from the residuals of segments of half a period.
 
-A wrong model does little over half a period that a free start and a force that is constant over quarters of
-it could not undo. What is left is noise, less what these unknowns took away: its power and the product of its
-neighbours are compared with what noise of correlation r^|k| would leave. With R its correlation and Q an
-orthonormal basis of the unknowns that is tr(P R P), P = 1 - Q Q', of which no more than R Q is ever formed.
+Over half a period, a free start and a force that is constant over quarters compensate a wrong model. The
+residual is noise, less the share of these unknowns. Its power and the product of its neighbours are compared
+with those that noise of correlation r^|k| would leave. With R its correlation and Q an orthonormal basis of
+the unknowns that is tr(P R P), P = 1 - Q Q'; only R Q is formed.
 
-Of a condensed record the same is done with what its smooth stretches leave over; no machine is needed there.
+For a condensed record the residuals of its smooth blocks are used, which need no machine.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.response import force_columns, in_swings
+from separatrix.discovery.fitting.response import force_columns, standardised
 from separatrix.discovery.measured.condense import Samples, expected_left
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
@@ -25,7 +25,7 @@ _PIECES = 4
 # samples of a piece of a measured force, and powers of time that are taken from it
 _SHORT, _POWERS = 16, 3
 _LEAST = 0.04
-# segments that say how large the noise is
+# segments that determine the size of the noise
 _FEWEST = 4
 # memory of a force beyond which it is that of the joint and not of the sensor
 _MOST = 0.8
@@ -53,21 +53,21 @@ class Noise:
     memory: float
     # standard error of that correlation
     error: float = 0.0
-    # whether the memory is that of what condensed stretches leave over, in which no machine has a part
+    # whether the memory is that of residuals of condensed blocks, which are independent of the machine
     of_samples: bool = False
 
 
 def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float | None = None) -> Noise:
     """Size and memory of the noise of one channel of all records; the memory may be `known`."""
-    stretches = [] if problem.in_force else _of_stretches(problem, channel)
+    condensed = [] if problem.in_force else _of_blocks(problem, channel)
     if problem.in_force:
         left = _of_short_pieces(problem, fit)
     else:
-        left = _joined([_of_segments(problem, fit, channel, mass), *stretches])
-    # a row of stretches stands for all of one length
-    if left.record.size < _FEWEST and not stretches:
+        left = _joined([_of_segments(problem, fit, channel, mass), *condensed])
+    # a row of blocks stands for all of one length
+    if left.record.size < _FEWEST and not condensed:
         return Noise({}, 0.0)
-    memory, error = _memory_of(_joined(stretches) if stretches else left)
+    memory, error = _memory_of(_joined(condensed) if condensed else left)
     if known is not None:
         memory = known
     if problem.in_force and memory > _MOST:
@@ -77,7 +77,7 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float
         rows = left.record == number
         expected = float(np.interp(memory, _MEMORIES, left.powers[:, rows].sum(axis=1)))
         factors[int(number)] = float(np.sqrt(left.power[rows].sum() / expected))
-    return Noise(factors, memory, error, bool(stretches))
+    return Noise(factors, memory, error, bool(condensed))
 
 
 def _memory_of(left: _Left) -> tuple[float, float]:
@@ -107,8 +107,8 @@ def _joined(parts: list[_Left]) -> _Left:
     return _Left(*(np.concatenate([getattr(one, name) for one in parts], axis=-1) for name in names))
 
 
-def _of_stretches(problem: Problem, channel: int) -> list[_Left]:
-    """What condensed stretches leave over, a row for all stretches of one length in a record."""
+def _of_blocks(problem: Problem, channel: int) -> list[_Left]:
+    """Residuals of condensed blocks, a row for all blocks of one length in a record."""
     found = []
     for number, prepared in enumerate(problem.prepared):
         samples = prepared.samples
@@ -134,7 +134,7 @@ def _of_length(samples: Samples, size: int, channel: int, sigma: float) -> tuple
 
 
 def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left:
-    """What segments of samples leave over once their starts and forces are projected out."""
+    """Residuals of segments of samples with their starts and forces projected out."""
     segments = problem.segments
     length = segments.inside.shape[1]
     counts = segments.inside.sum(axis=1)
@@ -163,19 +163,19 @@ def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left
 
 
 def _bent_sensor(problem: Problem, fit: Fit) -> np.ndarray:
-    """Square and cube of the place, (segments, samples, 2): the errors of a sensor that is not quite linear.
+    """Square and cube of the position, (segments, samples, 2): errors of a slightly nonlinear sensor.
 
-    They bend where the speed jumps, as no force does, and would be memory of the noise.
+    They have kinks where the speed jumps, unlike forces, and would appear as memory of the noise.
     """
     seen = problem.segments.inside & fit.good[:, None]
-    u = np.where(seen, in_swings(problem, fit.evaluation.x)[0], 0.0)
+    u = np.where(seen, standardised(problem, fit.evaluation.x)[0], 0.0)
     return u[:, :, None] ** np.array([2, 3])
 
 
 def _of_short_pieces(problem: Problem, fit: Fit) -> _Left:
-    """What short pieces of measured forces leave over once a parabola in time is taken from each.
+    """Residuals of short pieces of measured forces less a parabola in time each.
 
-    A force shows every bend of a law at once: what a wrong machine leaves in some of them is put aside.
+    A force shows every kink of a law at once; pieces with large residuals of a wrong machine are left out.
     """
     length = problem.segments.inside.shape[1] // _SHORT * _SHORT
     pieces = fit.evaluation.residual[:, :length].reshape(-1, _SHORT)
@@ -191,7 +191,7 @@ def _of_short_pieces(problem: Problem, fit: Fit) -> _Left:
 def _without_outliers(
     record: np.ndarray, cleaned: np.ndarray, freedom: np.ndarray, basis: np.ndarray, counts: np.ndarray
 ) -> _Left:
-    """Powers of what is left, but of those stretches that the model misses altogether."""
+    """Powers of the residuals, without pieces that the model misses altogether."""
     power = np.sum(cleaned**2, axis=1)
     share = power / freedom
     kept = np.zeros(record.size, bool)

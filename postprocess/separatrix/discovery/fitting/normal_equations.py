@@ -105,10 +105,10 @@ def inverse_scaled(matrix: np.ndarray, known: np.ndarray, smallest: float = 1e-1
     """Inverse of the known rows and columns of a symmetric matrix, else 0; in units of its diagonal
     directions below `smallest` of the largest do not count."""
     found = np.zeros_like(matrix)
-    place = np.ix_(known, known)
+    block = np.ix_(known, known)
     scale = 1 / np.sqrt(np.diag(matrix)[known])
     units = np.outer(scale, scale)
-    found[place] = np.linalg.pinv(matrix[place] * units, rcond=smallest, hermitian=True) * units
+    found[block] = np.linalg.pinv(matrix[block] * units, rcond=smallest, hermitian=True) * units
     return found
 
 

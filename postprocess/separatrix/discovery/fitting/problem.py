@@ -14,12 +14,12 @@ from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, padded, padded_table, seeing
 from separatrix.errors import SeparatrixError
 
-# of the adaptive flight, relative to the place counted from the origin: a third quicker than 1e-9; the share
-# of the noise that its error may be where a small motion is far from the origin, and where rounding begins
+# tolerance of the adaptive flight, relative to the position from the origin: a third quicker than 1e-9; share
+# of the noise that its error may be for a small motion far from the origin; limit of rounding
 _TOLERANCE = 1e-8
 _NOISE_SHARE = 0.01
 _ROUNDING = 1e-14
-# of the size of a parameter, by which the force that a known motion takes is differentiated
+# relative step of a parameter by which the force of a known motion is differentiated
 _STEP = 1e-5
 
 
@@ -35,7 +35,7 @@ def flight_tolerance(prepared: Prepared) -> float:
 class Problem:
     """Records cut into segments, a model, and what is free."""
 
-    # what a start is: x and v
+    # unknowns of a start: x and v
     starts = 2
 
     def __init__(
@@ -85,9 +85,9 @@ class Problem:
         return found
 
     def left_over(self) -> tuple[np.ndarray, np.ndarray]:
-        """What condensed stretches of each segment leave over, and its degrees of freedom.
+        """Residual squares of the condensed blocks of each segment, and their degrees of freedom.
 
-        The machine has no part in it: it says how large the noise is beside the one that is assumed.
+        They are independent of the machine and measure the noise relative to the assumed one.
         """
         squares, freedom = np.zeros(self.segments.count), np.zeros(self.segments.count)
         for number, prepared in enumerate(self.prepared):
@@ -120,14 +120,14 @@ class Problem:
         return 2 if not self.in_force and any(part["v"] is not None for part in self._parts) else 1
 
     def _known_nuisances(self) -> list[tuple[int, float, np.ndarray]]:
-        """Places and errors of nuisances of known size, and the segments that share what this says.
+        """Indices and errors of nuisances of known size, and the segments that share their residual.
 
-        Each is one more residual of its record, of which every segment has its part, so that sums and
-        resampled sums over the segments hold it.
+        Each is one more residual of its record, of which every segment has a share, so that sums and
+        resampled sums over the segments contain it.
         """
         return [
-            (place, one.error, rows)
-            for place, one in enumerate(self.free)
+            (index, one.error, rows)
+            for index, one in enumerate(self.free)
             if one.error is not None and (rows := self._rows_of(one.record)).size
         ]
 
@@ -161,14 +161,14 @@ class Problem:
             "x": fitted.x[samples],
             "v": None if fitted.v is None else fitted.v[samples],
             "samples": samples,
-            "force": None if self.in_force else force_argument(record, fitted.place[first]),
+            "force": None if self.in_force else force_argument(record, fitted.offset[first]),
             "tolerance": flight_tolerance(self.prepared[number]),
         }
 
     def evaluate(
         self, values: np.ndarray, starts: np.ndarray, derivatives: bool = True, by_start_alone: bool = False
     ) -> Evaluation:
-        """Simulate all segments from `starts` (segments, 2) of x and v, or of places and velocities.
+        """Simulate all segments from `starts` (segments, 2) of x and v, or of positions and velocities.
 
         With `by_start_alone` derivatives by the parameters of the machine are 0, which is much quicker.
         """
@@ -205,13 +205,13 @@ class Problem:
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
-        for column, (place, error, rows) in enumerate(measured, start=self.channels * length):
-            out.residual[rows, column] = -values[place] / error
+        for column, (index, error, rows) in enumerate(measured, start=self.channels * length):
+            out.residual[rows, column] = -values[index] / error
             out.used[rows, column] = 1 / rows.size
             if derivatives:
-                out.by_parameter[rows, column, place] = 1 / error
+                out.by_parameter[rows, column, index] = 1 / error
         self._add_imperfections(values, out)
-        # what was not flown to its end says nothing
+        # segments that were not simulated to their end do not count
         for table in (out.residual, out.by_start, out.by_parameter):
             if table is not None:
                 table[out.failed] = 0
@@ -247,7 +247,7 @@ class Problem:
         if not self.imperfections:
             return
         deviations, length = self._deviations(), self.segments.inside.shape[1]
-        for place, one in enumerate(self.free):
+        for index, one in enumerate(self.free):
             table = self.imperfections.get((one.path, one.record))
             if table is None:
                 continue
@@ -255,9 +255,9 @@ class Problem:
             for channel in range(self.channels):
                 columns = slice(channel * length, (channel + 1) * length)
                 added = table[rows, channel] / deviations[rows, channel]
-                out.residual[rows, columns] -= values[place] * added
+                out.residual[rows, columns] -= values[index] * added
                 if out.by_parameter is not None:
-                    out.by_parameter[rows, columns, place] += added
+                    out.by_parameter[rows, columns, index] += added
 
     def _deviations(self) -> np.ndarray:
         """Of the noise of x and v at the samples (segments, channels, length), infinite beside these."""

@@ -15,29 +15,29 @@ from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.screen import Screened
 
-# a linearised estimate that reaches this share of what it promised needs no other start
+# a linearised estimate that reaches this share of its promise needs no other start
 _DELIVERED = 0.8
 # reduced chi^2 of the base beyond which the linearised estimate promises nothing
 _BAD = 1.3
 _HOPELESS = 4.0
-# log-likelihood by which a candidate is out of the race
+# log-likelihood by which a candidate is far behind
 _BEATEN = 15.0
 # segments that may be in a wrong minimum
 _SPARED = 3
 # share of segments that one fit may follow more than another without being better
 _FEW = 0.1
 # log-likelihood by which a name is too far behind another one of the same motion to be at its minimum; share
-# of the size of that one from which its own follows
+# of the size of that one from which its own size is extrapolated
 _FAR_BEHIND, _FIRST_SHARE = 6.0, 0.1
 # log-likelihood by which a machine that contains the base may be worse than it
 WORSE = 1.0
 # share of chi^2 by which two fits of one minimum may differ
 _SAME = 1e-3
-# share of chi^2 by which two fits that are far behind may differ and another start not be worth it
+# share of chi^2 by which two fits far behind may differ for another start to be needless
 _ALIKE = 0.05
 # reduced chi^2 of the base up to which a start from it is trusted
 _NEAR_BASE = 10.0
-# share of what the base misses that a rival has closed for another effect to need but one start
+# share of the gap of the base that a rival has closed for another effect to need only one start
 _MOST_CLOSED = 0.5
 # usual sizes beyond which a linearised estimate is not believed
 _FARTHEST = 25.0
@@ -58,7 +58,7 @@ class Fitted:
 
     @property
     def unseen(self) -> np.ndarray:
-        """Which free parameters the records say nothing about."""
+        """Which free parameters the records do not determine."""
         return np.diag(self.fit.reduced.matrix[self.fit.good].sum(axis=0)) <= 0
 
     @property
@@ -78,13 +78,13 @@ def refit(
     quick: bool = False,
     known: Fitted | None = None,
 ) -> Fitted:
-    """The best of several starts: the linearised estimate first, then usual sizes from short segments on.
+    """The best of several starts: the linearised estimate, then usual sizes from short segments on.
 
-    Where a `rival` (the base itself, perhaps) already leaves nothing but noise, a candidate that is clearly
-    worse after its first start is not tried further. A fit `known` from another noise is carried on, and
-    tried from the base of now where it is neither good nor out of the race.
+    If a `rival` (perhaps the base itself) already leaves only noise, a candidate that is clearly worse after
+    its first start is not tried further. A fit `known` from another noise is continued, and is tried from the
+    present base if it is neither good nor far behind.
     """
-    best, warm_started = None, "known"
+    best, best_kind = None, "known"
     if known is not None:
         best = carried_on(data, candidate, known)
         out = best.fit.far_off(hopeless(base)) or (rival is not None and beaten(best, rival))
@@ -107,9 +107,9 @@ def refit(
             # of other kinds it was done with the last stage
             fit = polished(data, problem, fit, data.last, 8, rival=base.fit)
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
-        agreed = best is not None and _agree({kind, warm_started}, found, best, base, rival)
+        agreed = best is not None and _agree({kind, best_kind}, found, best, base, rival)
         if best is None or _better(found, best):
-            best, warm_started = found, kind
+            best, best_kind = found, kind
         best.tries = tries
         if agreed:
             break
@@ -121,7 +121,7 @@ def refit(
         if _enough(best, base, candidate, rival):
             break
         if known is not None or ((quick or base.added) and tries == 2):
-            # the other starts of a fit that is known were tried then
+            # the other starts of a known fit were tried before
             break
     return _above_base(data, best, base, candidate)
 
@@ -129,9 +129,9 @@ def refit(
 def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | None) -> bool:
     """Whether a fit that began at the base needs no start from afar.
 
-    An effect with sizes alone has one minimum near the base. Another has more; but where the first is worse
-    than no effect, or no better where most of the gap is closed, or on top of an effect, they are not worth
-    what they cost.
+    An effect with amplitudes alone has one minimum near the base. Others have more; but these are not worth
+    their cost where the first is worse than no effect, or far behind a rival that closes most of the gap, or
+    on top of an effect.
     """
     if base.fit.reduced_chi2 > _NEAR_BASE:
         return False
@@ -149,14 +149,14 @@ def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | N
 
 
 def hopeless(base: Fitted) -> float:
-    """Reduced chi^2 from which on a candidate is given up."""
+    """Reduced chi^2 from which on a candidate is abandoned."""
     return _HOPELESS * max(1.0, base.fit.reduced_chi2)
 
 
 def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
-    """The fit, or one from the base where that is better: a machine that contains the base is no worse.
+    """The fit, or a better one from the base: a machine that contains the base cannot be worse.
 
-    What stays worse has not found its minimum, whatever its last step promised.
+    A fit that stays worse has not found its minimum.
     """
     if not candidate.linear.any() or gain_over(best, base)[0] > -WORSE:
         return best
@@ -184,7 +184,7 @@ def beaten(one: Fitted, rival: Fitted) -> bool:
 
 
 def carried_on(data: Data, candidate: Candidate, known: Fitted, patient: bool = False) -> Fitted:
-    """An earlier fit, carried on with the noise of now."""
+    """An earlier fit, continued with the present noise."""
     problem = data.problem(candidate.model, data.last, candidate.free)
     values = values_of(known, [replace(one, value=0.0) if one.path in _amplitudes(candidate) else one
                                for one in candidate.free])  # fmt: skip
@@ -270,20 +270,18 @@ def _try(
 
 
 def crossed(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
-    """A fit tried again from where another effect led the machine and its starts; the better of
-    both.
-    """
+    """A fit tried again from the machine and starts of another effect; the better of both."""
     values = _base_values(other, candidate)
     added = list(candidate.added)
     values[added] = one.fit.values[list(one.added)]
     return _from(data, one, values, other)
 
 
-def in_place_of(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
-    """A fit tried again in the place of another name of its motion; the better of both.
+def imitating(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
+    """A fit tried again from another name of its motion; the better of both.
 
-    It begins at the machine of that name, without a size and with the size that its own leads to there; where
-    both end far from it, at the machine of its own that has its motion.
+    It begins at the machine of that name, without a size and with the size that its own parameters reach
+    there. If both end far from it, it begins at its own machine with the same motion.
     """
     own = _base_values(other, candidate)
     found = _from(data, one, _absent(own, candidate), other)
@@ -297,17 +295,17 @@ def in_place_of(data: Data, one: Fitted, other: Fitted, candidate: Candidate) ->
 
 
 def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> Fitted:
-    """A fit begun at the machine of its own that has the motion of another name; the better of both.
+    """A fit from its own machine with the motion of another name; the better of both.
 
-    Without a size both are the same machine. What its own has to be to follow the first share of that size is
-    carried on in proportion, as the names of one motion are.
+    Without a size both machines are the same. The change of its parameters that follows the first share of
+    that size is extrapolated in proportion, as names of one motion are proportional.
     """
     known = _absent(_base_values(other, candidate), candidate)
     theirs = other.fit.values.copy()
     theirs[list(other.added)] *= _FIRST_SHARE
     motion = other.problem.evaluate(theirs, other.fit.starts, derivatives=False)
-    # which is that of the machine, without what imperfections of the rig add to it
-    imperfections = np.array([free.is_fault for free in one.problem.free])
+    # this motion excludes imperfections of the rig
+    imperfections = np.array([free.is_imperfection for free in one.problem.free])
     begun = np.where(imperfections, 0.0, known)
     fit = minimise(one.problem.imitating(motion), begun, other.fit.starts, most=8, fixed=imperfections)
     starts = other.fit.starts + (fit.starts - other.fit.starts) / _FIRST_SHARE
@@ -315,8 +313,8 @@ def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     lower, upper = (
         np.array([getattr(free, side) for free in one.problem.free]) for side in ("lower", "upper")
     )
-    warm_started = replace(other, fit=replace(other.fit, starts=starts))
-    return _from(data, one, np.clip(values, lower, upper), warm_started)
+    begun_from = replace(other, fit=replace(other.fit, starts=starts))
+    return _from(data, one, np.clip(values, lower, upper), begun_from)
 
 
 def warm_started_by(data: Data, one: Fitted, other: Fitted) -> Fitted:
@@ -387,8 +385,8 @@ def common(one: Fitted, other: Fitted) -> np.ndarray:
 def gain_over(one: Fitted, other: Fitted) -> tuple[float, np.ndarray]:
     """Log-likelihood of `one` over that of `other`, and its parts by segment.
 
-    A segment that one of them flies without steady impacts could not be fitted: its chi^2 is at most what is
-    found, and what that proves for the one that flies it counts.
+    A segment that one of them simulates without steady impacts could not be fitted: its chi^2 is an upper
+    bound, which counts as far as it favours that one.
     """
     parts = 0.5 * (other.fit.chi2 - one.fit.chi2)
     proven = [
@@ -400,6 +398,6 @@ def gain_over(one: Fitted, other: Fitted) -> tuple[float, np.ndarray]:
 
 
 def _bounded_by(fitted: Fitted) -> np.ndarray:
-    """Segments that are flown to their end, but not with steady impacts."""
+    """Segments that are simulated to their end, but without steady impacts."""
     evaluation = fitted.fit.evaluation
     return ~evaluation.failed & ~evaluation.steady & (fitted.fit.counts > 0)

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Segments whose start is in a wrong minimum (one impact more or less), tried from
-others.
-"""
+"""Further starts for segments in a wrong minimum (one impact more or less)."""
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from separatrix.discovery.fitting.problem import Problem
 _SUSPECT = 1.7
 _MOST_SEGMENTS = 12
 _ITERATIONS = 15
-# starts of one segment with the same number of impacts that are followed, and how many such numbers
+# starts of one segment that are followed for each number of impacts, and how many such numbers
 _FOLLOWED = 2
 _NUMBERS = 4
 _LEAST_GAIN = 0.01
@@ -48,18 +46,18 @@ def rescued(
     tries = len(steps)
     rows = np.repeat(suspects, tries)
     copies = problem.of_segments(rows)
-    places = np.tile(np.repeat(np.arange(len(guesses)), len(around)), suspects.size)
-    begin = np.stack(guesses)[places, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
+    indices = np.tile(np.repeat(np.arange(len(guesses)), len(around)), suspects.size)
+    begin = np.stack(guesses)[indices, rows] + np.tile(steps, (suspects.size, 1)) * spread[rows]
     promising = _promising(copies.evaluate(fit.values, begin, derivatives=False), tries)
     if not promising.size:
-        # from none of the tries can the segments be flown
+        # the segments cannot be simulated from any of the trials
         return fit.starts.copy(), improved
     rows, begin = rows[promising], begin[promising]
     found, cost = solve_starts(copies.of_segments(promising), fit.values, begin)
     starts = fit.starts.copy()
     for segment in np.unique(rows):
-        places = np.flatnonzero(rows == segment)
-        best = places[np.argmin(cost[places])]
+        trials = np.flatnonzero(rows == segment)
+        best = trials[np.argmin(cost[trials])]
         before = fit.chi2[segment] if fit.good[segment] else np.inf
         if cost[best] < min(0.8 * before, before - 10):
             starts[segment] = found[best]
@@ -76,7 +74,7 @@ def _around(width: int) -> np.ndarray:
 
 
 def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
-    """The best tries of each segment, those with one number of impacts apart from those with another.
+    """The best trials of each segment, separately for each number of impacts.
 
     Numbers of impacts whose best try is behind those of several others are left out.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a small force, acting along the fitted motion, does to the samples: from the transition matrices.
+"""Response of the samples to a small force along the fitted motion, from the transition matrices.
 
 With T(t) the derivative of x and v by the start, impacts included, a force f(s) moves the state at t by the
 integral of T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any number of forces can be tried.
@@ -19,7 +19,7 @@ _LOST = 1e-9
 def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
     """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples.
 
-    Where the force is compared, what acts on the body in its direction is less to be measured.
+    Where the force is compared, a force on the body in its direction reduces the measured one.
     """
     if problem.in_force:
         return _of_forces(problem, fit, forces)
@@ -54,12 +54,12 @@ def _of_forces(problem: Problem, fit: Fit, forces: np.ndarray) -> np.ndarray:
 
 
 def _back(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """The change of the start that a kick in v at each sample amounts to, and where that has a meaning."""
+    """Change of the start that is equivalent to a kick in v at each sample, and its validity."""
     transition = fit.evaluation.transition
     determinant = (
         transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
     )
-    # a body that sticks forgets: from there on a force does nothing
+    # a body that sticks loses its memory: later forces have no earlier equivalent
     alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & problem.segments.inside, axis=1)
     safe = np.where(alive, determinant, 1.0)
     # second column of the inverse
@@ -84,16 +84,16 @@ def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarr
     return problem.whitened(columns)
 
 
-def in_swings(problem: Problem, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A signal (segments, samples) about the mean of its record in units of its swing there, and the swings.
+def standardised(problem: Problem, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A signal (segments, samples) less the mean of its record, over its standard deviation, and the latter.
 
-    Those of the record as it was measured, which is sampled evenly: what is fitted is denser near impacts.
+    Both are of the record as measured, which is sampled evenly: condensed samples are denser near impacts.
     """
-    found, swings = np.zeros(signal.shape), np.zeros(len(problem.prepared))
+    found, deviations = np.zeros(signal.shape), np.zeros(len(problem.prepared))
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
         measured = prepared.record.force if problem.in_force else prepared.record.x
-        swings[number] = float(np.std(measured))
-        if swings[number] > 0:
-            found[rows] = (signal[rows] - np.mean(measured)) / swings[number]
-    return found, swings
+        deviations[number] = float(np.std(measured))
+        if deviations[number] > 0:
+            found[rows] = (signal[rows] - np.mean(measured)) / deviations[number]
+    return found, deviations

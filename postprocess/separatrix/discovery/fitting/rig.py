@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small imperfections that every rig has and that are no missing effect.
+"""Small imperfections of every rig, which are not missing effects.
 
-A sensor that is not quite linear, a drive with further harmonics.
+A slightly nonlinear sensor, a drive with further harmonics.
 
-Each is known to be no larger than some 1e-3 of the signal, which is two standard deviations here; as
-nuisances with that prior they take from a residual what they may explain of it (G. E. P. Box's tentative
-overfitting, with a bound).
+Each is at most some 1e-3 of the signal, which is two standard deviations here. As nuisances with that prior
+they remove from a residual what they may explain (G. E. P. Box's tentative overfitting, with a bound).
 """
 
 from dataclasses import dataclass, replace
@@ -17,22 +16,22 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import FAULT, imperfection_columns_of
+from separatrix.discovery.fitting.joint_forces import IMPERFECTION_SIZE, imperfection_columns_of
 from separatrix.discovery.fitting.machine import IMPERFECTION, Free
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, inverse_scaled, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
-from separatrix.discovery.fitting.response import force_columns, in_swings
+from separatrix.discovery.fitting.response import force_columns, standardised
 
 _POWERS = (2, 3)
 _HARMONICS = 6
-# standard deviations that a imperfection may have, and by which factors its prior is made narrower for that
+# largest imperfection in standard deviations; factors by which its prior is narrowed for that
 _LARGEST = 3.0
 _NARROWER, _NARROWEST = 4.0, 1e15
-# precisions over that of the prior: imperfections of half and of a quarter of its size are as usual
+# precisions over that of the prior: imperfections of half and a quarter of its size are equally likely
 _SIZES = (1.0, 4.0, 16.0)
-# least eigenvalue of scaled equations that says something
+# least usable eigenvalue of scaled equations
 _SHOWN = 1e-11
 
 
@@ -55,13 +54,13 @@ def _columns_of_imperfections(problem: Problem, fit: Fit, usual: float | None = 
     if state["phase"] is not None:
         usual = usual_acceleration(problem, fit) if usual is None else usual
         waves = [f(n * state["phase"]) for n in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
-        accelerations = FAULT * usual * np.stack(waves, axis=2) * inside[:, :, None]
+        accelerations = IMPERFECTION_SIZE * usual * np.stack(waves, axis=2) * inside[:, :, None]
         columns.append(force_columns(problem, fit, accelerations, 1.0))
     return np.concatenate(columns, axis=2)
 
 
 def usual_acceleration(problem: Problem, fit: Fit) -> float:
-    """Of the flights of a fitted motion [m/s^2], by the median; impacts are far above. 0 if nothing flies."""
+    """Median acceleration of a fitted motion [m/s^2], below that of impacts; 0 without a segment."""
     steps = np.diff(problem.sample_times(), axis=1)
     usable = problem.segments.inside[:, 1:] & fit.good[:, None] & (steps > 0)
     rates = np.diff(fit.evaluation.v, axis=1)[usable] / steps[usable]
@@ -69,22 +68,23 @@ def usual_acceleration(problem: Problem, fit: Fit) -> float:
 
 
 def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
-    """What square and cube of what is compared, place or force, add to x or F as they are measured.
+    """Contributions of square and cube of the compared signal, position or force, to its measurement.
 
-    Each record has its own: a smooth curve has other terms over another range.
+    They are separate for each record: a smooth curve has other terms over another range.
     """
     signal = fit.evaluation.force if problem.in_force else fit.evaluation.x
     count, length = signal.shape
     records = len(problem.prepared)
     table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
-    u, swings = in_swings(problem, signal)
+    u, deviations = standardised(problem, signal)
     # also of segments that only another machine follows well
     inside = problem.segments.inside & ~fit.evaluation.failed[:, None]
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
         sigma = prepared.deviation(problem.segments.index[rows])
-        for place, power in enumerate(_POWERS, start=number * len(_POWERS)):
-            table[rows, :length, place] = inside[rows] * FAULT * swings[number] * u[rows] ** power / sigma
+        size = IMPERFECTION_SIZE * deviations[number]
+        for column, power in enumerate(_POWERS, start=number * len(_POWERS)):
+            table[rows, :length, column] = inside[rows] * size * u[rows] ** power / sigma
     return problem.whitened(table)
 
 
@@ -95,9 +95,9 @@ class Beside:
     shift: np.ndarray
     covariance: np.ndarray
 
-    def of(self, places: list[int]) -> "Beside":
+    def of(self, indices: list[int]) -> "Beside":
         """Some of the parameters."""
-        return Beside(self.shift[places], self.covariance[np.ix_(places, places)])
+        return Beside(self.shift[indices], self.covariance[np.ix_(indices, indices)])
 
     def add_to(self, matrix: np.ndarray, gradient: np.ndarray, open_: np.ndarray) -> None:
         """Add what is known to normal equations whose first unknowns these are, and let them move."""
@@ -115,9 +115,9 @@ class Beside:
 
 
 def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
-    """The fit without what imperfections may explain of its residuals, its parameters fitted beside them.
+    """The fit less the part of its residuals that imperfections may explain, refitted beside them.
 
-    The first parameters of a held-out record were fitted to others: they are `known` from there.
+    The first parameters of a held-out record are `known` from the training records.
     """
     evaluation = fit.evaluation
     columns, sizes = _explained(problem, fit, known)
@@ -128,7 +128,7 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
 
 
 def imperfections_of(problem: Problem, fit: Fit, usual: float) -> dict[tuple[str, int | None], np.ndarray]:
-    """What each imperfection of one standard deviation adds to x and v along a fit, as in `Problem`.
+    """Contribution of each imperfection of one standard deviation to x and v along a fit, as in `Problem`.
 
     Sensors are curved in each record by themselves; the drive has its harmonics in all of them, of one size
     over the `usual` acceleration [m/s^2].
@@ -150,36 +150,34 @@ def as_nuisances(imperfections: dict[tuple[str, int | None], np.ndarray]) -> lis
 
 
 def _explained(problem: Problem, fit: Fit, known: Beside | None) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of parameters and imperfections, and their steps and sizes that explain most of a residual."""
+    """Columns of parameters and imperfections, with the steps and sizes that explain most of a residual."""
     columns, matrix, gradient, open_ = _equations(problem, fit)
     p = fit.evaluation.by_parameter.shape[2]
     without = solve_scaled(matrix[:p, :p], gradient[:p], open_[:p])
     if known is not None:
         known.add_to(matrix, gradient, open_)
     sizes = solve_scaled(_bounded(matrix, gradient, p, open_)[0], gradient, open_)
-    # a step that the fit has without imperfections is none of theirs
+    # the step without imperfections is not due to them
     sizes[:p] -= without
     return columns, sizes
 
 
-def cleaned_prediction(fitted: Fitted, told: Prediction) -> Fit:
-    """What a machine predicts, without what imperfections may explain of it and may have made of its
-    parameters.
-    """
-    return cleaned(told.problem, told.fit, _shared(fitted, told))
+def cleaned_prediction(fitted: Fitted, prediction: Prediction) -> Fit:
+    """A prediction less the part that imperfections may explain, also by their shift of the parameters."""
+    return cleaned(prediction.problem, prediction.fit, _shared(fitted, prediction))
 
 
-def _shared(fitted: Fitted, told: Prediction) -> Beside:
+def _shared(fitted: Fitted, prediction: Prediction) -> Beside:
     """Step of the shared parameters that training records suggest beside imperfections."""
     shared = [i for i, one in enumerate(fitted.problem.free) if one.record is None]
     known = with_imperfections(fitted.problem, fitted.fit).of(shared)
-    return replace(known, shift=np.zeros_like(known.shift)) if told.with_imperfections else known
+    return replace(known, shift=np.zeros_like(known.shift)) if prediction.with_imperfections else known
 
 
 def with_imperfections(problem: Problem, fit: Fit) -> Beside:
-    """Parameters of a fit as they would be, and be known, if the imperfections of a rig were fitted too.
+    """Parameters of a fit and their covariance if the imperfections of a rig were fitted too.
 
-    Enlarged where the fit beside them is still worse than the noise.
+    The covariance is enlarged where that fit is still worse than the noise.
     """
     _, matrix, gradient, open_ = _equations(problem, fit)
     p = fit.evaluation.by_parameter.shape[2]
@@ -191,9 +189,7 @@ def with_imperfections(problem: Problem, fit: Fit) -> Beside:
 
 
 def _equations(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Columns of parameters and imperfections, their normal equations beside the starts, and which may
-    move.
-    """
+    """Columns of parameters and imperfections, their normal equations without starts, and which may move."""
     evaluation = fit.evaluation
     columns = np.concatenate([evaluation.by_parameter, imperfection_columns(problem, fit)], axis=2)
     imperfections = columns.shape[2] - evaluation.by_parameter.shape[2]
@@ -207,8 +203,8 @@ def _equations(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.n
 def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray) -> tuple[np.ndarray, float]:
     """Normal equations of p parameters and of imperfections with their prior, and its precision.
 
-    It is made narrower until no imperfection is larger than such imperfections are: what takes a larger one
-    is none."""
+    The prior is narrowed until no imperfection exceeds its largest size.
+    """
     prior = 1.0
     while True:
         known = matrix + np.diag(np.r_[np.zeros(p), np.full(gradient.size - p, prior)])
@@ -218,7 +214,7 @@ def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray
 
 
 def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """By how much chi^2 of each segment falls, beyond what another start does without that."""
+    """Fall of chi^2 of each segment beyond that of a refitted start."""
     found = []
     for one in (evaluation.residual, residual):
         # the residual as the only column: what is left of its square beside the start
@@ -231,9 +227,9 @@ def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -
 class Contest:
     """A machine against another one with imperfections of a rig, in log-likelihood, linearised.
 
-    `gain`: what it explains of what the other one leaves over. For each usual size of imperfections,
-    `imperfections`: the
-    evidence of the other one with them over without them, and `beside`: what the machine explains then.
+    `gain`: what it explains of the residual of the other one. For each usual size of imperfections,
+    `imperfections` is the evidence of the other one with them over that without them, and `beside` is what
+    the machine explains then.
     """
 
     gain: float
@@ -255,54 +251,48 @@ class Contest:
 
 
 def share_with_imperfections(one: Fitted, other: Fitted) -> float:
-    """Share of what one machine explains of what another leaves over that is evidence against imperfections
-    too.
-    """
+    """Share of the gain of one machine over another that remains evidence beside imperfections."""
     return _share(_contest(one, other))
 
 
 def shares_with_imperfections(
-    fitted: tuple[Fitted, Fitted], told: tuple[Prediction, Prediction]
+    fitted: tuple[Fitted, Fitted], predictions: tuple[Prediction, Prediction]
 ) -> tuple[float, float]:
-    """The same in training, and of what two machines predict: one rig made all the records."""
-    training, held_out = _contest(*fitted), _foretold_contest(told, fitted[1])
+    """The same in training and for the predictions of two machines: all records are of one rig."""
+    training, held_out = _contest(*fitted), _held_out_contest(predictions, fitted[1])
     return _share(training), _share(held_out, training)
 
 
-def weight_of_imperfections(fitted: Fitted, told: Prediction | None) -> tuple[float, float]:
+def weight_of_imperfections(fitted: Fitted, prediction: Prediction | None) -> tuple[float, float]:
     """Log-likelihood that imperfections of a rig gain beside a machine, on fitted and on predicted records.
 
-    Nothing where they do not pay for their freedom in training.
+    It is 0 where they do not pay for their freedom in training.
 
-    The noise counts as known: what one machine leaves is held against what others leave.
+    The noise counts as known, so that the residuals of different machines are comparable.
     """
     training = _contest(fitted, fitted, noise_known=True)
     size = int(np.argmax(training.imperfections))
     if training.imperfections[size] <= 0:
         return 0.0, 0.0
-    if told is None:
+    if prediction is None:
         return float(training.imperfections[size]), 0.0
-    held_out = _foretold_contest((told, told), fitted, noise_known=True)
+    held_out = _held_out_contest((prediction, prediction), fitted, noise_known=True)
     return float(training.imperfections[size]), float(held_out.imperfections[size])
 
 
-def evidence_of_imperfections(fitted: Fitted, told: Prediction) -> float:
-    """Evidence that a rig has imperfections where a machine is right but for them; 0 if nothing speaks for
-    them.
-    """
-    both = _contest(fitted, fitted) + _foretold_contest((told, told), fitted)
+def evidence_of_imperfections(fitted: Fitted, prediction: Prediction) -> float:
+    """Evidence that a rig has imperfections where a machine is right but for them, at least 0."""
+    both = _contest(fitted, fitted) + _held_out_contest((prediction, prediction), fitted)
     return max(0.0, float(both.imperfections.max()))
 
 
-def _foretold_contest(
-    told: tuple[Prediction, Prediction], other: Fitted, noise_known: bool = False
+def _held_out_contest(
+    predictions: tuple[Prediction, Prediction], other: Fitted, noise_known: bool = False
 ) -> Contest:
-    """Of what they predict; the other one is known as training records know it, without or beside
-    imperfections.
-    """
-    beside = _shared(other, told[1])
-    without = Beside(np.zeros(beside.shift.size), told[1].covariance)
-    return _contest(*told, (without, beside), noise_known)
+    """Contest of two predictions; training gives the parameters of the other, also beside imperfections."""
+    beside = _shared(other, predictions[1])
+    without = Beside(np.zeros(beside.shift.size), predictions[1].covariance)
+    return _contest(*predictions, (without, beside), noise_known)
 
 
 def _share(new: Contest, known: Contest | None = None) -> float:
@@ -327,7 +317,7 @@ def _contest(
     moved = (evaluation.residual - one.fit.evaluation.residual)[:, :, None]
     imperfections = imperfection_columns(other.problem, other.fit)
     p, q = evaluation.by_parameter.shape[2], imperfections.shape[2]
-    # what one of them does not follow is not a number
+    # segments that one of them does not follow are NaN
     columns = np.concatenate([evaluation.by_parameter, imperfections, moved], axis=2)
     columns[~both] = 0.0
     residual = np.where(both[:, None], evaluation.residual, 0.0)
@@ -342,15 +332,15 @@ def _contest(
     plain = equations.of(without, None)
     tried = [equations.of(beside, prior * narrower) for narrower in _SIZES]
     return Contest(
-        plain[1], np.array([told - plain[0] for told, _ in tried]), np.array([gain for _, gain in tried])
+        plain[1],
+        np.array([evidence - plain[0] for evidence, _ in tried]),
+        np.array([gain for _, gain in tried]),
     )
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Normal equations of p parameters, of imperfections, and of what another machine explains, which is
-    last.
-    """
+    """Normal equations of p parameters, of imperfections, and last of the contribution of another machine."""
 
     matrix: np.ndarray
     gradient: np.ndarray
@@ -358,14 +348,12 @@ class _Evidence:
     p: int
 
     def narrowest(self, known: Beside | None) -> float:
-        """Precision of imperfections with which none is larger than such imperfections are."""
+        """Precision of imperfections for which none exceeds its largest size."""
         matrix, gradient, open_ = self._known(known)
         return _bounded(matrix[:-1, :-1], gradient[:-1], self.p, open_[:-1])[1]
 
     def of(self, known: Beside | None, prior: float | None) -> tuple[float, float]:
-        """Log evidence (up to a constant) with imperfections of a precision, or none; what is explained
-        then.
-        """
+        """Log evidence (up to a constant) with imperfections of a precision, or none; the gain then."""
         matrix, gradient, open_ = self._known(known)
         kept = np.ones(gradient.size, bool)
         logarithm = _surprise(known)
@@ -397,7 +385,7 @@ def _surprise(known: Beside | None) -> float:
 
 
 def _log_determinant(matrix: np.ndarray, open_: np.ndarray) -> float:
-    """Of the open unknowns that are shown, without directions that nothing is known of."""
+    """Of the open unknowns with information, without undetermined directions."""
     shown = open_ & (np.diag(matrix) > 0)
     size = np.sqrt(np.diag(matrix)[shown])
     values = np.linalg.eigvalsh(matrix[np.ix_(shown, shown)] / np.outer(size, size))

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each candidate could explain, from linearised signatures: no refit, seconds.
+"""What each candidate could explain, from linearised signatures, without a refit.
 
-The signature of an effect is what it does to the samples. What the starts of the segments and the parameters
-of the base machine can imitate is projected out; the rest decides whether the effect can be seen (d'),
-whether it can be told from another (cosines) and how much of the residual it takes (score).
+The signature of an effect is its change of the samples. The part that the starts of the segments and the
+parameters of the base machine can imitate is projected out. The rest determines whether the effect is visible
+(d'), whether it is distinguishable from another (cosines) and how much of the residual it explains (score).
 """
 
 import itertools
@@ -66,7 +66,7 @@ class Screened:
 
 
 def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None:
-    """What the added effect does at the fitted base, in its most telling form; None where it does nothing."""
+    """Signature of the added effect at the fitted base, in its form of largest gain; None without one."""
     by_path = {(one.path, one.record): value for one, value in zip(base.free, fit.values, strict=True)}
     values = np.array([by_path.get((one.path, one.record), one.value) for one in candidate.free])
     problem = base.like(candidate.model, candidate.free)

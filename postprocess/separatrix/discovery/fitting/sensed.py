@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records of several sensors ready to be fitted: smoothed, cut, with starts of all coordinates.
 
-What no sensor shows is guessed by an observer: the machine of the case is flown along the record, and what is
-measured is put in its place again and again. A damped machine forgets the rest of its start. Then starts are
-fitted segment by segment, each from where the one before it ended.
+An observer guesses what no sensor shows: the machine of the case is simulated along the record, and measured
+coordinates are reset at short intervals. A damped machine forgets the rest of its start. Then starts are
+fitted segment by segment, each from the end of the one before.
 """
 
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.data import FEWEST, STAGES, Data, swing_samples
+from separatrix.discovery.fitting.data import FEWEST, STAGES, Data, oscillation_samples
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import Free, bounds_of
 from separatrix.discovery.fitting.noise import noise_of
@@ -23,17 +23,17 @@ from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.measured.smoother import Smoothed, smooth
 from separatrix.errors import SeparatrixError
 
-# periods of the drive, or swings, in which what no sensor shows must show itself
+# periods of the drive, or oscillations, that determine coordinates without a sensor
 _UNSEEN_PERIODS = 2.0
-# parts of a period after which an observer is told again what was measured
-_TOLD = 10
+# corrections of an observer by the measurement per period
+_CORRECTIONS = 10
 # stage whose segments are followed one after the other
 _CHAINED = 1
 # cost of a segment over the usual one that is lost, and neighbours whose starts are tried then
 _LOST, _NEIGHBOURS = 5.0, 6
 # standard error of what was guessed, over its size
 _GUESSED = 0.1
-# numbers of joints that records tell little of, or that another number stands for
+# parameters of joints that records hardly determine, or that another parameter represents
 _FIXED = ("free_length", "exponent", "tension", "velocity")
 _MISFIT = 1.5
 # of a stiffness, mass, friction or restitution
@@ -42,7 +42,7 @@ _LEAST = 1e-3
 
 @dataclass
 class SensedData(Data):
-    """Records of several sensors; `bodies` are the smoothed places and speeds by sensor."""
+    """Records of several sensors; `bodies` are the smoothed positions and speeds by sensor."""
 
     model: object = None
     bodies: list[dict[str, Smoothed]] = field(default_factory=list)
@@ -68,12 +68,12 @@ class SensedData(Data):
             guess = self.guess(r)
             table = np.tile(_GUESSED * np.std(guess, axis=0), (guess.shape[0], 1))
             for name, one in seen.items():
-                place = self.structure.names.index(name[2:])
+                body = self.structure.names.index(name[2:])
                 error = np.sqrt(np.einsum("kii->ki", one.covariance))
                 if name[0] == "x":
-                    table[:, place] = error[:, 0]
+                    table[:, body] = error[:, 0]
                 if name[0] == "v" or f"v.{name[2:]}" not in seen:
-                    table[:, n + place] = error[:, 1 if name[0] == "x" else 0]
+                    table[:, n + body] = error[:, 1 if name[0] == "x" else 0]
             tables.append(table)
         return self._at_starts(stage, tables)
 
@@ -101,7 +101,7 @@ class SensedData(Data):
         return found
 
     def guess(self, number: int) -> np.ndarray:
-        """Places and velocities of all coordinates at the samples of a record (samples, 2 n)."""
+        """Positions and velocities of all coordinates at the samples of a record (samples, 2 n)."""
         prepared = self.prepared[number]
         key = (number, prepared.phase, prepared.frequency)
         if key not in self._guesses:
@@ -115,18 +115,18 @@ class SensedData(Data):
         return self._guesses[key]
 
     def measured(self, number: int) -> np.ndarray:
-        """What sensors show of places and velocities; not numbers elsewhere."""
+        """Measured positions and velocities; NaN elsewhere."""
         structure, seen = self.structure, self.bodies[number]
         n = structure.n
         table = np.full((self.prepared[number].record.t.size, 2 * n), np.nan)
         for name, one in seen.items():
-            place = structure.names.index(name[2:])
+            body = structure.names.index(name[2:])
             if name[0] == "x":
-                table[:, place] = one.state[:, 0]
-                if np.isnan(table[0, n + place]):
-                    table[:, n + place] = one.state[:, 1]
+                table[:, body] = one.state[:, 0]
+                if np.isnan(table[0, n + body]):
+                    table[:, n + body] = one.state[:, 1]
             else:
-                table[:, n + place] = one.state[:, 0]
+                table[:, n + body] = one.state[:, 0]
         return table
 
     def _chained(
@@ -134,7 +134,7 @@ class SensedData(Data):
     ) -> np.ndarray:
         """The motion of the machine of the case that follows the sensors, segment by segment.
 
-        The start of each is fitted from where the segment before it ended and from what the observer says.
+        The start of each is fitted from the end of the segment before and from the guess of the observer.
         """
         whole = self.problem(self.model, _CHAINED, [])
         rows = np.flatnonzero(whole.segments.record == number)
@@ -156,7 +156,7 @@ class SensedData(Data):
             if i and motions[i - 1].size:
                 tried.append(np.where(unseen, motions[i - 1][-1], known[first]))
             follow(i, tried)
-        # a drive repeats itself: what is lost may move as its neighbours do
+        # a drive is periodic: a lost segment may move as its neighbours do
         lost = np.flatnonzero(costs > _LOST * np.median(costs))
         for i in lost:
             near = [
@@ -171,10 +171,10 @@ class SensedData(Data):
         return found
 
     def _observed(self, prepared: SensedPrepared, known: np.ndarray, unseen: np.ndarray) -> np.ndarray:
-        """The motion of the machine of the case that is told what was measured."""
+        """The motion of the machine of the case, corrected by the measurement."""
         model, t = self.model, prepared.record.t
-        period = prepared.period_samples or swing_samples(_moving(prepared))
-        every = max(1, round(period / _TOLD))
+        period = prepared.period_samples or oscillation_samples(_moving(prepared))
+        every = max(1, round(period / _CORRECTIONS))
         values, active = np.zeros(0), []
         if prepared.frequency is not None:
             active = [
@@ -201,7 +201,7 @@ class SensedData(Data):
                 found[np.ix_(rows[:-1], unseen)] = flown.motion[:-1][:, unseen]
                 state = flown.motion[-1]
             else:
-                # what is measured lies beyond a stop of the case
+                # the measurement lies beyond a stop of the case
                 found[np.ix_(rows[:-1], unseen)] = state[unseen]
         found[-1, unseen] = state[unseen]
         return found
@@ -213,9 +213,9 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
     bodies, calm, lengths = [], [], []
     for one in prepared:
         record = one.record
-        swing = swing_samples(_moving(one))
+        oscillation = oscillation_samples(_moving(one))
         seen = {
-            sensor.name: smooth(record.t, sensor.values, sensor.sigma, one.period_samples or swing)
+            sensor.name: smooth(record.t, sensor.values, sensor.sigma, one.period_samples or oscillation)
             for sensor in one.sensors
             if sensor.kind in "xv"
         }
@@ -223,7 +223,8 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
         calm.append(_calm(structure, record.t, seen))
         unseen = sum(name[0] == "x" for name in seen) < structure.n
         share = max(periods, _UNSEEN_PERIODS) if unseen else periods
-        length = seconds / record.interval if seconds is not None else share * (one.period_samples or swing)
+        period = one.period_samples or oscillation
+        length = seconds / record.interval if seconds is not None else share * period
         lengths.append(int(np.clip(length, FEWEST, record.t.size / 3)))
     stages = [
         cut([one.samples for one in prepared], calm, [max(FEWEST, int(share * n)) for n in lengths])
@@ -231,19 +232,19 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
     ]
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
-            raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no stretch to be fitted")
+            raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no interval to be fitted")
     return SensedData(prepared, calm, stages, model=model, bodies=bodies)
 
 
 def _moving(one: SensedPrepared) -> np.ndarray:
-    """A signal that swings as the machine does: the first place, else the first speed."""
-    if one.record.has_place:
+    """A signal that oscillates with the machine: the first position, else the first speed."""
+    if one.record.has_position:
         return one.record.x
     return next(sensor.values for sensor in one.sensors if sensor.kind == "v")
 
 
 def _calm(structure: Structure, t: np.ndarray, seen: dict[str, Smoothed]) -> Smoothed:
-    """A motion that is slow where any speed along a joint is: there friction switches."""
+    """A motion that is slow where any speed along a joint is, because friction switches there."""
     speeds = {name[2:]: one.state[:, 1 if name[0] == "x" else 0] for name, one in seen.items()}
     slowest = np.full(t.size, np.inf)
     rows = [np.eye(structure.n)[structure.names.index(name)] for name in speeds]
@@ -263,9 +264,10 @@ def _calm(structure: Structure, t: np.ndarray, seen: dict[str, Smoothed]) -> Smo
 
 
 def joint_parameters(model, forces: bool) -> list[Free]:
-    """The parameters of a structure that records can say something about.
+    """The parameters of a structure that records can determine.
 
-    Without a measured force nothing tells the scale of masses and forces: the heaviest body keeps its mass.
+    Without a measured force the common scale of masses and forces is undetermined: the heaviest body keeps
+    its mass.
     """
     structure = structure_of(model)
     kept = None if forces else f"body.{structure.names[int(np.argmax(structure.mass))]}.mass"
@@ -274,7 +276,7 @@ def joint_parameters(model, forces: bool) -> list[Free]:
         family, _, key = path.split("[")[0].partition(".")
         key = key.rpartition(".")[2]
         value = float(parameter.value)
-        if path == kept or path in tied.values() or not _is_told(family, key, value):
+        if path == kept or path in tied.values() or not _is_fitted(family, key, value):
             continue
         if family == "body" and path.split(".")[1] not in structure.names:
             continue
@@ -285,8 +287,8 @@ def joint_parameters(model, forces: bool) -> list[Free]:
     return found
 
 
-def _is_told(family: str, key: str, value: float) -> bool:
-    """Whether a number of a case is fitted: that of a law that is there."""
+def _is_fitted(family: str, key: str, value: float) -> bool:
+    """Whether a parameter of a case is fitted: one of an active law."""
     if family == "body":
         return key == "mass"
     if family not in ("spring", "friction", "contact") or key in _FIXED:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Closed forms of the families of effects, held against a function that was found as a table."""
+"""Closed forms of the families of effects, compared with a function that was found as a table."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -117,9 +117,9 @@ def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
 def closed_forms(
     effect: str, at: np.ndarray, value: np.ndarray, rows: np.ndarray, zero: np.ndarray
 ) -> dict[str, dict]:
-    """Closed forms held against a function: parameters, misfit, its freedom and probability, deviation, fit.
+    """Closed forms compared with a function: parameters, misfit, its freedom and probability, deviation, fit.
 
-    What a form misses of the records is |rows form(at) - zero|^2; `value` is the function that they tell.
+    The misfit of a form to the records is |rows form(at) - zero|^2; `value` is the estimated function.
     """
     found = {}
     for name, form in FORMS[effect].items():

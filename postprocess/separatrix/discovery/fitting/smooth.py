@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The function that an effect is, as the records tell it, with its band and the closed forms that fit it.
+"""An effect as a function, estimated from the records, with its band and the closed forms that fit it.
 
-Whatever it was fitted as, the function is taken on many knots, with a smoothing spline's prior in place of
-few of them, in a machine that is refitted with it.
+However it was fitted, the function is taken on many knots, with the prior of a smoothing spline, in a machine
+that is refitted with it.
 """
 
 from dataclasses import dataclass
@@ -32,22 +32,22 @@ from separatrix.library import effects
 
 # knots, and those of a table in which zero is implied
 _KNOTS, _KNOTS_BESIDE_ZERO = 16, 15
-# places at which a series is drawn
+# points at which a series is drawn
 _TURN = 49
-# times that knots are laid
+# passes of the choice of knots
 _PASSES = 3
 # power of the second derivative that the density of knots follows
 _BENT = 0.4
 # share of the segments that a step must follow
 _FOLLOWED = 0.98
-# how often the motion is linearised anew, how often a step is halved, steps of the starts after it
+# linearisations of the motion, halvings of a step, steps of the starts after it
 _ROUNDS, _HALVINGS, _FOLLOW = 6, 3, 6
-# squares by which another step would change nothing that shows; squares a value by which the end may miss
+# change of squares that is negligible; squares per value by which the end may miss
 _SETTLED, _NEAR = 0.1, 1.0
-# degree of the smooth function that is begun from where a table is jagged; squares over those of the fit from
-# which on it is
-_EVENED, _CAUGHT = 3, 2.0
-# squares by which the function may follow the records worse than what it is drawn for
+# degree of the smooth function to start from if a table is jagged; ratio of squares to the fit from which on
+# it is
+_EVENED, _TRAPPED = 3, 2.0
+# squares by which the function may follow the records worse than the effect
 _WORSE = 10.0
 # share of the promised change of the squares by which a step may miss it
 _AS_PROMISED = 0.3
@@ -57,7 +57,7 @@ _UNKNOWN = 1e-10
 
 @dataclass
 class Part:
-    """A function by its values at knots, with their covariance, and what the records say alone.
+    """A function by its values at knots, with their covariance, and the information of the records alone.
 
     `information` and `gradient` are of a quadratic misfit about `centre`: d^T information d - 2 d^T gradient.
     """
@@ -78,12 +78,12 @@ class Part:
 
 @dataclass
 class Function:
-    """A function as the records tell it, in one part or one for each direction, and what fits it."""
+    """A function as estimated from the records, in one part or one for each direction, and what fits it."""
 
     member: Member
     parts: list[Part]
     forms: dict[str, dict]
-    # squares by which it follows the records better than what it is drawn for
+    # squares by which it follows the records better than the effect
     gain: float = 0.0
 
 
@@ -99,7 +99,7 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
         # a series is its own function
         return Function(member, [_series(fitted, member)], {}) if member.effect in fitted.names else None
     if any(effects()[name].family == member.family for name in base.names):
-        # another effect of the family has a part of it
+        # another effect of the family contains a part of it
         return None
     seen = member.seen(fitted)
     if seen.size < 3 or not np.ptp(seen) > 0:
@@ -108,11 +108,11 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
     try:
         settled = _settled(data, base, fitted, member, knots)
     except (np.linalg.LinAlgError, SeparatrixError):
-        # or a machine on the way that there is not
+        # or an impossible machine on the way
         return None
     if settled is None:
         return None
-    parts, gain, told = settled
+    parts, gain, freedom = settled
     whole = [closed_forms(member.effect, one.at, one.value, *_alone(one)) for one in parts]
     # with two directions a form must fit both; a constant beside an anchor is the machine without the effect
     forms = {
@@ -122,19 +122,19 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
     }
     own = forms.get(FORM_OF.get(fitted.names[-1], ""))
     if own is not None:
-        _judged_by_its_own(forms, own, gain, told)
+        _correct_for_knots(forms, own, gain, freedom)
     return Function(member, parts, forms, gain)
 
 
-def _judged_by_its_own(forms: dict[str, dict], own: dict, gain: float, told: float) -> None:
-    """Forms as they fit where the own machine of one says how well it follows the records.
+def _correct_for_knots(forms: dict[str, dict], own: dict, gain: float, freedom: float) -> None:
+    """Correct the misfit of all forms by that of the effect's own form, whose fit to the records is known.
 
-    A table only draws near to it between knots: what it misses of it more, it misses of the others too.
+    A table is approximate between knots; the excess misfit of the own form is common to all of them.
     """
     bias = max(0.0, own["misfit"] - max(0.0, gain))
     for one in forms.values():
         one["p"] = max(one["p"], float(chi2.sf(max(0.0, one["misfit"] - bias), one["freedom"])))
-    own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), told)))
+    own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), freedom)))
     for one in forms.values():
         one["fits"] = one["fits"] or one["p"] > LIKELY
 
@@ -142,10 +142,10 @@ def _judged_by_its_own(forms: dict[str, dict], own: dict, gain: float, told: flo
 def _settled(
     data: Data, base: Fitted, fitted: Fitted, member: Member, knots: np.ndarray
 ) -> tuple[list[Part], float, float] | None:
-    """The function on knots, and again on knots that lie closer where it bends, until that changes nothing.
+    """The function on knots, and on knots that are denser where it bends, until it no longer changes.
 
-    What the last knots change beyond the errors, still closer ones may change again. Also the squares by
-    which it follows the records better than what it is drawn for, and the numbers that records tell of it.
+    A last change beyond the errors is added to these. Also the squares by which it follows the records better
+    than the effect, and the number of parameters that the records determine.
     """
     parts, curve = None, None
     for _ in range(_PASSES):
@@ -154,7 +154,7 @@ def _settled(
         again = _Curve.begun(data, base, fitted if curve is None else curve.fitted, member, at)
         found = None if again is None else again.settle()
         if last is None and (found is None or again.far_from(fitted)):
-            # the way from a jagged table to a smooth function may lead through motions with other impacts
+            # the path from a jagged table to a smooth function may pass through motions with other impacts
             evened = _Curve.begun(data, base, fitted, member, at, evened=True)
             other = None if evened is None else evened.settle()
             if other is not None:
@@ -170,12 +170,12 @@ def _settled(
             break
     gain = None if curve is None else curve.gain(fitted)
     if gain is None or gain < -_WORSE:
-        # a law may do what no function of its family does
+        # no function of its family reproduces this law
         return None
-    told = sum(float(np.trace(part.information @ part.covariance)) for part in parts)
+    freedom = sum(float(np.trace(part.information @ part.covariance)) for part in parts)
     for part, one in zip(parts, changed, strict=False):
         part.covariance = part.covariance + np.diag(np.maximum(0.0, one - part.error**2))
-    return parts, gain, told
+    return parts, gain, freedom
 
 
 def _closer(member: Member, parts: list[Part]) -> np.ndarray:
@@ -205,13 +205,13 @@ class _Curve:
     fitted: Fitted
     knots: np.ndarray
     alike: bool
-    # places of its values among the free parameters: those of a part follow each other
-    places: np.ndarray
+    # indices of its values among the free parameters: those of a part are consecutive
+    indices: np.ndarray
     penalty: np.ndarray
-    # what the machine without it has of the function already
+    # contribution of the machine without it to the function
     beside: np.ndarray
     # the fit that it began from
-    warm_started: Fit
+    begun_from: Fit
 
     @classmethod
     def begun(
@@ -236,13 +236,13 @@ class _Curve:
             return None
         model, problem, values = made
         paths = [one.path for one in problem.free]
-        places = [
+        indices = [
             paths.index(f"effect.{member.effect}.{key}[{i}]")
             for key in (member.values[:1] if alike else member.values)
             for i in range(2 if member.anchor else 1, knots.size + 1)
         ]
         if member.anchor:
-            places.insert(0, paths.index(member.anchor))
+            indices.insert(0, paths.index(member.anchor))
         count = 1 if alike else len(member.values)
         penalty = np.kron(np.eye(count), roughness(knots))
         try:
@@ -250,9 +250,9 @@ class _Curve:
         except SeparatrixError:
             # no such machine
             return None
-        whole = Fitted((*base.names, member.effect), model, problem, fit, tuple(places))
-        none = np.zeros(len(places))
-        found = cls(data, member, whole, knots, alike, np.array(places), penalty, none, fitted.fit)
+        whole = Fitted((*base.names, member.effect), model, problem, fit, tuple(indices))
+        none = np.zeros(len(indices))
+        found = cls(data, member, whole, knots, alike, np.array(indices), penalty, none, fitted.fit)
         if member.effect == "friction_curve":
             # the law of the machine is in the friction too
             signs = (1.0,) if alike else (1.0, -1.0)
@@ -262,16 +262,16 @@ class _Curve:
     @property
     def values(self) -> np.ndarray:
         """The function at the knots."""
-        found = self.fitted.fit.values[self.places]
+        found = self.fitted.fit.values[self.indices]
         if self.member.by_share:
             return found[0] * np.append(1.0, 1 + found[1:])
         return np.append(found[0], found[0] + found[1:]) if self.member.anchor else found
 
     def _slopes(self) -> np.ndarray:
         """Derivatives of the function by the free parameters that it is in."""
-        slopes = np.eye(self.places.size)
+        slopes = np.eye(self.indices.size)
         if self.member.by_share:
-            found = self.fitted.fit.values[self.places]
+            found = self.fitted.fit.values[self.indices]
             slopes[1:] *= found[0]
             slopes[1:, 0] = 1 + found[1:]
         elif self.member.anchor:
@@ -290,7 +290,7 @@ class _Curve:
                 return None
             inner = np.linalg.solve(self._slopes(), found[0] - centre)
             step = known.others(inner)
-            step[self.places] = inner
+            step[self.indices] = inner
             if not self._go(step, known.promised(found[0] - centre)):
                 break
             moved = self.values + self.beside - centre
@@ -302,17 +302,15 @@ class _Curve:
         return self._parts(*found, freed, centre)
 
     def far_from(self, fitted: Fitted) -> bool:
-        """Whether records are followed so much worse than by a fitted machine that segments are
-        in a local minimum.
-        """
-        return self.fitted.fit.total > _CAUGHT * fitted.fit.total
+        """Whether the misfit exceeds that of a fitted machine so far that segments are in a local minimum."""
+        return self.fitted.fit.total > _TRAPPED * fitted.fit.total
 
     def gain(self, fitted: Fitted) -> float:
         """Squares over the misfit by which the function follows the records better than a fitted machine."""
         return 2 * float(gain_over(self.fitted, fitted)[0]) / max(1.0, fitted.fit.reduced_chi2)
 
     def _known(self, origin: bool = False) -> "_Known":
-        """What records know of the values, all else free, the `origin` of their variable only if asked."""
+        """Information of records on the values, all else free, the `origin` of their variable on request."""
         fit = self.fitted.fit
         scale = max(1.0, fit.reduced_chi2)
         matrix, gradient = (
@@ -320,15 +318,15 @@ class _Curve:
             for one in (fit.reduced.matrix[fit.good].sum(axis=0), fit.reduced.gradient[fit.good].sum(axis=0))
         )
         inside = np.zeros(gradient.size, bool)
-        inside[self.places] = True
+        inside[self.indices] = True
         if not origin:
             inside |= [one.path in self.member.origin for one in self.fitted.problem.free]
         open_ = np.flatnonzero(~inside & ~fit.at_bound & (np.diag(matrix) > 0))
         inner = inverse_scaled(matrix, open_)[np.ix_(open_, open_)]
-        across = matrix[np.ix_(self.places, open_)]
+        across = matrix[np.ix_(self.indices, open_)]
         back = np.linalg.inv(self._slopes())
-        alone = matrix[np.ix_(self.places, self.places)] - across @ inner @ across.T
-        slope = gradient[self.places] - across @ inner @ gradient[open_]
+        alone = matrix[np.ix_(self.indices, self.indices)] - across @ inner @ across.T
+        slope = gradient[self.indices] - across @ inner @ gradient[open_]
         promised = float(gradient[open_] @ inner @ gradient[open_])
         return _Known(
             back.T @ alone @ back,
@@ -351,9 +349,9 @@ class _Curve:
             values = np.clip(fit.values + 0.5**halving * step, *bounds)
             try:
                 tried = minimise(problem, values, fit.starts, most=_FOLLOW, fixed=fixed)
-                # a function that was far off leaves segments in wrong minima
+                # a distant function leaves segments in wrong minima
                 tried = polished(
-                    self.data, problem, tried, self.data.last, _FOLLOW, fixed, rival=self.warm_started
+                    self.data, problem, tried, self.data.last, _FOLLOW, fixed, rival=self.begun_from
                 )
             except SeparatrixError:
                 continue
@@ -388,7 +386,7 @@ class _Curve:
 
 @dataclass
 class _Known:
-    """Information and gradient of the values of a function, all else free, and what all else does then."""
+    """Information and gradient of the values of a function, all else free, and the step of all else then."""
 
     information: np.ndarray
     gradient: np.ndarray
@@ -412,9 +410,9 @@ class _Known:
 
 
 def _alone(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of residuals whose squares are what a function misses of the records, and what they are 0 at.
+    """Rows of residuals whose squares are the misfit of a function to the records, and their zero.
 
-    Directions that the records do not know are left out.
+    Directions that the records do not determine are left out.
     """
     size = np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information / np.outer(size, size))
@@ -428,13 +426,13 @@ def _series(fitted: Fitted, member: Member) -> Part:
     """A series of harmonics by its values over a turn."""
     at = np.linspace(0, 2 * np.pi, _TURN)
     paths = [one.path for one in fitted.problem.free]
-    columns, places = [], []
+    columns, indices = [], []
     for key, wave in zip(member.values, (np.cos, np.sin), strict=True):
-        for place, path in enumerate(paths):
+        for index, path in enumerate(paths):
             if path.startswith(f"effect.{member.effect}.{key}["):
-                places.append(place)
+                indices.append(index)
                 columns.append(wave(int(path.split("[")[1][:-1]) * at))
     basis = np.column_stack(columns)
-    covariance = basis @ fitted.covariance[np.ix_(places, places)] @ basis.T
+    covariance = basis @ fitted.covariance[np.ix_(indices, indices)] @ basis.T
     none = np.zeros((at.size, at.size))
-    return Part("", at, basis @ fitted.fit.values[places], covariance, none, none[0], 0 * at)
+    return Part("", at, basis @ fitted.fit.values[indices], covariance, none, none[0], 0 * at)

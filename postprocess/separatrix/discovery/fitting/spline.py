@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A smoothing spline: a Gaussian prior on the second derivative of a function that is known by its values.
 
-Over the size of that prior the posterior is averaged, each size weighed by its evidence and as likely as any
-other before (A. Gelman, Bayesian Analysis 1 (2006) 515), so that the band has what the values do not tell of
-the shape. Such a band holds a function on as much of its support as it says (G. Wahba, J. R. Stat. Soc. B 45
-(1983) 133).
+The posterior is averaged over the size of that prior, weighed by its evidence, with a uniform prior for the
+size (A. Gelman, Bayesian Analysis 1 (2006) 515), so that the band includes the uncertainty of the shape. Such
+a band contains a function on its nominal share of the support (G. Wahba, J. R. Stat. Soc. B 45 (1983) 133).
 """
 
 import numpy as np
 
-# precisions of the prior over what is known of the values, from rough to straight, in decades
+# precisions of the prior over the information on the values, from rough to straight, in decades
 _DECADES = np.linspace(-6, 6, 49)
 
 
@@ -36,7 +35,7 @@ def smoothed(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Mean and covariance of values whose misfit is d^T information d - 2 d^T gradient about a centre.
 
-    None where there are values that neither the records nor their being smooth tell of.
+    None where neither the records nor the smoothness determine some value.
     """
     unit = np.trace(information) / np.trace(penalty)
     if not unit > 0:
@@ -55,7 +54,7 @@ def smoothed(
         step = inverse @ slope
         evidence = 0.5 * (slope @ step - precision * centre @ penalty @ centre + rank * np.log(precision))
         evidence -= 0.5 * np.sum(np.log(values)) + np.sum(np.log(size))
-        # all sizes of the bend are alike before: steps of the logarithm of the precision are not
+        # the prior is uniform in the size of the bend, not in the logarithm of the precision
         evidence -= 0.5 * np.log(precision)
         found.append((evidence, centre + step, inverse))
     if not found:

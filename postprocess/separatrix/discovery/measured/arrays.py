@@ -19,19 +19,19 @@ from separatrix.discovery.measured.tables import (
 )
 from separatrix.errors import SeparatrixError
 
-# of a sampling interval, by which times of channels may differ
+# share of a sampling interval by which times of channels may differ
 _APART = 0.01
 _MOST_NAMES = 30
 
 
 @dataclass
 class Found:
-    """What a file holds: arrays and keys by name; units of columns, where the file states them; notes."""
+    """Content of a file: arrays and keys by name; units of columns, where the file states them; notes."""
 
     values: dict[str, object] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    # channels that are no columns, of which nothing is read
+    # channels that are no columns and are not read
     unused: list[str] = field(default_factory=list)
 
     def key(self, name: str, value: object) -> None:
@@ -46,12 +46,12 @@ def is_key(name: str) -> bool:
 
 
 def column_of(name: str, names: Mapping[str, str]) -> str:
-    """The column that a channel is: as the user says, else by its own name."""
+    """The column of a channel: as the user states, else by its own name."""
     return names.get(name, SAME.get(name, name))
 
 
 def table_of(path: Path, found: Found, names: Mapping[str, str]) -> Table:
-    """Columns and header of what a file holds; one structure that has them is looked into."""
+    """Columns and header of the content of a file, or of the one structure in it that has them."""
     values = _looked_into(path, found.values)
     values = {column_of(name, names): value for name, value in values.items()}
     missing = [] if "t" in values else ["t"]
@@ -60,7 +60,7 @@ def table_of(path: Path, found: Found, names: Mapping[str, str]) -> Table:
         raise SeparatrixError(
             f"{path}: found {_listed([*values, *found.unused])}; '{missing[0]}' is missing of "
             "t, x[, v, force, phi]; which channel is which "
-            f"may be said in {path.name}.keys, as in 'columns: {missing[0]} = NAME'"
+            f"may be stated in {path.name}.keys, as in 'columns: {missing[0]} = NAME'"
         )
     notes = list(found.notes)
     columns = {}

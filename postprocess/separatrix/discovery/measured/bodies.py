@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a machine of several bodies is made of: coordinates, joints between them, and places where forces act.
+"""Parts of a machine of several bodies: coordinates, joints between them, and locations where forces act.
 
-A place is two bodies, or one and the ground, between which a joint may lie; its coordinate is second minus
-first. Two joints at one place are one to all forces there.
+A location is a pair of bodies, or a body and the ground, between which a joint may lie; its coordinate is
+second minus first. Joints at the same location share the forces there.
 """
 
 import tomllib
@@ -20,7 +20,7 @@ from separatrix.library import Model
 KINDS = ("spring", "friction", "contact")
 """Tables of a case that are joints."""
 GROUND = "ground"
-# what every case has beside its machine and a base machine does not need
+# tables of a case that a base machine does not need
 _OF_RUNS = ("axis", "sweep", "record", "grid", "refine")
 _PAIR = "driving", "driven"
 
@@ -37,7 +37,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Place:
+class Location:
     """Two bodies, or one on the ground: name, ends, row over the coordinates, paths of the joints there."""
 
     name: str
@@ -54,12 +54,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Structure:
-    """A machine of several bodies as its case says it."""
+    """A machine of several bodies as its case defines it."""
 
     names: tuple[str, ...]
     mass: np.ndarray
     joints: tuple[Joint, ...]
-    places: tuple[Place, ...]
+    locations: tuple[Location, ...]
     watched: str
     # bodies that a drive acts on
     driven: tuple[str, ...]
@@ -73,9 +73,9 @@ class Structure:
         """The joint with a path."""
         return next(one for one in self.joints if one.path == path)
 
-    def place(self, name: str) -> Place:
-        """The place with a name."""
-        return next(one for one in self.places if one.name == name)
+    def location(self, name: str) -> Location:
+        """The location with a name."""
+        return next(one for one in self.locations if one.name == name)
 
 
 def is_structure(model: Model) -> bool:
@@ -90,7 +90,7 @@ def is_pair(model: Model) -> bool:
 
 @lru_cache(maxsize=256)
 def structure_of(model: Model) -> Structure:
-    """The structure of a model; what no base machine can have is refused."""
+    """The structure of a model; one that no base machine can have is refused."""
     case = tomllib.loads(model.to_text({}))
     if case.get("structure"):
         raise SeparatrixError(
@@ -105,17 +105,17 @@ def structure_of(model: Model) -> Structure:
         for name, table in case.get(kind, {}).items():
             ends = tuple(table["between"])
             joints.append(Joint(f"{kind}.{name}", table["law"], ends, _row(ends, names), table))
-    places: dict[tuple[str, str], list[str]] = {}
+    locations: dict[tuple[str, str], list[str]] = {}
     for joint in joints:
-        places.setdefault(_sorted(joint.ends, bodies), []).append(joint.path)
+        locations.setdefault(_sorted(joint.ends, bodies), []).append(joint.path)
     for name in names:
-        places.setdefault((GROUND, name), [])
+        locations.setdefault((GROUND, name), [])
     found = []
-    for ends, paths in places.items():
+    for ends, paths in locations.items():
         row = _row(ends, names)
         if row.any():
             name = ends[1] if ends[0] == GROUND else "-".join(ends)
-            found.append(Place(name, ends, row, tuple(paths)))
+            found.append(Location(name, ends, row, tuple(paths)))
     mass = np.array([case["body"][name]["mass"] for name in names])
     watched = case.get("watch", {}).get("body", names[0])
     drives = case.get("drive", {}).values()
@@ -136,7 +136,7 @@ def _row(ends: tuple[str, str], names: tuple[str, ...]) -> np.ndarray:
 
 
 def edited(model: Model, change: Callable[[dict], None]) -> Model:
-    """The model whose case a function has changed; tables of runs go where they do not fit any more."""
+    """The model whose case a function has changed, without tables of runs if these no longer fit."""
     case = tomllib.loads(model.to_text({}))
     change(case)
     try:

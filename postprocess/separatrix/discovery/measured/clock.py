@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time stamps of a record: gaps, and stamps that scatter about the times of sampling."""
+"""Time stamps of a record: gaps, and scatter about the times of sampling."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -11,11 +11,11 @@ from scipy.ndimage import maximum_filter1d
 from separatrix.errors import SeparatrixError
 
 GAP = 1.5
-# shortest stretch that is fitted
+# shortest interval without gaps that is fitted [samples]
 FEWEST_IN_PIECE = 12
-# usual deviation of the steps of time from their median from which stamps are called uneven
+# usual relative deviation of the time steps from their median above which stamps are uneven
 _UNEVEN = 0.01
-# rows on either side of an uneven step that tell a lost sample from a late stamp
+# rows on either side of an uneven step that distinguish a lost sample from a late stamp
 _AROUND = 7
 _LATE, _LOST = 1.25, 2.0
 
@@ -23,10 +23,10 @@ _LATE, _LOST = 1.25, 2.0
 def pieces_of(
     t: np.ndarray, x: np.ndarray, fewest: int, where: Callable[[int], str], notes: list[str]
 ) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Times of the samples, and the stretches without gaps as (first, last + 1).
+    """Times of the samples, and the intervals without gaps as (first, last + 1).
 
-    Stamps that scatter while the motion does not follow them are those of the computer and not of the sensor:
-    the samples were taken at even times. `fewest` samples must lie in stretches that can be fitted.
+    If stamps scatter and the motion does not follow them, they are those of the computer and not of the
+    sensor: the samples were taken at even times. `fewest` samples must lie in intervals that can be fitted.
     """
     steps = np.diff(t)
     usual = float(np.median(steps))
@@ -41,7 +41,7 @@ def pieces_of(
     long = sum(last - first for first, last in pieces if last - first >= FEWEST_IN_PIECE)
     if long < fewest:
         raise SeparatrixError(
-            f"{where(int(gaps[0]) if gaps.size else 0)}: gaps leave {long} samples in stretches of at least "
+            f"{where(int(gaps[0]) if gaps.size else 0)}: gaps leave {long} samples in intervals of at least "
             f"{FEWEST_IN_PIECE}, {fewest} are needed"
         )
     if uneven:
@@ -50,7 +50,7 @@ def pieces_of(
 
 
 def _lost(t: np.ndarray, steps: np.ndarray, usual: float) -> np.ndarray:
-    """Rows after a gap where stamps scatter: all later ones are late, not one alone."""
+    """Rows after a gap where stamps scatter: after a gap all later stamps are late, not one alone."""
     rows = np.flatnonzero(steps > _LATE * usual) + 1
     late = np.pad(t - usual * np.arange(t.size), _AROUND)
     before = sum(late[rows + k] for k in range(_AROUND)) / np.minimum(_AROUND, rows)
@@ -63,7 +63,7 @@ def _lost(t: np.ndarray, steps: np.ndarray, usual: float) -> np.ndarray:
 
 
 def _evened(t: np.ndarray, x: np.ndarray, pieces, where, notes: list[str]) -> np.ndarray:
-    """Even times within the pieces, where x says that the samples were taken at these."""
+    """Even times within the pieces, if x shows that the samples were taken at these."""
     index = np.arange(t.size)
     above = below = 0.0
     for first, last in pieces:
@@ -77,33 +77,31 @@ def _evened(t: np.ndarray, x: np.ndarray, pieces, where, notes: list[str]) -> np
     late = t - even
     follows, error = _followed(x, late, interval, pieces)
     row = int(np.argmax(np.abs(late)))
-    said = f"{where(row)}: t is {abs(late[row]):.3g} s off even steps, {np.std(late):.3g} s is usual"
+    deviation = f"{where(row)}: t is {abs(late[row]):.3g} s off even steps, {np.std(late):.3g} s is usual"
     if follows + 2 * error < 0.5:
-        notes.append(f"{said}; x does not follow: even times are taken")
+        notes.append(f"{deviation}; x does not follow: even times are taken")
         return even
-    follow = "and x follows" if follows - 2 * error > 0.5 else "and x does not tell whether it follows"
-    notes.append(f"{said}, {follow}: noise, and impacts if there are any, are found less well")
+    follow = "and x follows" if follows - 2 * error > 0.5 else "and x does not show whether it follows"
+    notes.append(f"{deviation}, {follow}: noise, and impacts if there are any, are found less well")
     return t
 
 
 def _followed(x: np.ndarray, late: np.ndarray, interval: float, pieces) -> tuple[float, float]:
-    """How far x is ahead where a stamp is late, over speed times delay: 1 for true times, 0 for stamps that
-    scatter; and its standard error.
-    """
-    delays, places = [], []
+    """Lead of x where a stamp is late over speed times delay, and its error; 1: true times, 0: scatter."""
+    delays, positions = [], []
     for first, last in pieces:
         if last - first >= FEWEST_IN_PIECE:
             speed = np.gradient(x[first:last])[2:-2] / interval
             delays.append(speed * np.diff(late[first:last], 4))
-            places.append(np.diff(x[first:last], 4))
-    delay, place = np.concatenate(delays), np.concatenate(places)
-    usual = 5 * 1.4826 * float(np.median(np.abs(place)))
+            positions.append(np.diff(x[first:last], 4))
+    delay, position = np.concatenate(delays), np.concatenate(positions)
+    usual = 5 * 1.4826 * float(np.median(np.abs(position)))
     size = float(delay @ delay)
     if size == 0 or usual == 0:
         return 0.5, np.inf
-    # impacts; x that follows in a lively part of a quiet record stays
+    # limits impacts, but not the response of x in a fast part of a slow record
     most = np.maximum(usual, 2 * np.abs(delay))
-    place = np.clip(place, -most, most)
-    slope = float(delay @ place) / size
+    position = np.clip(position, -most, most)
+    slope = float(delay @ position) / size
     # fourth differences of neighbours are correlated
-    return slope, 2 * float(np.std(place - slope * delay)) / np.sqrt(size)
+    return slope, 2 * float(np.std(position - slope * delay)) / np.sqrt(size)

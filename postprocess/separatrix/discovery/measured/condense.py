@@ -1,16 +1,15 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is fitted of a record: its samples, and in place of smooth stretches a few values that hold all they
-say.
+"""The fitted samples of a record, with smooth blocks condensed to a few values of the same information.
 
-A stretch of b samples that a polynomial of degree n - 1 follows down to the noise is replaced by the values
-of its least-squares polynomial at the n zeros of the discrete orthogonal (Gram) polynomial of degree n. There
+A block of b samples that a polynomial of degree n - 1 follows down to the noise is replaced by the values of
+its least-squares polynomial at the n zeros of the discrete orthogonal (Gram) polynomial of degree n. There
 the errors of the values are independent (Gauss quadrature: Golub and Welsch, Calculation of Gauss quadrature
-rules, Math. Comp. 23 (1969)), and a term of degree n leaves them as they are. What the polynomial leaves over
-is noise; its size is kept.
+rules, Math. Comp. 23 (1969)), and a term of degree n does not change them. The residual of the polynomial is
+noise, whose size is kept.
 
-Samples stay where the motion is not smooth: around impacts, where the body turns round or sticks (friction
-jumps there), and wherever the noise does not hide a term of degree n or n + 1.
+Samples stay where the motion is not smooth: around impacts, where the body turns or sticks (friction jumps
+there), and wherever the noise does not hide a term of degree n or n + 1.
 """
 
 from dataclasses import dataclass, field
@@ -24,21 +23,21 @@ from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.errors import SeparatrixError
 
-# samples per period of the motion from which a record is condensed, and as many as are smoothed then
+# samples per period of the motion above which a record is condensed, and those that are smoothed then
 _MANY, _ENOUGH = 450.0, 200.0
 # samples of a record that are fitted as they are, however slow the motion
 _FEW = 10_000
-# values in place of a stretch, its shortest and, as a share of the period, longest length
+# values that replace a block, its shortest and, as a share of the period, longest length
 NODES = 4
 _SHORTEST = 16
 _LONGEST = 1 / 16
-# chi^2 of two terms that noise exceeds in one of a hundred stretches
+# chi^2 of two terms that noise exceeds in one of a hundred blocks
 _UNSEEN = 9.2
-# a jump of the acceleration may shift the values by this share of their noise; the share of such a jump that
-# terms above degree n have in a stretch
+# share of their noise by which a jump of the acceleration may shift the values; share of such a jump in terms
+# above degree n of a block
 _SHIFT, _HIDDEN = 0.1, 0.004
 _MOST_MEMORY = 0.9
-# length of the stretches that the memory of the noise is measured in
+# length of the blocks in which the memory of the noise is measured
 _SOUNDED = 32
 MOST_ROWS = 200_000
 """Values and samples that a record may keep."""
@@ -46,41 +45,41 @@ MOST_ROWS = 200_000
 
 @dataclass
 class Samples:
-    """What is fitted of a record, row by row."""
+    """The fitted values of a record, row by row."""
 
     t: np.ndarray
     x: np.ndarray
     v: np.ndarray | None
-    # stretches of rows without gaps as (first, last + 1)
+    # intervals of rows without gaps as (first, last + 1)
     pieces: list[tuple[int, int]]
-    # samples of the stretch that a row stands for (1: it is a sample), and which of its values
+    # samples of the block of a row (1: it is a sample), and index of the value in the block
     size: np.ndarray
     node: np.ndarray
-    # place in the record in samples
-    place: np.ndarray
-    # sums of squares that stretches leave over, and of products of neighbours, at their first rows
+    # offset in the record in samples
+    offset: np.ndarray
+    # residual sums of squares of blocks, and of products of neighbours, at their first rows
     left: np.ndarray
     left_v: np.ndarray
     products: np.ndarray
-    # of the noise, within which stretches are smooth: more than 1 where too many rows would stay
+    # factor of the noise within which blocks are smooth: above 1 where too many rows would stay
     factor: float = 1.0
-    # rows whose velocity says nothing: an impact lies so near that the sensor may be on either side of it
+    # rows whose velocity is not compared: the sample may be on either side of a near impact
     blind: np.ndarray | None = None
     _noises: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @cached_property
     def lengths(self) -> list[int]:
-        """Lengths of the stretches that rows stand for [samples]."""
+        """Lengths of the blocks of rows [samples]."""
         return [int(size) for size in np.unique(self.size) if size > 1]
 
     @property
     def condensed(self) -> bool:
-        """Whether any row stands for more than a sample."""
+        """Whether any row represents more than a sample."""
         return bool(self.lengths)
 
     @cached_property
     def freedom(self) -> np.ndarray:
-        """Degrees of freedom of what stretches leave over, at their first rows."""
+        """Residual degrees of freedom of blocks, at their first rows."""
         return np.where((self.node == 0) & (self.size > 1), self.size - NODES, 0)
 
     def spread(self, memory: float) -> np.ndarray:
@@ -101,22 +100,22 @@ class Samples:
 
     def _of_noise(self, memory: float) -> tuple[np.ndarray, np.ndarray]:
         if memory not in self._noises:
-            # noise is measured again now and then
+            # noise may have been measured again
             self._noises.clear()
             self._noises[memory] = self._computed(memory)
         return self._noises[memory]
 
     def _computed(self, memory: float) -> tuple[np.ndarray, np.ndarray]:
         spread, first, last, within = np.ones((4, self.size.size))
-        begin = self.place.copy()
+        begin = self.offset.copy()
         for size in self.lengths:
             rows = self.size == size
-            stretch, node = _stretch_noise(size, round(memory, 3)), self.node[rows]
-            for table, values in zip((spread, first, last, within), stretch, strict=True):
+            noise, node = _block_noise(size, round(memory, 3)), self.node[rows]
+            for table, values in zip((spread, first, last, within), noise, strict=True):
                 table[rows] = values[node]
             begin[rows] -= _basis(size)[1][node]
         links = np.zeros(self.size.size)
-        # from the end of a stretch or sample to the beginning of the next
+        # from the end of a block or sample to the beginning of the next
         neighbours = begin[1:] - begin[:-1] - self.size[:-1] < 0.5
         links[1:] = np.where(neighbours, memory * last[:-1] * first[1:], 0.0)
         return spread, np.where(self.node > 0, within, links)
@@ -141,15 +140,13 @@ def whole(record: Record) -> Samples:
 
 
 def stride(period: float, samples: int) -> int:
-    """Every how many samples are enough to see a motion of `period` samples in a record of so many."""
+    """Stride that still resolves a motion of `period` samples in a record of `samples`."""
     return 1 if period < _MANY or samples <= _FEW else max(1, round(period / _ENOUGH))
 
 
 @cache
 def _basis(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orthonormal polynomials (size, NODES + 2) on a stretch; its nodes [samples]; values at nodes by
-    coefficient.
-    """
+    """Orthonormal polynomials (size, NODES + 2) on a block; nodes [samples]; values there by coefficient."""
     u = np.linspace(-1, 1, size)
     q, r = np.linalg.qr(np.polynomial.legendre.legvander(u, NODES + 1))
     q *= np.sign(np.diag(r))
@@ -161,9 +158,11 @@ def _basis(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @cache
-def _stretch_noise(size: int, memory: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of the values of a stretch, of noise with correlation memory^|k| and size 1: standard deviations;
-    correlations with the first and the last sample; with the value before (0 of the first).
+def _block_noise(size: int, memory: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Noise of the values of a block, for noise of samples with correlation memory^|k| and size 1.
+
+    Standard deviations; correlations with the first and the last sample; with the value before (0 of the
+    first).
     """
     q, _, values = _basis(size)
     weights = values @ q[:, :NODES].T
@@ -178,7 +177,7 @@ def _stretch_noise(size: int, memory: float) -> tuple[np.ndarray, np.ndarray, np
 
 @cache
 def expected_left(size: int, memory: float) -> tuple[float, float]:
-    """Sum of squares, and of products of neighbours, that noise of size 1 leaves in a stretch."""
+    """Residual sum of squares, and of products of neighbours, of noise of size 1 in a block."""
     q = _basis(size)[0][:, :NODES]
     noise = toeplitz(memory ** np.arange(size))
     carried = noise @ q
@@ -199,7 +198,7 @@ def condense(
     kept, slow, acceleration = events
     noise = max(sigma, white_noise(record.x)) * _inflation(record)
     longest = _power(period * _LONGEST)
-    # where friction jumps the hidden part of the jump stays below the noise of the values
+    # the hidden part of a jump of friction stays below the noise of the values
     jump = _HIDDEN * max(acceleration, 1e-300) * record.interval**2
     at_jumps = (_SHIFT * noise / jump) ** 0.4
     unseen = _UNSEEN
@@ -213,7 +212,7 @@ def condense(
         if unseen > 1e12:
             raise SeparatrixError(
                 f"{record.file}: {rows} of {record.t.size} samples are around impacts or where the body "
-                f"turns round, at most {MOST_ROWS} can be fitted: keep every "
+                f"turns, at most {MOST_ROWS} can be fitted: keep every "
                 f"{-(-rows // MOST_ROWS)}th row, or a part of the record"
             )
         unseen *= 4
@@ -224,12 +223,12 @@ def condense(
 
 
 def _power(samples: float) -> int:
-    """Longest stretch of at most so many samples: the shortest one times a power of two."""
+    """Longest block of at most so many samples: the shortest one times a power of two."""
     return int(_SHORTEST * 2 ** np.floor(np.log2(max(1.0, samples / _SHORTEST))))
 
 
 def _inflation(record: Record) -> float:
-    """Noise of slow terms over that of white noise of the same size, from short stretches."""
+    """Noise of slow terms over that of white noise of the same size, from short blocks."""
     blocks = _blocks(record.pieces, np.zeros(record.t.size, bool), _SOUNDED)
     if not blocks.size:
         return 1.0
@@ -247,7 +246,7 @@ def _inflation(record: Record) -> float:
 
 
 def _blocks(pieces: list[tuple[int, int]], taken: np.ndarray, size: int) -> np.ndarray:
-    """First samples of stretches of `size` on a grid in each piece, of which nothing is taken."""
+    """First samples of blocks of `size` on a grid in each piece, without taken samples."""
     first = np.concatenate(
         [np.arange(a, b - size + 1, size) for a, b in pieces if b - a >= size] or [np.zeros(0, int)]
     ).astype(int)
@@ -258,7 +257,7 @@ def _blocks(pieces: list[tuple[int, int]], taken: np.ndarray, size: int) -> np.n
 def _taken(
     record: Record, events: tuple[np.ndarray, np.ndarray], longest: int, at_jumps: float, noise: float
 ) -> list[tuple[int, np.ndarray]]:
-    """Stretches to condense, as their length and first samples; the longest that are smooth."""
+    """Blocks to condense, as their length and first samples; the longest that are smooth."""
     kept, slow = events
     taken = kept.copy()
     slow_before = np.concatenate([[0], np.cumsum(slow)])
@@ -278,7 +277,7 @@ def _taken(
 
 
 def _smooth(record: Record, first: np.ndarray, size: int, noise: float) -> np.ndarray:
-    """Whether the next two terms of each stretch are hidden by the noise, in x and v, at even times."""
+    """Whether the noise hides the next two terms of each block in x and v, at even times."""
     at = first[:, None] + np.arange(size)
     q = _basis(size)[0][:, NODES:]
     smooth = np.sum((record.x[at] @ q) ** 2, axis=1) < _UNSEEN * noise**2
@@ -290,7 +289,7 @@ def _smooth(record: Record, first: np.ndarray, size: int, noise: float) -> np.nd
 
 
 def _rows(record: Record, taken: list[tuple[int, np.ndarray]]) -> Samples:
-    """The rows in order: values of the stretches, samples elsewhere."""
+    """The rows in order: values of the blocks, samples elsewhere."""
     single = np.ones(record.t.size, bool)
     parts = []
     for size, first in taken:
@@ -309,14 +308,14 @@ def _rows(record: Record, taken: list[tuple[int, np.ndarray]]) -> Samples:
             rest = centred - terms @ q.T
             products = np.sum(rest[:, 1:] * rest[:, :-1], axis=1)
             channels.append((middle + terms @ values.T, np.sum(rest**2, axis=1), products))
-        place = first[:, None] + nodes
+        offset = first[:, None] + nodes
         span = (record.t[first + size - 1] - record.t[first]) / (size - 1)
         begun = np.arange(NODES) == 0
         (x, left, products), (v, left_v, _) = channels
-        columns = (place, record.t[first][:, None] + nodes * span[:, None], x, v)
+        columns = (offset, record.t[first][:, None] + nodes * span[:, None], x, v)
         columns = (*columns, *(one[:, None] * begun for one in (left, left_v, products)))
         flat = [one.ravel() for one in columns]
-        parts.append([*flat, np.full(place.size, size), np.tile(np.arange(NODES), first.size)])
+        parts.append([*flat, np.full(offset.size, size), np.tile(np.arange(NODES), first.size)])
     rows = np.flatnonzero(single)
     none = np.zeros(rows.size)
     v = none if record.v is None else record.v[rows]
@@ -324,6 +323,8 @@ def _rows(record: Record, taken: list[tuple[int, np.ndarray]]) -> Samples:
     parts.append([*samples, np.ones(rows.size, int), np.zeros(rows.size, int)])
     whole_ = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
     order = np.argsort(whole_[0], kind="stable")
-    place, t, x, v, left, left_v, products, size, node = (column[order] for column in whole_)
-    edges = [(int(np.searchsorted(place, a)), int(np.searchsorted(place, b - 0.5))) for a, b in record.pieces]
-    return Samples(t, x, None if record.v is None else v, edges, size, node, place, left, left_v, products)
+    offset, t, x, v, left, left_v, products, size, node = (column[order] for column in whole_)
+    edges = [
+        (int(np.searchsorted(offset, a)), int(np.searchsorted(offset, b - 0.5))) for a, b in record.pieces
+    ]
+    return Samples(t, x, None if record.v is None else v, edges, size, node, offset, left, left_v, products)

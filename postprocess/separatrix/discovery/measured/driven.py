@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The known motion of a record whose force is compared: speed and acceleration, and where they mean a force.
+"""The known motion of a record whose force is compared: speed, acceleration, and where they give a force.
 
-At rest friction is whatever holds the body, and where the speed is not known from zero neither is its
-direction: such samples are not compared.
+At rest friction equals the other forces, and a speed that is within its error of zero has no known direction;
+such samples are not compared.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from separatrix.discovery.measured.smoother import Smoothed
 
 # standard errors of the speed within which a body may be at rest; share of the usual speed where errors are 0
 _SLOW, _REST = 3.0, 1e-4
-# errors of neighbouring accelerations go together: they count as so many times larger
+# errors of neighbouring accelerations are correlated: factor by which they count as larger
 _TOGETHER = 2.0
-# way at the beginning, over that of the whole record, on which friction may remember what was before
+# way at the beginning, over that of the whole record, on which friction may depend on the earlier motion
 _BEGUN = 0.1
 
 
@@ -32,7 +32,7 @@ class Driven:
     inertia_error: np.ndarray
     # whether the direction of the motion is known
     moves: np.ndarray
-    # where the motion turned between the sample before and this one [m]; its own place where it did not
+    # position where the motion turned between the sample before and this one [m], else that of the sample
     turned: np.ndarray
 
     def scaled(self, scale: float, rate: float) -> "Driven":
@@ -49,7 +49,7 @@ class Driven:
         )
 
     def strokes(self, first: int, last: int) -> list[tuple[int, int, int, float]]:
-        """Stretches (first, last + 1) of a piece between turning points, direction, where they begin [m]."""
+        """Intervals (first, last + 1) of a piece between turning points, their direction and start [m]."""
         sign = np.where(self.v[first:last] < 0, -1, 1)
         edges = [0, *(np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist(), sign.size]
         return [
@@ -57,7 +57,7 @@ class Driven:
         ]
 
     def ways(self, pieces: list[tuple[int, int]]) -> np.ndarray:
-        """Way since the motion turned round last [m] at each sample."""
+        """Way since the last turning point [m] at each sample."""
         found = np.zeros(self.x.size)
         for piece in pieces:
             for a, b, _, begun in self.strokes(*piece):
@@ -87,17 +87,17 @@ def driven(
         moves[first + 1 : last] &= ~turns
         moves[first:last] &= np.cumsum(np.abs(np.diff(x[first:last], prepend=x[first]))) > _BEGUN * np.ptp(x)
     error = _TOGETHER * mass * np.sqrt(np.maximum(smoothed.covariance[:, 2, 2], 0.0))
-    turned = _turning_places(smoothed, x, speed, pieces)
+    turned = _turning_positions(smoothed, x, speed, pieces)
     return Driven(x.copy(), speed.copy(), a.copy(), error, moves, turned)
 
 
-def _turning_places(
+def _turning_positions(
     smoothed: Smoothed, x: np.ndarray, v: np.ndarray, pieces: list[tuple[int, int]]
 ) -> np.ndarray:
-    """Where the motion turned between each sample and the one before: at once where the speed jumps."""
+    """Positions where the motion turned between each sample and the one before; a jump of speed is a kink."""
     found = x.copy()
     at = np.flatnonzero((v[1:] < 0) != (v[:-1] < 0))
-    # what was in a gap is not known
+    # the motion in a gap is unknown
     at = at[~np.isin(at + 1, [first for first, _ in pieces])]
     steps = np.diff(smoothed.t)[at]
     before, after = v[at], v[at + 1]

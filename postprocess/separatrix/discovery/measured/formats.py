@@ -43,7 +43,7 @@ _PACKAGES = {"UFF": ("pyuff", "formats"), "TDMS": ("nptdms", "formats"), "MDF": 
 
 
 def read_table(path: Path) -> Table:
-    """Read one file of any kind; what cannot be read is refused with the line and the reason."""
+    """Read one file of any kind; an unreadable one is refused with line and reason."""
     if path.is_dir():
         raise SeparatrixError(f"{path}: a folder, expected a record", NO_INPUT)
     if not path.is_file():
@@ -65,7 +65,7 @@ def read_table(path: Path) -> Table:
 
 
 def _kind(path: Path) -> str:
-    """What a file is, by its content, else by the end of its name."""
+    """Kind of a file, by its content, else by the end of its name."""
     with path.open("rb") as file:
         begin = file.read(_MATLAB_HEAD + 8)
     ending = _ENDINGS.get(path.suffix.lower(), "")

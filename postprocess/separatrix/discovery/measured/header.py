@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the header of a record says: numbers with or without their units, units of the columns, the phase."""
+"""Keys of the header of a record: numbers with or without their units, units of the columns, the phase."""
 
 import re
 from difflib import get_close_matches
@@ -14,7 +14,7 @@ from separatrix.discovery.measured.tables import (
     NUMBERS,
     SAME,
     Table,
-    has_place,
+    has_position,
     is_noise,
     is_sensor,
     kind_of,
@@ -68,7 +68,7 @@ _SAME |= {
     "radian": "rad",
     "degree": "deg",
 }
-# what files say that say nothing
+# entries of files without a unit
 _UNSTATED = ("", "none", "n/a", "na", "-", "unknown", "not applicable")
 _EXAMPLES = {"units": "units: s, mm", "phase": "phase: 0.35, or phase: 20 deg at t = 0 s"}
 _AT = re.compile(r"\s*(?:at|@)\s*t\s*=\s*(.*)")
@@ -92,7 +92,7 @@ _NO_LESS_THAN_0 = (
 
 
 def numbers_of(path: Path, header: dict[str, str], of_time: float, notes: list[str]) -> dict[str, float]:
-    """Numbers of the header in the units of their keys; `phase_origin_s` is when the phase was what is said.
+    """Numbers of the header in the units of their keys; `phase_origin_s` is the time of the stated phase.
 
     `of_time`: unit of the column t [s].
     """
@@ -147,7 +147,7 @@ def _doubt(header: dict[str, str], numbers: dict[str, float], notes: list[str]) 
 
 
 def is_stated(unit: str) -> bool:
-    """Whether a file says a unit, and not that there is none."""
+    """Whether a file states a unit."""
     return unit.strip().lower() not in _UNSTATED
 
 
@@ -176,41 +176,41 @@ def to_si(path: Path, table: Table, notes: list[str]) -> tuple[dict[str, np.ndar
         with np.errstate(invalid="ignore", over="ignore"):
             # values that are no numbers are refused with their row
             columns[name] = column * _size(kind_of(name), units[name]) if name in units else column
-    # of an angle alone without a place, too
-    kind = "x" if has_place(table.columns) else "v"
-    place = next((units[name] for name in units if kind_of(name) == kind), "m")
-    return columns, "rad" if _is_angle(place) else "m", _size("t", units.get("t", "s"))
+    # also for an angular speed without a position
+    kind = "x" if has_position(table.columns) else "v"
+    unit = next((units[name] for name in units if kind_of(name) == kind), "m")
+    return columns, "rad" if _is_angle(unit) else "m", _size("t", units.get("t", "s"))
 
 
 def _all_units(path: Path, table: Table, notes: list[str]) -> dict[str, str]:
-    """Units of the columns by the header and by what the file states beside them, which must agree."""
+    """Units of the columns by the header and by the file beside them, which must agree."""
     stated = {name: unit for name, unit in table.units.items() if name in table.columns and is_stated(unit)}
-    said = _units(path, table) if "units" in table.header else {}
-    by_header = {name: said.get(name, said.get(kind_of(name), "")) for name in table.columns}
+    given = _units(path, table) if "units" in table.header else {}
+    by_header = {name: given.get(name, given.get(kind_of(name), "")) for name in table.columns}
     by_header = {name: unit for name, unit in by_header.items() if unit}
     for name, unit in stated.items():
         own = by_header.get(name)
         if own is not None and table.own_units:
             if not same_unit(kind_of(name), own, unit):
-                notes.append(f"{name} is in '{own}' as the user says, not in '{unit}' as the file states")
+                notes.append(f"{name} is in '{own}' as the user states, not in '{unit}' as the file states")
         elif _size(kind_of(name), unit) is None:
             allowed = ", ".join(UNITS[kind_of(name)])
             raise SeparatrixError(
                 f"{path}: '{name}' is in '{_shown(unit)}', expected one of {allowed}; where the file "
-                f"is wrong, say it in {path.name}.keys, as in 'units: t s, x 2.5 mm'"
+                f"is wrong, state it in {path.name}.keys, as in 'units: t s, x 2.5 mm'"
             )
         elif own is not None and not same_unit(kind_of(name), own, unit):
-            raise SeparatrixError(f"{path}: 'units' says '{own}' of '{name}', which itself says '{unit}'")
+            raise SeparatrixError(f"{path}: 'units' gives '{own}' for '{name}', whose own unit is '{unit}'")
     return stated | by_header
 
 
 def _shown(unit: str) -> str:
-    """What a damaged file says, in a message."""
+    """Printable text of a damaged file, for a message."""
     return "".join(one if one.isprintable() else "?" for one in unit[:_LONGEST_UNIT])
 
 
 def _size(kind: str, unit: str) -> float | None:
-    """Size of a unit, as `mm` or `2.5 mm`, over the SI unit; None of what is no unit of such a column."""
+    """Size of a unit, as `mm` or `2.5 mm`, over the SI unit; None if it is no unit of such a column."""
     found = _NUMBER.fullmatch(unit.strip())
     times = 1.0
     if found and found.group(2):
@@ -226,7 +226,7 @@ def _is_angle(unit: str) -> bool:
 
 
 def _plain(unit: str) -> str:
-    """A unit in the way it is written here: `m s-2`, `m/s\u00b2` and `Meters/sec/sec` are `m/s^2`."""
+    """A unit in canonical form: `m s-2`, `m/s\u00b2` and `Meters/sec/sec` are `m/s^2`."""
     unit = re.sub(r"\s+since\s.*", "", unit.strip()).strip("[]()")
     unit = unit.replace("\u00b2", "^2").replace("**", "^").replace("\u00b7", " ")
     unit = re.sub(r"/s(ec)?/s(ec)?$", "/s^2", unit)
@@ -245,10 +245,10 @@ def _units(path: Path, table: Table) -> dict[str, str]:
     """Unit of each column: `s, mm`, in the order of the columns, or by name, as in `t s, x mm`."""
     text, columns = table.header["units"], table.columns
     entries = [entry.strip() for entry in re.split(r"[,;]", text) if entry.strip()]
-    said = [_entry(entry, [one for one in columns if is_sensor(one)]) for entry in entries]
-    _check_order(path, table, sum(not name for name, _ in said))
+    given = [_entry(entry, [one for one in columns if is_sensor(one)]) for entry in entries]
+    _check_order(path, table, sum(not name for name, _ in given))
     found, order = {}, iter(table.names)
-    for name, unit in said:
+    for name, unit in given:
         if not name:
             name = next(order, "")
             if name not in columns:
@@ -257,13 +257,13 @@ def _units(path: Path, table: Table) -> dict[str, str]:
             _refuse(path, text)
         found[name] = unit
     known = {kind_of(name) for name in [*found, *table.units] if name in columns or name in UNITS}
-    if "t" not in known or not known & ({"x"} if has_place(columns) else {"x", "v"}):
+    if "t" not in known or not known & ({"x"} if has_position(columns) else {"x", "v"}):
         _refuse(path, text)
     return found
 
 
 def _check_order(path: Path, table: Table, count: int) -> None:
-    """Refuse so many units in order where it matters whether columns that are not used have some of them."""
+    """Refuse units in order where their assignment depends on whether unused columns have some of them."""
     used = list(table.columns)
     among_all = [name for name in table.names[:count] if name in used]
     fewer = count < len(table.names) and among_all != used[:count]
@@ -271,7 +271,7 @@ def _check_order(path: Path, table: Table, count: int) -> None:
         raise SeparatrixError(
             f"{path}: units '{table.header['units']}': {count} units in the order of "
             f"{len(used) + len(table.unused)} columns, of which {', '.join(table.unused)} "
-            f"{'is' if len(table.unused) == 1 else 'are'} not used: say them by name, as in "
+            f"{'is' if len(table.unused) == 1 else 'are'} not used: state them by name, as in "
             "'units: t s, x mm'"
         )
 
@@ -279,9 +279,9 @@ def _check_order(path: Path, table: Table, count: int) -> None:
 def _entry(entry: str, sensors: list[str]) -> tuple[str, str]:
     """Name of a column ('' if there is none) and unit, from `mm`, `x mm`, `x: mm`, `x = mm`, `x [mm]`."""
     for name in (*sensors, "t", "x", "a", *CHANNELS, *SAME):
-        said = re.fullmatch(rf"{re.escape(name)}\s*(?:[:=]\s*|\s+|(?=[\[(]))[\[(]?\s*(.*?)\s*[\])]?", entry)
-        if said:
-            return SAME.get(name, name), said.group(1)
+        match = re.fullmatch(rf"{re.escape(name)}\s*(?:[:=]\s*|\s+|(?=[\[(]))[\[(]?\s*(.*?)\s*[\])]?", entry)
+        if match:
+            return SAME.get(name, name), match.group(1)
     return "", entry.strip("[]() ")
 
 

@@ -14,13 +14,13 @@ from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
 
 MOST_SAMPLES = 40_000
-"""Samples of such a record that are compared; of a longer one means of neighbours are."""
+"""Compared samples of such a record; a longer one is averaged over neighbours."""
 # least noise of a force over its scatter: no sensor of force is better
 _EXACT = 5e-4
 
 
 def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared:
-    """Noise of force and position; refused is what is no record of a driven joint."""
+    """Noise of force and position; a record that is not of a driven joint is refused."""
     if record.force is None:
         raise SeparatrixError(f"{record.file}: no column 'force' (or 'F'), the force that is compared")
     if 'law = "measured_force"' not in model.to_text({}):

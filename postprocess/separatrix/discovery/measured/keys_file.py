@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the user says of a file that an instrument has written: RECORD.keys, lines `key: value` beside it."""
+"""Keys of the user for a file that an instrument has written: RECORD.keys, lines `key: value` beside it."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +22,7 @@ class UserKeys:
     names: dict[str, str] = field(default_factory=dict)
 
     def added_to(self, table: Table) -> Table:
-        """The table with these keys; they may not contradict those of the file, but for its units."""
+        """The table with these keys; except for units they may not contradict those of the file."""
         for key, value in self.header.items():
             if table.header.get(key, value).strip() != value:
                 raise SeparatrixError(
@@ -30,7 +30,7 @@ class UserKeys:
                 )
         table.own_units = "units" in self.header
         table.header |= self.header
-        missing = [said for said, name in self.names.items() if name not in table.columns]
+        missing = [channel for channel, name in self.names.items() if name not in table.columns]
         if missing:
             has = ", ".join(table.unused) or "none that is not used"
             raise SeparatrixError(f"{self.path}: columns: '{missing[0]}' is not in the record; it has {has}")

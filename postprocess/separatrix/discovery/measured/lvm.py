@@ -24,13 +24,13 @@ def read_lvm(path: Path, names: Mapping[str, str]) -> Found:
     content = path.read_bytes()
     text = content.decode("utf-8") if _is_utf8(content) else content.decode("latin-1")
     lines = list(enumerate(text.splitlines(), start=1))
-    ends = [place for place, (_, line) in enumerate(lines) if line.startswith(_END)]
+    ends = [index for index, (_, line) in enumerate(lines) if line.startswith(_END)]
     if not ends:
         raise SeparatrixError(f"{path}: '{_END}' is missing")
     keys = _keys(lines[: ends[0]], None)
     mark = _SEPARATORS.get(_first(keys, "Separator", "Tab"), "\t")
     rest = _without_special(lines[ends[0] + 1 :])
-    ends = [place for place, (_, line) in enumerate(rest) if line.startswith(_END)]
+    ends = [index for index, (_, line) in enumerate(rest) if line.startswith(_END)]
     if len(ends) != 1:
         raise SeparatrixError(
             f"{path}: found {len(ends)} segments, expected one: save each as a file of its own"
@@ -144,9 +144,9 @@ def _numbers(path: Path, rows: list[tuple[int, list[str]]], at: int, decimal: st
     """Numbers of a column, and the rows that have one: a shorter channel ends before the others."""
     kept = [(number, words) for number, words in rows if at < len(words) and words[at].strip()]
     values = np.empty(len(kept))
-    for place, (number, words) in enumerate(kept):
+    for index, (number, words) in enumerate(kept):
         try:
-            values[place] = real(words[at].strip().replace(decimal, "."))
+            values[index] = real(words[at].strip().replace(decimal, "."))
         except ValueError:
             raise SeparatrixError(f"{path}:{number}: '{words[at].strip()}' is no number") from None
     return values, kept

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records in ASAM MDF files: channels with clocks of their own, samples that the recorder calls invalid."""
+"""Records in ASAM MDF files: channels with clocks of their own, samples that the recorder marks invalid."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,17 +22,17 @@ def read_mdf(path: Path, names: Mapping[str, str]) -> Found:
     found, times, invalid = Found(), {}, {}
     with library("asammdf", path, "mdf").MDF(path) as file:
         masters = set(file.masters_db.items())
-        for said, places in file.channels_db.items():
-            places = [place for place in places if place not in masters]
-            name = column_of(said, names)
-            if not places:
+        for own, channels in file.channels_db.items():
+            channels = [one for one in channels if one not in masters]
+            name = column_of(own, names)
+            if not channels:
                 continue
             if not is_column(name) or name == "t":
-                found.unused.append(said)
+                found.unused.append(own)
                 continue
-            if len(places) > 1 or name in times:
-                raise SeparatrixError(f"{path}: {max(2, len(places))} channels are '{name}', expected one")
-            group, index = places[0]
+            if len(channels) > 1 or name in times:
+                raise SeparatrixError(f"{path}: {max(2, len(channels))} channels are '{name}', expected one")
+            group, index = channels[0]
             signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
             master, kind = signal.master_metadata or ("", _TIME)
             if kind != _TIME:

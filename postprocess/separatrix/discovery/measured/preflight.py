@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of a record before anything is fitted: noise, resolution, drive, delay of channels."""
+"""Properties of a record before any fit: noise, resolution, drive, delay of channels."""
 
 from dataclasses import dataclass, field, replace
 
@@ -22,15 +22,15 @@ _OFF = 0.01
 _UNEVEN = 1e-2
 # sizes of a record against those of the machine beyond which a unit must be wrong
 _MOST_RATIO = 50.0
-# of the velocity over the slope of the position, beyond which its unit must be wrong
+# ratio of the velocity to the slope of the position beyond which its unit must be wrong
 _UNIT = 2.0
-# samples by which x may lag behind v; correlation of v and the slope of x that needs no blocks of samples to
-# be seen, and how many blocks are left at least
+# samples by which x may lag behind v; correlation of v and the slope of x above which no blocks of samples
+# are needed, and least number of blocks
 _MOST_LAG = 4
 _ALIKE, _FEWEST_BLOCKS = 0.9, 400
-# error of a crank angle [rad] that is that of its digits
+# error of a crank angle [rad] below which it is due to rounding
 _EXACT = 1e-9
-# of the scatter of a crank angle over its stated noise that is told
+# ratio of the scatter of a crank angle to its stated noise that is reported
 _DISAGREEMENT = 1.5
 
 
@@ -60,7 +60,7 @@ class Prepared:
     drive_scale: float = 1.0
     origin: float = 0.0
     notes: list[str] = field(default_factory=list)
-    # what is fitted: all samples, or fewer rows that say as much
+    # fitted rows: all samples, or fewer with the same information
     samples: Samples | None = None
     # whether the force is compared: sigma and resolution are its own, the motion is known
     in_force: bool = False
@@ -71,7 +71,7 @@ class Prepared:
     mass: float = 0.0
 
     def __post_init__(self) -> None:
-        """Fit every sample, unless something else is said."""
+        """Fit every sample by default."""
         if self.samples is None:
             self.samples = whole(self.record)
 
@@ -119,7 +119,7 @@ class Prepared:
 
 
 def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
-    """Measure what the header does not say, and refuse what cannot be a record of this machine."""
+    """Measure what the header does not state, and refuse a record that cannot be of this machine."""
     notes = list(record.notes)
     if record.v is not None:
         check_velocity(record, notes)
@@ -165,7 +165,7 @@ def _noise(record: Record, rest: Record | None, resolution: float, unit: str, no
         sigma = white_noise(record.x)
         notes.append(f"noise {sigma:.3g} {unit}, from fourth differences of x")
     sigma = max(sigma, floor)
-    # a record that says that it has no noise was computed
+    # a record that states zero noise was computed
     least = QUIET * float(np.std(record.x))
     if sigma <= (least if stated == 0 else 0):
         sigma = least
@@ -278,7 +278,7 @@ def _errors_of_angle(prepared: Prepared) -> None:
         prepared.notes.append(
             f"noise of phi is stated as {stated:.3g} rad, it scatters by {sigma:.3g} rad about even turning"
         )
-    # neighbours that err alike say less
+    # neighbours with correlated errors carry less information
     memory = float(np.corrcoef(scatter[1:], scatter[:-1])[0, 1]) if sigma > 0 else 0.0
     memory = min(max(memory, 0.0), 0.99)
     error = max(sigma, stated) * np.sqrt((1 + memory) / (1 - memory) / t.size)
@@ -325,7 +325,7 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
 
 
 def _check_size(prepared: Prepared, model) -> None:
-    """A record far larger or smaller than the machine has the wrong unit or another machine."""
+    """Refuse a record far larger or smaller than the machine: wrong units, or another machine."""
     sizes = [
         abs(p.value)
         for path, p in model.parameters.items()
@@ -395,6 +395,6 @@ def check_velocity(record: Record, notes: list[str]) -> None:
 
 
 def _block_means(values: np.ndarray, width: int) -> np.ndarray:
-    """Means of blocks of so many values; what is left at the end belongs to none."""
+    """Means of blocks of so many values; the remainder at the end is dropped."""
     count = values.size // width
     return values[: count * width].reshape(count, width).mean(axis=1)

@@ -18,13 +18,13 @@ from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_
 from separatrix.errors import SeparatrixError
 
 _FEWEST_SAMPLES = 60
-# beyond which squares overflow: no measured value [SI]
+# largest measured value [SI]: squares of larger ones overflow
 _LARGEST = 1e100
 
 
 @dataclass
 class Record:
-    """One record in SI units; `pieces` are the stretches without gaps as (first, last + 1)."""
+    """One record in SI units; `pieces` are the intervals without gaps as (first, last + 1)."""
 
     name: str
     t: np.ndarray
@@ -32,9 +32,9 @@ class Record:
     v: np.ndarray | None = None
     force: np.ndarray | None = None
     phi: np.ndarray | None = None
-    # of several bodies: columns by what they are of, as `x.BODY`
+    # of several bodies: columns by kind and body or joint, as `x.BODY`
     sensors: dict[str, np.ndarray] = field(default_factory=dict)
-    # whether x is a column itself, and not the first place among the sensors or the integral of a speed
+    # whether x is a column itself, and not the first position among the sensors or the integral of a speed
     own_x: bool = True
     header: dict[str, float] = field(default_factory=dict)
     pieces: list[tuple[int, int]] = field(default_factory=list)
@@ -45,8 +45,8 @@ class Record:
     part: str = ""
 
     @property
-    def has_place(self) -> bool:
-        """Whether a place was measured: else x is the integral of a speed."""
+    def has_position(self) -> bool:
+        """Whether a position was measured: else x is the integral of a speed."""
         return self.own_x or any(name[0] == "x" for name in self.sensors)
 
     @property
@@ -61,7 +61,7 @@ class Record:
 
 
 def read_record(path: Path, at_rest: bool = False) -> Record:
-    """Read and check one record; whatever is wrong is refused with file, row and reason.
+    """Read and check one record; errors are reported with file, row and reason.
 
     `at_rest`: of a body that does not move, whose positions may all be the same.
     """
@@ -96,12 +96,12 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     if kept.size < _FEWEST_SAMPLES:
         raise SeparatrixError(f"{path}: {kept.size} samples, at least {_FEWEST_SAMPLES} are needed")
     sensors = [name for name in columns if is_sensor(name)]
-    places = [name for name in sensors if name[0] == "x"]
+    positions = [name for name in sensors if name[0] == "x"]
     own_x = "x" in columns
     if own_x:
-        places.insert(0, "x")
-    elif places:
-        columns["x"] = columns[places[0]]
+        positions.insert(0, "x")
+    elif positions:
+        columns["x"] = columns[positions[0]]
     else:
         speed = next(name for name in ("v", *sensors) if name in columns and name[0] == "v")
         columns["x"] = cumulative_trapezoid(columns[speed], columns["t"], initial=0)
@@ -117,7 +117,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     if not at_rest:
         if np.ptp(x) == 0:
             raise SeparatrixError(f"{path}: 'x' is constant")
-        if places:
+        if positions:
             kept = np.delete(kept, left_out(t, x, unit, where, notes))
         columns = {name: column[kept] for name, column in columns.items()}
         x = columns["x"]
@@ -129,7 +129,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
             f"{path}: sampling_rate_hz is {rate:g}, t advances by {usual:.6g} s per row: wrong unit of time?"
         )
     if not at_rest:
-        for name in places:
+        for name in positions:
             check_clipping(columns[name], unit, where, notes)
     if table.unused:
         notes.append(f"columns that are not used: {', '.join(table.unused)}")

@@ -3,8 +3,8 @@
 """Records cut into short segments, each with a start of its own.
 
 A segment starts where the motion is smooth: away from impacts (also those that only a velocity shows), from
-turning points (where friction switches and may hold the body) and from gaps. Segments of a record follow one
-another without a hole.
+turning points (where friction switches and may hold the body) and from gaps. Segments of a record are
+contiguous.
 """
 
 from dataclasses import dataclass
@@ -42,12 +42,12 @@ def cut(records: list[Samples], smoothed: list[Smoothed], lengths: list[int]) ->
     for number, (record, smooth, length) in enumerate(zip(records, smoothed, lengths, strict=True)):
         smoothness = _calm(smooth)[smooth.nearest(record.t)]
         if record.blind is not None:
-            # an impact that only the velocity shows, as one at the beginning of the record
+            # impacts that only the velocity shows, as at the beginning of the record
             smoothness[record.blind] = 0
         for first, last in record.pieces:
             if last - first >= max(_FEWEST, min(length, FEWEST_IN_PIECE)):
                 piece = slice(first, last)
-                cuts = _cut_piece(record.place[piece], length, smoothness[piece])
+                cuts = _cut_piece(record.offset[piece], length, smoothness[piece])
                 rows += [(number, first + a, first + b) for a, b in cuts]
     table = np.array(rows, int).reshape(-1, 3)
     return padded(table[:, 0], table[:, 1], table[:, 2])
@@ -70,7 +70,7 @@ def padded_table(flat: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def seeing(segments: Segments, records: list[Samples]) -> np.ndarray:
-    """Samples of the segments (segments, length) whose velocity says something, if it was measured."""
+    """Samples of the segments (segments, length) whose velocity is compared, if it was measured."""
     found = segments.inside.copy()
     for number, samples in enumerate(records):
         if samples.blind is not None:
@@ -80,7 +80,7 @@ def seeing(segments: Segments, records: list[Samples]) -> np.ndarray:
 
 
 def _calm(smooth: Smoothed) -> np.ndarray:
-    """How good a start each sample is: speed over its usual size, 0 near impacts."""
+    """Suitability of each sample as a start: speed over its usual size, 0 near impacts."""
     speed = np.abs(smooth.v)
     calm = speed / max(float(np.sqrt(np.mean(speed**2))), 1e-300)
     for k in smooth.impacts:
@@ -88,21 +88,21 @@ def _calm(smooth: Smoothed) -> np.ndarray:
     return calm
 
 
-def _cut_piece(place: np.ndarray, length: int, calm: np.ndarray) -> list[tuple[int, int]]:
-    """Rows at which the segments of a piece begin and end; `place` counts samples of the sensor."""
+def _cut_piece(offset: np.ndarray, length: int, calm: np.ndarray) -> list[tuple[int, int]]:
+    """Rows at which the segments of a piece begin and end; `offset` counts samples of the sensor."""
     # a piece between gaps may be much shorter
-    whole = place[-1] - place[0] + 1
+    whole = offset[-1] - offset[0] + 1
     within = min(max(2, length // 4), whole // 2)
-    begin = int(np.searchsorted(place, place[0] + within))
+    begin = int(np.searchsorted(offset, offset[0] + within))
     starts = [int(np.argmax(calm[:begin] > _SLOW))]
     reach = max(1, length // 3)
-    while place[-1] + 1 - place[starts[-1]] > 1.5 * length:
-        aim = place[starts[-1]] + length
-        near = np.arange(np.searchsorted(place, aim - reach), np.searchsorted(place, aim + reach, "right"))
+    while offset[-1] + 1 - offset[starts[-1]] > 1.5 * length:
+        aim = offset[starts[-1]] + length
+        near = np.arange(np.searchsorted(offset, aim - reach), np.searchsorted(offset, aim + reach, "right"))
         near = near[near > starts[-1] + _FEWEST]
         if not near.size:
-            near = np.array([min(starts[-1] + _FEWEST + 1, place.size - 1)])
-        near = near[np.argsort(np.abs(place[near] - aim), kind="stable")]
+            near = np.array([min(starts[-1] + _FEWEST + 1, offset.size - 1)])
+        near = near[np.argsort(np.abs(offset[near] - aim), kind="stable")]
         good = near[calm[near] > _SLOW]
         starts.append(int(good[0] if good.size else near[np.argmax(calm[near])]))
-    return list(zip(starts, [*starts[1:], place.size], strict=True))
+    return list(zip(starts, [*starts[1:], offset.size], strict=True))

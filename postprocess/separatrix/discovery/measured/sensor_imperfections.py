@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faults of a sensor that no motion makes: stray samples, values that are held, clipping."""
+"""Artefacts of a sensor that no motion causes: stray samples, held values, clipping."""
 
 from collections.abc import Callable
 
@@ -12,10 +12,10 @@ from separatrix.errors import SeparatrixError
 
 Where = Callable[[int], str]
 
-# distance of a stray sample from where its neighbours lead: over the noise, the grid, and over the changes of
-# the steps around it, of which an impact makes a third at most
+# distance of a stray sample from the line of its neighbours: over the noise, the grid, and the changes of the
+# steps around it, of which an impact causes a third at most
 _STRAY = (20.0, 5.0, 3.0)
-# rows on either side that show how fast steps change
+# rows on either side from which the change of steps is estimated
 _AROUND = 5
 _MOST_STRAY = 3
 # a held value ends with a jump: over the noise, the grid, and the usual steps before and after
@@ -25,15 +25,15 @@ _SHORTEST_HELD = 3
 _SLOW = 3.0
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.02
-# step to and from a clipped value, over the grid and over the usual step: a turning point and a place of
-# rest are reached level by level, or ever more slowly
+# step to and from a clipped value, over the grid and over the usual step: a turning point or a position of
+# rest is reached level by level, or ever more slowly
 _ABRUPT = (1.5, 0.05)
 # noise over the grid of a force from which on it is never the same number by chance
 _STEPS_OF_NOISE, _FEWEST_INSIDE = 0.5, 20
 
 
 def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
-    """Rows of samples that say nothing on the motion, told in `notes`; too many are refused."""
+    """Rows of samples without information on the motion, reported in `notes`; too many are refused."""
     _check_rate(x, where)
     held = _held(t, x, unit, where, notes)
     rows = np.setdiff1d(np.arange(x.size), held)
@@ -57,7 +57,7 @@ def _check_rate(x: np.ndarray, where: Where) -> None:
 
 
 def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
-    """Single samples that lie where no motion leads: away from a smooth line through two on either side."""
+    """Single samples that no motion reaches: away from a smooth line through two on either side."""
     off = np.zeros(x.size)
     off[2:-2] = x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6
     steps = np.diff(x)
@@ -74,13 +74,13 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[st
     least = max(_STRAY[0] * max(white_noise(x), QUIET * float(np.std(x))), _STRAY[1] * resolution_of(x))
     size = np.abs(off)
     rows = np.flatnonzero((size > least) & (size > _STRAY[2] * bend))
-    said = [
+    messages = [
         f"{where(row)}: x is {x[row]:.6g} {unit} between {x[row - 1]:.6g} and {x[row + 1]:.6g} {unit}"
         for row in rows
     ]
     if rows.size > _MOST_STRAY:
-        raise SeparatrixError(f"{said[0]}; {rows.size} such samples: clean the record")
-    notes += [f"{text}: left out" for text in said]
+        raise SeparatrixError(f"{messages[0]}; {rows.size} such samples: clean the record")
+    notes += [f"{text}: left out" for text in messages]
     return rows
 
 
@@ -97,7 +97,7 @@ def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str
     found = []
     for first, last in runs(np.diff(x) == 0):
         last += 1
-        # a body at rest before a gap is elsewhere after it
+        # a body at rest before a gap may have moved after it
         if last - first < _SHORTEST_HELD or first < 1 or last > x.size - 2 or gaps[first - 1 : last].any():
             continue
         around = max(abs(x[first] - x[first - 1]), abs(x[last + 1] - x[last]))
@@ -109,7 +109,7 @@ def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str
             f"{x[last]:.6g} {unit}: left out"
         )
     if len(found) > 3:
-        notes.append(f"{len(found) - 3} more stretches of held values: left out")
+        notes.append(f"{len(found) - 3} more intervals of held values: left out")
     return np.concatenate([np.arange(first + 1, last) for first, last in found] or [np.zeros(0, int)])
 
 
@@ -132,7 +132,7 @@ def check_clipped_force(force: np.ndarray, unit: str, where: Where, notes: list[
 def _check_limits(
     name: str, x: np.ndarray, unit: str, where: Where, notes: list[str], holds: Callable[[int, int], bool]
 ) -> None:
-    """Refuse a signal that stays at one of its limits for long, in runs that are no motion's."""
+    """Refuse a signal that stays at one of its limits for long, in runs that no motion causes."""
     for end, extreme in (("largest", x.max()), ("smallest", x.min())):
         long = [
             (first, last)
@@ -143,7 +143,7 @@ def _check_limits(
             continue
         share = sum(last - first for first, last in long) / x.size
         stays = f"{name} stays at its {end} value {extreme:.6g} {unit}"
-        message = f"{where(long[0][0])}: {stays} for {len(long)} stretches"
+        message = f"{where(long[0][0])}: {stays} in {len(long)} intervals"
         if len(long) >= 2 and share > _CLIPPED_SHARE:
             raise SeparatrixError(
                 f"{message}, {100 * share:.0f} % of the samples: clipped. The range of the sensor has to be "

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records of machines of several bodies: a column for each sensor, named by its kind and what it is on.
+"""Records of machines of several bodies: a column for each sensor, named by its kind and its body or joint.
 
-`x.BODY`, `v.BODY`, `a.BODY` are place, velocity and acceleration of a body, `F.JOINT` is the force of a
+`x.BODY`, `v.BODY`, `a.BODY` are position, velocity and acceleration of a body, `F.JOINT` is the force of a
 spring or a soft contact, positive where it pulls the second of its ends back towards the first. Not every
 body needs a sensor. `x` and `v` without a body are of the watched one.
 """
@@ -18,7 +18,7 @@ from separatrix.discovery.measured.signals import QUIET, resolution_of, white_no
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 
-# laws of joints whose force follows from place and speed
+# laws of joints whose force follows from extension and speed
 FORCES = ("linear", "polynomial", "kelvin_voigt")
 _MOST_SAMPLES = 50_000
 
@@ -42,8 +42,8 @@ class SensedPrepared(Prepared):
     sensors: list[Sensor] = field(default_factory=list)
 
     @property
-    def place(self) -> str:
-        """The body whose place the record has as x, or whose speed it has first."""
+    def observed(self) -> str:
+        """The body of the first position sensor, or without any of the first speed."""
         return min((one for one in self.sensors if one.kind in "xv"), key=lambda one: one.kind != "x").of
 
     @property
@@ -69,7 +69,7 @@ class SensedPrepared(Prepared):
 
 
 def prepare_sensors(record: Record, model: Model, rest: Record | None = None) -> SensedPrepared:
-    """Find what each column of a record is of, its noise, and the drive."""
+    """Find the body or joint of each column of a record, its noise, and the drive."""
     structure = structure_of(model)
     notes = list(record.notes)
     if rest is not None:
@@ -87,7 +87,7 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
             "bodies: keep a part "
             f"of it, or every {-(-record.t.size // _MOST_SAMPLES)}th row"
         )
-    if not record.has_place:
+    if not record.has_position:
         _check_impacts(record, structure)
     columns = _by_body(record, structure.watched)
     sensors = [_sensor(record, name, values, structure, notes) for name, values in columns.items()]
@@ -108,7 +108,7 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
 
 
 def _check_impacts(record: Record, structure: Structure) -> None:
-    """Speeds alone do not tell where a stop is, nor on which side of an impact a sample lies."""
+    """Refuse speeds alone with impacts: they give neither the position of a stop nor the side of a sample."""
     hard = [one.path for one in structure.joints if one.path.startswith("contact.") and one.law not in FORCES]
     if hard:
         raise SeparatrixError(
@@ -118,7 +118,7 @@ def _check_impacts(record: Record, structure: Structure) -> None:
 
 
 def _by_body(record: Record, watched: str) -> dict[str, np.ndarray]:
-    """Columns by what they are of; `x` and `v` are of the watched body."""
+    """Columns by body or joint; `x` and `v` are of the watched body."""
     own_x = {f"x.{watched}": record.x} if record.own_x else {}
     own_v = {} if record.v is None else {f"v.{watched}": record.v}
     for name in (own_x | own_v).keys() & record.sensors.keys():
@@ -143,7 +143,7 @@ def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure,
             raise SeparatrixError(
                 f"{record.file}: column '{name}': the force of a joint with law "
                 f"{joints[named[0]].law} is no function "
-                f"of place and speed; allowed {', '.join(FORCES)}"
+                f"of extension and speed; allowed {', '.join(FORCES)}"
             )
         if any(np.any(value) for key, value in joints[named[0]].table.items() if "modulation" in key):
             raise SeparatrixError(
@@ -169,7 +169,7 @@ def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure,
     if not stated:
         notes.append(f"noise of {name}: {sigma:.3g}, from fourth differences")
     unit = "m/s" if kind == "v" else "m"
-    if (kind == "x" or not record.has_place) and kind in "xv" and np.std(values) < 5 * sigma:
+    if (kind == "x" or not record.has_position) and kind in "xv" and np.std(values) < 5 * sigma:
         raise SeparatrixError(
             f"{record.file}: {name} scatters by {np.std(values):.3g} {unit} at a noise of {sigma:.3g} "
             f"{unit}: nothing but noise"

@@ -5,17 +5,17 @@
 import numpy as np
 from scipy.ndimage import median_filter
 
-# noise that is taken where none is found, over the scatter of the signal
+# noise that is assumed where none is found, over the scatter of the signal
 QUIET = 1e-6
 # variance of fourth differences of white noise of variance 1
 _FOURTH = 70.0
 # deviation of a multiple of the step of a grid from a whole number
 _OFF_GRID = 0.05
-# noise that a jump exceeds, and how often what the steps beside it have beyond the noise
+# factors of the noise and of the excess of the neighbouring steps over it that a jump exceeds
 _JUMP, _SUDDEN = 4.0, 3.0
-# steps whose median is that of the smooth motion
+# neighbouring steps whose median is the smooth motion
 _BESIDE = 7
-# a grid much finer than the noise is that of the digits in the file
+# a grid below this share of the noise is that of the digits in the file
 _FINE = 0.3
 
 
@@ -55,6 +55,6 @@ def jumps(v: np.ndarray, noise: float) -> np.ndarray:
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Stretches of flags that are set, as (first, last + 1)."""
+    """Runs of set flags, as (first, last + 1)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

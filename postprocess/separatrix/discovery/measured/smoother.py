@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from separatrix.discovery.measured.signals import runs
 
-# a stretch that is long enough to tune on
+# samples that are sufficient for tuning
 _TUNED_SAMPLES = 600
 _JUMP_SIGMAS = 6.0
 _JUMP_MEDIANS = 4.0
@@ -24,7 +24,7 @@ _FEWEST_STILL = 4
 
 @dataclass
 class Smoothed:
-    """States (n, 3) of x, v, a with covariances (n, 3, 3), and what happened on the way."""
+    """States (n, 3) of x, v, a with covariances (n, 3, 3), and the impacts."""
 
     t: np.ndarray
     state: np.ndarray
@@ -38,7 +38,7 @@ class Smoothed:
         return self.state[:, 1]
 
     def nearest(self, t: np.ndarray) -> np.ndarray:
-        """Places of the states next to times `t` [s]."""
+        """Indices of the states next to times `t` [s]."""
         after = np.clip(np.searchsorted(self.t, t), 1, self.t.size - 1)
         return after - (t - self.t[after - 1] < self.t[after] - t)
 
@@ -54,8 +54,8 @@ def smooth(
 ) -> Smoothed:
     """Smooth positions of noise `sigma` [m]; the drive period sets the window of detection.
 
-    The jerk is tuned on one of `every` samples: neighbours of a record that is sampled far faster than it
-    moves tell it from noise no more.
+    The jerk is tuned on one of `every` samples: it is indistinguishable from noise between neighbours of a
+    record that is sampled far faster than it moves.
     """
     window = int(np.clip((period_samples or 100) / 14, 4, 12))
     impacts = detect_impacts(t, x, sigma, window)
@@ -65,7 +65,7 @@ def smooth(
 
 
 def detect_impacts(t: np.ndarray, x: np.ndarray, sigma: float, window: int) -> np.ndarray:
-    """Indices of the samples just before the velocity turns round at once."""
+    """Indices of the samples just before the velocity reverses abruptly."""
     n = x.size
     if n < 4 * window:
         return np.zeros(0, int)
@@ -124,7 +124,7 @@ def impact_table(smoothed: Smoothed) -> np.ndarray:
 
 
 def stick_intervals(smoothed: Smoothed) -> list[tuple[float, float]]:
-    """Stretches of some samples or more with velocity and acceleration zero within three errors."""
+    """Intervals of some samples or more with velocity and acceleration zero within three errors."""
     error = np.sqrt(np.stack([smoothed.covariance[:, i, i] for i in (1, 2)], axis=1))
     still = np.all(np.abs(smoothed.state[:, 1:]) < 3 * error, axis=1)
     still &= np.abs(smoothed.v) < 0.05 * np.sqrt(np.mean(smoothed.v**2))

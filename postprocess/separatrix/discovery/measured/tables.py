@@ -44,32 +44,32 @@ MOST_SAMPLES = 10_000_000
 # lines of a header; bytes that are looked at together
 _MOST_HEADER, _CHUNK = 1000, 1_000_000
 KEYS = NUMBERS | {"units"}
-"""All header keys that mean something."""
+"""All known header keys."""
 
 
 def is_sensor(name: str) -> bool:
-    """Whether a column is named by what it is of: `x.BODY`, `v.BODY`, `a.BODY`, `F.JOINT`."""
+    """Whether a column is named by its body or joint: `x.BODY`, `v.BODY`, `a.BODY`, `F.JOINT`."""
     return _SENSOR.fullmatch(name) is not None
 
 
 def is_column(name: str) -> bool:
-    """Whether a column means something."""
+    """Whether a column is known."""
     return name in ("t", *CHANNELS) or is_sensor(name)
 
 
 def kind_of(name: str) -> str:
-    """What a column is: `x` of `x.BODY`, `force` of `F.JOINT`."""
+    """Kind of a column: `x` of `x.BODY`, `force` of `F.JOINT`."""
     kind = name.partition(".")[0] if is_sensor(name) else name
     return SAME.get(kind, kind)
 
 
-def has_place(names: Iterable[str]) -> bool:
-    """Whether a place is among the columns."""
+def has_position(names: Iterable[str]) -> bool:
+    """Whether a position is among the columns."""
     return any(kind_of(name) == "x" for name in names)
 
 
 def has_motion(names: Iterable[str]) -> bool:
-    """Whether a place or a speed is among the columns."""
+    """Whether a position or a speed is among the columns."""
     return any(kind_of(name) in ("x", "v") for name in names)
 
 
@@ -82,8 +82,8 @@ def is_noise(key: str) -> bool:
 class Table:
     """Texts of the header, columns by name, and the line of each row where the file has lines.
 
-    `units`: of columns, as the file states them beside these; `own_units`: whether those of the header are
-    the user's word on a file that states others.
+    `units`: of columns, as the file states them beside these; `own_units`: whether the units of the header
+    are those of the user, which override the file.
     """
 
     header: dict[str, str]
@@ -98,7 +98,7 @@ class Table:
 
 
 def is_text(path: Path) -> bool:
-    """Whether a file may be text of any encoding: bytes of zero are in UTF-16 alone."""
+    """Whether a file may be text of any encoding: only UTF-16 has zero bytes."""
     with path.open("rb") as file:
         begin = file.read(_CHUNK)
     return begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" not in begin
@@ -125,7 +125,7 @@ def _count_lines(path: Path) -> tuple[int, int]:
 
 
 def _read_plain(path: Path, count: int) -> Table | None:
-    """A well-formed file of so many lines at once; None where anything in it needs a closer look."""
+    """A well-formed file of so many lines at once; None if anything in it needs parsing by lines."""
     begun: list[str] = []
     with path.open(encoding="utf-8", errors="surrogateescape") as file:
         for line in file:
@@ -140,7 +140,7 @@ def _read_plain(path: Path, count: int) -> Table | None:
         return None
     used = [name for name in names if is_column(name)]
     try:
-        # any comment, blank line or short row among the numbers is left to the closer look
+        # any comment, blank line or short row among the numbers needs parsing by lines
         table = np.loadtxt(path, delimiter=",", comments=None, skiprows=len(begun), ndmin=2)
     except ValueError:
         return None
@@ -187,7 +187,7 @@ def _parsed(path: Path, text_lines: list[str], whole: bool = False) -> Table:
             if not colon:
                 continue
             if key in KEYS:
-                _check_place(path, number, key, stands, names is not None)
+                _check_line(path, number, key, stands, names is not None)
             if names is None:
                 header[key], stands[key] = value, number
             continue
@@ -226,8 +226,8 @@ def _check_encoding(path: Path, number: int, text: str) -> None:
         raise SeparatrixError(f"{path}:{number}: no text in UTF-8; supported are {READ}") from None
 
 
-def _check_place(path: Path, number: int, key: str, stands: dict[str, int], below: bool) -> None:
-    """A key says what holds for all rows: it stands above them, and once."""
+def _check_line(path: Path, number: int, key: str, stands: dict[str, int], below: bool) -> None:
+    """Refuse a key below the row of names, or given twice: it holds for all rows."""
     if below:
         raise SeparatrixError(f"{path}:{number}: '{key}' stands below the row of names, expected above it")
     if key in stands:

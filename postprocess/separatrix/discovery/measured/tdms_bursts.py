@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Segments of a TDMS file: how many samples each adds to a channel, and the waveform that it states.
+"""Segments of a TDMS file: the number of samples that each adds to a channel, and the stated waveform.
 
 A reader that joins the segments keeps the last start time alone; the lead-ins have all of them.
 """
@@ -33,13 +33,13 @@ class Burst:
 
     @property
     def clock(self) -> tuple:
-        """What says the times of the samples."""
+        """The properties that define the times of the samples."""
         return tuple(self.properties.get(key) for key in (START, STEP, OFFSET))
 
 
 @dataclass
 class _Channel:
-    """What is known of a channel so far: values of a chunk and their bytes, properties."""
+    """Known data of a channel: values of a chunk and their bytes, properties."""
 
     values: int = 0
     size: int = 0

@@ -16,8 +16,8 @@ from separatrix.universal_files import FileUnits, check_whole, units_of
 
 # specific data types of UFF 58 (displacement, velocity, force) and the columns that they are
 _OF_TYPE = {8: "x", 11: "v", 9: "force", 13: "force"}
-# types of function and abscissa of a time record: time response over time or what is not said; what is not
-# said over time
+# types of function and abscissa of a time record: time response over time or unspecified; unspecified over
+# time
 _OVER_TIME = {(1, 17), (1, 0), (0, 17)}
 _ROTATIONS = (4, 5, 6)
 # digits of the times of an uneven function in text; of a step, what one more digit would show
@@ -25,7 +25,7 @@ _DIGITS, _COARSE = 6, 0.1
 
 
 def read_uff(path: Path, names: Mapping[str, str]) -> Found:
-    """Functions over time; displacement is x, velocity v, force force, or as `id1` says."""
+    """Functions over time; displacement is x, velocity v, force force, or the column in `id1`."""
     check_whole(path)
     sets = library("pyuff", path, "formats").UFF(str(path)).read_sets()
     sets = [sets] if isinstance(sets, dict) else sets
@@ -39,15 +39,17 @@ def read_uff(path: Path, names: Mapping[str, str]) -> Found:
             key, colon, value = (word.strip() for word in line.partition(":"))
             if colon:
                 found.key(key, value)
-        said = str(one.get("id1", "")).strip()
-        name = column_of(said, names)
+        own = str(one.get("id1", "")).strip()
+        name = column_of(own, names)
         if not is_column(name) and not names:
             name = _OF_TYPE.get(one.get("ordinate_spec_data_type"), "")
         if not is_column(name):
-            found.unused.append(said or "NONE")
+            found.unused.append(own or "NONE")
             continue
         if name in found.values:
-            raise SeparatrixError(f"{path}: two functions are '{name}': say which in their first line (id1)")
+            raise SeparatrixError(
+                f"{path}: two functions are '{name}': state which in their first line (id1)"
+            )
         found.values[name] = _values(path, name, one)
         times[name] = np.asarray(one["x"], float)
         unit = _unit(name, one, units)
@@ -86,14 +88,14 @@ def _units(path: Path, sets: list[dict]) -> FileUnits | None:
 
 
 def _unit(name: str, one: dict, units: FileUnits | None) -> str:
-    """The unit of a function, by its label and by data set 164; '' where the file says nothing."""
+    """The unit of a function, by its label and by data set 164; '' where the file states none."""
     label = str(one.get("ordinate_axis_units_lab", "")).strip()
     label = label if is_stated(label) else ""
     kind = kind_of(name)
     if units is None or kind == "phi":
         return label
     if units.problem:
-        # no unit: refused, or the user says which
+        # no unit: refused, or stated by the user
         return "unknown: code and factors of data set 164 disagree"
     length, force = units.length, units.force
     turns = abs(one.get("rsp_dir") or 0) in _ROTATIONS
@@ -103,13 +105,13 @@ def _unit(name: str, one: dict, units: FileUnits | None) -> str:
         over = {"x": "", "v": "/s", "a": "/s^2"}[kind]
         unit = f"rad{over}" if turns else f"{1 / length!r} m{over}"
     if label and not same_unit(kind, label, unit):
-        # no unit: refused, or the user says which
+        # no unit: refused, or stated by the user
         return f"{label} by its label, {unit} by data set 164"
     return label or unit
 
 
 def _check_times(path: Path, name: str, one: dict, t: np.ndarray, notes: list[str]) -> None:
-    """Tell the rate of even times, and refuse uneven ones whose digits hide the steps."""
+    """Report the rate of even times, and refuse uneven ones whose digits hide the steps."""
     if one.get("abscissa_spacing"):
         step = float(one.get("abscissa_inc") or 0.0)
         if step > 0:

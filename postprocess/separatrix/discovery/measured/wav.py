@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Records in WAV files: numbers over full scale, whose size the user says."""
+"""Records in WAV files: numbers over full scale, whose size the user states."""
 
 import warnings
 from collections.abc import Mapping
@@ -15,27 +15,27 @@ from separatrix.errors import SeparatrixError
 
 FULL_SCALE = "full scale"
 """The unit of such numbers."""
-# what SciPy says of chunks that hold no samples
+# warning of SciPy on chunks without samples
 _HARMLESS = "Chunk (non-data) not understood"
 
 
 def read_wav(path: Path, names: Mapping[str, str]) -> Found:
     """Channels 1, 2, ... as shares of full scale (of integers) or as they are; the only one is x."""
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
         rate, samples = wavfile.read(path)
-    for one in said:
+    for one in raised:
         if not str(one.message).startswith(_HARMLESS):
             raise SeparatrixError(f"{path}: is damaged: {one.message}")
     channels = samples[:, None] if samples.ndim == 1 else samples
     if rate <= 0 or not channels.size:
         raise SeparatrixError(f"{path}: {len(channels)} samples at {rate} Hz")
     found = Found({"t": np.arange(len(channels)) / rate}, {"t": "s"}, [f"{rate} samples a second"])
-    for place, channel in enumerate(channels.T, start=1):
-        only = "x" if channels.shape[1] == 1 and not names else str(place)
-        name = column_of(only, names)
+    for number, channel in enumerate(channels.T, start=1):
+        own = "x" if channels.shape[1] == 1 and not names else str(number)
+        name = column_of(own, names)
         if not is_column(name):
-            found.unused.append(only)
+            found.unused.append(own)
             continue
         found.units[name] = FULL_SCALE
         found.values[name] = _shares(name, channel, found.notes)
@@ -43,7 +43,7 @@ def read_wav(path: Path, names: Mapping[str, str]) -> Found:
 
 
 def _shares(name: str, channel: np.ndarray, notes: list[str]) -> np.ndarray:
-    """Integers over full scale; what stands at its end may have been beyond."""
+    """Integers over full scale; values at its ends may be clipped."""
     if channel.dtype.kind == "f":
         return channel.astype(float)
     middle = 128 if channel.dtype == np.uint8 else 0

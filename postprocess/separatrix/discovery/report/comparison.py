@@ -45,7 +45,7 @@ class Start:
 def compare(
     base: Path, extended: Path, verdict: dict, details: h5py.File, progress: Callable[[str, float], None]
 ) -> Section:
-    """The section with both figures, or with the sentence that says why they are missing."""
+    """The section with both figures, or with the reason why they are missing."""
     section = Section("motion", "What it means for the motion")
     reason = _reason(verdict)
     try:
@@ -89,8 +89,8 @@ def _fill(
     drives = [one["drive_frequency"] for one in verdict["records"]]
     span = (min(drives) * (1 - _ROOM), max(drives) * (1 + _ROOM))
     sweeps = {}
-    for place, (stage, case) in enumerate(cases.items()):
-        progress(f"sweeping the drive of the {_label(stage)}", 0.91 + 0.03 * place)
+    for number, (stage, case) in enumerate(cases.items()):
+        progress(f"sweeping the drive of the {_label(stage)}", 0.91 + 0.03 * number)
         sweeps[stage] = sweep(program, case, [one / unit[stage] for one in span], folder / f"{stage}.h5")
     held = [one["name"] for one in verdict["records"] if one["use"] == "held out"]
     marks = {one["name"]: one["drive_frequency"] for one in verdict["records"]}

@@ -20,7 +20,7 @@ from separatrix.open import reading
 def write_report(folder: Path, base: Path, options: Options | None = None) -> tuple[Path, Path]:
     """Write both files from what separatrix-discover left in `folder`; `base` is the case that was compared.
 
-    Quick options run no maps. Where no PDF can be written there is none, and the progress says why.
+    Quick options run no maps. If no PDF can be written, the progress reports the reason.
     """
     options = options or Options()
     options.progress("writing the report", 0.9)
@@ -90,7 +90,7 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         figures.confusability(verdict),
         "Cosine between what is left of the signatures of two effects when the base machine is refitted; "
         "at 1 these "
-        "records cannot tell the two apart.",
+        "records do not distinguish the two.",
     )
     _show(
         by_key["residuals"],
@@ -123,7 +123,7 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
 
 
 def _first_page(section: Section, verdict: dict) -> None:
-    """The gap before and after, and the function that the effect is, below what the verdict says."""
+    """The gap before and after, and the effect as a function, below the verdict."""
     shown = [
         Picture(
             "gap",
@@ -137,8 +137,8 @@ def _first_page(section: Section, verdict: dict) -> None:
             Picture(
                 "function",
                 figures.function(verdict["function"]),
-                "The effect as a function, as the records tell it, with its 95 % band, and the closed forms "
-                "that fit. Dots: the table that the corrected case has, where it has one.",
+                "The effect as a function, estimated from the records, with its 95 % band, and the closed "
+                "forms that fit. Dots: the table that the corrected case has, where it has one.",
             )
         )
     section.body.insert(1, Beside(shown))

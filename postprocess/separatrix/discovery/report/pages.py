@@ -26,7 +26,7 @@ class Table:
 
 @dataclass
 class Picture:
-    """A figure and the caption that says what it shows."""
+    """A figure and its caption."""
 
     name: str
     figure: Figure

@@ -48,7 +48,7 @@ def sections(verdict: dict) -> list[Section]:
         Section("confusable", "What can be mistaken for what", [_confusable(verdict)]),
         Section("residuals", "What is left over, before and after", []),
         Section("impacts", "Impacts", []),
-        Section("held-out", "On records that the fit never saw", [_foretold(verdict)]),
+        Section("held-out", "On records that the fit never saw", [_held_out(verdict)]),
         _parameters(verdict),
         _detectable(verdict),
         _experiment(verdict),
@@ -68,7 +68,7 @@ def depends_on(verdict: dict) -> str:
 
 def _summary(verdict: dict) -> Section:
     others = ", ".join(_pair(name) for name in verdict["alternatives"])
-    said = {
+    text = {
         "named": f"The base machine lacks: {names(verdict)}. "
         + (
             "All gates are passed."
@@ -82,9 +82,9 @@ def _summary(verdict: dict) -> Section:
         "characterised": f"Something is missing, and no effect of {searched(verdict)} explains it; "
         f"it is known on what it depends: {depends_on(verdict)}.",
     }[verdict["outcome"]]
-    lines = [f"Verdict: {verdict['outcome']}. {said}"]
-    for place, one in enumerate(verdict["character"]):
-        lines.append(f"{'Or ' if place else 'Most likely '}{one['text']}.")
+    lines = [f"Verdict: {verdict['outcome']}. {text}"]
+    for index, one in enumerate(verdict["character"]):
+        lines.append(f"{'Or ' if index else 'Most likely '}{one['text']}.")
     if verdict["added"]:
         lines.append(
             f"It is added to the case as a table, effect.{verdict['added'][-1]}: no name, but the function "
@@ -96,7 +96,7 @@ def _summary(verdict: dict) -> Section:
         lines.append(
             f"In any case it is {' and '.join(verdict['in_families'])}: the form is in doubt, not the family."
         )
-    lines += [f"{words(name)} sits {place}." for name, place in verdict["places"].items()]
+    lines += [f"{words(name)} acts {location}." for name, location in verdict["locations"].items()]
     for path in of_effects(verdict):
         one = verdict["parameters"][path]
         digits = digits_of(one["value"], one["standard_error"])
@@ -196,9 +196,8 @@ def _gap(verdict: dict) -> Section:
         [
             "Reduced chi^2: mean square of the residuals over that of the noise.",
             Table(["records", "base machine", "extended machine", "noise", "excess removed"], rows),
-            "What a free force that depends on one thing would gain over the base machine; a small p says "
-            "that there is "
-            "something to be gained there, by whatever law:",
+            "Gain of a free force of one variable over the base machine; a small p indicates that some law "
+            "of this variable is missing:",
             Table(["a force that depends on", "chi^2", "free numbers", "p"], explained),
         ],
     )
@@ -213,17 +212,17 @@ def _removed(one: dict) -> str:
 
 def _where(verdict: dict) -> Section:
     if not verdict["where"]:
-        said: list = ["No bin of any map differs from zero by more than chance."]
+        body: list = ["No bin of any map differs from zero by more than chance."]
     else:
         no_gap = ["There is no gap: what follows is what noise and small imperfections of a rig leave."]
-        said = [
+        body = [
             *(no_gap if verdict["outcome"] == "none" else []),
             "In each bin a constant force is fitted to what the base machine leaves over. These bins "
             "differ from zero by "
             "more than chance, given how many bins there are:",
             [one["text"] + "." for one in verdict["where"]],
         ]
-    return Section("where", "Where is it?", said)
+    return Section("where", "Where is it?", body)
 
 
 def _missing(verdict: dict) -> Section:
@@ -241,7 +240,7 @@ def _missing(verdict: dict) -> Section:
         body.append("No effect gained enough to be put to the gates, or none passed them.")
     if verdict["alternatives"]:
         body.append(
-            "Not told apart from: " + ", ".join(_pair(name) for name in verdict["alternatives"]) + "."
+            "Not distinguished from: " + ", ".join(_pair(name) for name in verdict["alternatives"]) + "."
         )
     if verdict["equivalences"]:
         body += ["These are the same motion:", [f"{text}." for text in verdict["equivalences"]]]
@@ -292,13 +291,13 @@ def _confusable(verdict: dict) -> str:
     if not close:
         return "No two signatures have a cosine above 0.9 once the base machine is refitted."
     return (
-        "Cosine of the signatures of two effects, the base machine refitted: at 1 these records cannot "
-        "tell them apart. "
+        "Cosine of the signatures of two effects, the base machine refitted: at 1 these records do not "
+        "distinguish them. "
         "Above 0.9: " + ", ".join(close[:12]) + (f" and {len(close) - 12} more." if len(close) > 12 else ".")
     )
 
 
-def _foretold(verdict: dict) -> str:
+def _held_out(verdict: dict) -> str:
     if "held_out" not in verdict["gap"]:
         return "No record was held out."
     one = verdict["gap"]["held_out"]
@@ -342,7 +341,7 @@ def _detectable(verdict: dict) -> Section:
         [words(name), one["path"] or "-", with_unit(one["size"], one["unit"], 3), one["reason"]]
         for name, one in verdict["detectable"].items()
     ]
-    said = (
+    text = (
         f"The size that each effect would need to stand out by {Options().visible:g} standard errors in "
         "these records. "
         "What is smaller may be there and could not have been seen."
@@ -350,7 +349,7 @@ def _detectable(verdict: dict) -> Section:
     return Section(
         "detectable",
         "What could not have been seen",
-        [said, Table(["effect", "parameter", "smallest size", "why not known"], rows)],
+        [text, Table(["effect", "parameter", "smallest size", "why not known"], rows)],
     )
 
 
@@ -366,20 +365,20 @@ def _experiment(verdict: dict) -> Section:
             ]
             for one in verdict["experiments"]
         ]
-        said = f"To tell apart what remains: {verdict['separating_experiment']}."
+        text = f"To separate what remains: {verdict['separating_experiment']}."
         header = (
             ["times as fast", "amplitude over that of the first record", "standard errors apart"]
             if faster
             else ["drive ratio", "drive (or start) over that of the first record", "standard errors apart"]
         )
-        return Section("next", "What to measure next", [said, *([Table(header, rows)] if rows else [])])
+        return Section("next", "What to measure next", [text, *([Table(header, rows)] if rows else [])])
     elif verdict["outcome"] == "ambiguous":
-        said = (
-            "No experiment was found that would tell the candidates apart. Experiments are worked out for "
+        text = (
+            "No experiment was found that would separate the candidates. Experiments are worked out for "
             "one body, driven or free, without a force that must be measured."
         )
     elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
-        said = "The maps above show where to look for a law that the catalogue lacks."
+        text = "The maps above show where to look for a law that the catalogue lacks."
     else:
-        said = "Nothing stays ambiguous."
-    return Section("next", "What to measure next", [said])
+        text = "Nothing stays ambiguous."
+    return Section("next", "What to measure next", [text])

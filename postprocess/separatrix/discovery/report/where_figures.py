@@ -44,8 +44,8 @@ def where_lines(details: h5py.File) -> Figure | None:
         unit = details["where"][name].attrs["unit"]
         ax.set_xlabel(f"{name} ({unit})")
         ax.set_title(f"{letter})", loc="left")
-    for place, (ax, name) in enumerate(zip(axes, names, strict=False)):
-        if place % 3 == 0 or name == IMPACT_SPEED:
+    for index, (ax, name) in enumerate(zip(axes, names, strict=False)):
+        if index % 3 == 0 or name == IMPACT_SPEED:
             ax.set_ylabel(f"missing {quantity_of(name)} ({details['where'][name].attrs['force_unit']})")
     handles = [
         Line2D([], [], linestyle="", marker="o", color=BEFORE, markersize=3.5, label="flagged"),

@@ -72,9 +72,9 @@ class Viewer {
     this.legend = h("div");
     this.table = h("div", { class: "scroll" });
     this.hovered = h("div", { class: "values", "aria-live": "polite" });
-    this.told = h("p", { class: "note", role: "status" });
+    this.status = h("p", { class: "note", role: "status" });
     this.tools = h("div", { class: "bar" });
-    this.left = h("div", {}, this.controls, this.canvas, this.tools, this.told, this.sliders, this.legend, this.hovered,
+    this.left = h("div", {}, this.controls, this.canvas, this.tools, this.status, this.sliders, this.legend, this.hovered,
       h("p", { class: "note", id: "separatrix-keys" }, "Drag or Shift + arrows: pan. Wheel, pinch, + and −: zoom. Arrows: move the cursor. Enter or click: the motion from there. 0: everything."));
     this.right = h("div", {}, h("section", { "aria-label": "Attractors" }, h("h2", {}, "Attractors"), this.table), this.panel.element);
     this.header = h("header", {}, h("h1", {}, title), h("span", { class: "note" }, this.described.files.map((file) => file.name).join(", ")));
@@ -83,7 +83,7 @@ class Viewer {
     this.map = new MapView(this.canvas, {
       hover: (place, keyed) => this.inspector.hover(place, keyed), pick: (place) => this.starter.pick(place), moved: () => this.moved(),
     });
-    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => { fill(this.told, text); this.inspector.again(); });
+    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => { fill(this.status, text); this.inspector.again(); });
     this.map.live = this.live;
   }
 
@@ -159,10 +159,10 @@ class Viewer {
       h("button", { onclick: () => this.map.reset() }, "Everything"),
       live ? check("follow", "motion under the mouse", false, () => {}) : null,
       live ? check("live", "compute where the file has no more points", true, () => this.moved()) : null,
-      live ? h("button", { onclick: () => { this.live.number++; this.live.halt(); fill(this.told, "stopped"); } }, "Stop") : null,
+      live ? h("button", { onclick: () => { this.live.number++; this.live.halt(); fill(this.status, "stopped"); } }, "Stop") : null,
       live && this.described.keeps ? h("button", { onclick: () => this.keep() }, "Keep this view as a file") : null,
       h("button", { onclick: () => this.canvas.toBlob((blob) => save(blob, "map.png")) }, "PNG"));
-    if (this.file.no_motions) fill(this.told, `No motions: ${this.file.no_motions}`);
+    if (this.file.no_motions) fill(this.status, `No motions: ${this.file.no_motions}`);
     this.buildSliders();
   }
 
@@ -364,7 +364,7 @@ class Viewer {
     const fine = inside && Math.max(...this.map.perPixel) < 0.6;
     const beyond = (v.a0 < -0.6 || v.b0 < -0.6 || v.a1 > axes[0].count - 0.4 || v.b1 > axes[1].count - 0.4);
     const wanted = this.transport.live && this.checks.live && this.checks.live.checked && (fine || changed || beyond);
-    if (!wanted && this.transport.live) fill(this.told, "");
+    if (!wanted && this.transport.live) fill(this.status, "");
     this.live.restart(this.map, wanted);
   }
 
@@ -373,12 +373,12 @@ class Viewer {
     const columns = Math.round(width), rows = Math.round(height);
     const da = (v.a1 - v.a0) / columns, db = (v.b1 - v.b0) / rows;
     const lattice = one && one.stride === 1 ? { a: one.a, da: one.da, b: one.b, db: one.db, columns: one.columns, rows: one.rows } : { a: v.a0 + da / 2, da, b: v.b0 + db / 2, db, columns, rows };
-    fill(this.told, "computing and writing …");
+    fill(this.status, "computing and writing …");
     try {
       const answer = await this.transport.ask("keep", { ...this.place(), page: this.live.page, view: this.live.number, ...lattice }, { act: true });
-      fill(this.told, `wrote ${answer.written}`);
+      fill(this.status, `wrote ${answer.written}`);
     } catch (error) {
-      fill(this.told, "nothing was written");
+      fill(this.status, "nothing was written");
       this.fail(error);
     }
   }

@@ -37,7 +37,7 @@ export class Starter {
   }
 
   async pick(place) {
-    if (this.viewer.file.no_motions) return fill(this.viewer.told, `No motions: ${this.viewer.file.no_motions}`);
+    if (this.viewer.file.no_motions) return fill(this.viewer.status, `No motions: ${this.viewer.file.no_motions}`);
     const { request, mark } = this.startAt(place);
     const token = (this.picking = {});
     try {

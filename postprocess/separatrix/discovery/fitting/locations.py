@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sizes of motion and forces at the places of a machine of several bodies, along a fitted motion."""
+"""Scales of motion and forces at the locations of a machine of several bodies, along a fitted motion."""
 
 from dataclasses import dataclass
 
@@ -10,17 +10,17 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.measured.bodies import Structure, structure_of
 
-# stretch or speed over the largest at any place, below which nothing moves there
+# extension or speed over the largest at any location, below which nothing moves there
 _STILL = 1e-9
-# of the friction of the case, below which a fitted one says nothing of its size
+# share of the friction of the case below which a fitted one does not determine its size
 _LOST_FRICTION = 0.1
 
 
 @dataclass(frozen=True)
-class PlaceScales:
-    """Of a place, in SI units: mass that a force moves, stretch, speed, force, impact speed (0: none).
+class LocationScales:
+    """Of a location, in SI units: mass that a force moves, extension, speed, force, impact speed (0: none).
 
-    Of a friction of the case also its force.
+    For a friction of the case also its force.
     """
 
     mass: float
@@ -33,21 +33,21 @@ class PlaceScales:
 
 @dataclass(frozen=True)
 class SensedScales:
-    """Typical sizes in the records, by place and joint."""
+    """Typical sizes in the records, by location and joint."""
 
-    places: dict[str, PlaceScales | None]
-    # of what forces are over; they are counted on the coordinates themselves
+    locations: dict[str, LocationScales | None]
+    # divisor of forces, which act on the coordinates themselves
     mass: float = 1.0
     # joints whose force is a column
     measured: frozenset[str] = frozenset()
 
-    def at(self, name: str) -> PlaceScales | None:
-        """Sizes at a place, or joint; None where nothing moves."""
-        return self.places.get(name)
+    def at(self, name: str) -> LocationScales | None:
+        """Scales at a location, or joint; None where nothing moves."""
+        return self.locations.get(name)
 
 
-def place_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
-    """Measure all places along the motion of a fit."""
+def location_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
+    """Measure all locations along the motion of a fit."""
     structure = structure_of(problem.model)
     inside = problem.segments.inside & fit.good[:, None]
     if not inside.any():
@@ -59,9 +59,10 @@ def place_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
     both = inside[:, 1:] & inside[:, :-1]
     interval = float(np.median([one.record.interval for one in problem.prepared]))
     rates = steps[both] / interval
-    found: dict[str, PlaceScales | None] = {}
+    found: dict[str, LocationScales | None] = {}
     largest = float(np.max(np.std(motion[:, :n], axis=0)))
-    rows = {one.name: one.row for one in structure.places} | {one.path: one.row for one in structure.joints}
+    rows = {one.name: one.row for one in structure.locations}
+    rows |= {one.path: one.row for one in structure.joints}
     for name, row in rows.items():
         length = float(np.std(motion[:, :n] @ row))
         speed = float(np.sqrt(np.mean((motion[:, n:] @ row) ** 2)))
@@ -70,7 +71,7 @@ def place_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
             continue
         mass = 1 / float(row @ (row / structure.mass))
         size = float(np.median(np.abs(rates @ row)) / 0.6745)
-        found[name] = PlaceScales(
+        found[name] = LocationScales(
             mass,
             length,
             speed,
