@@ -45,6 +45,12 @@ def boundary(
         The result file. Without one the result is kept in memory.
     ranks, progress, overwrite
         As for `basin`; what is counted are edges of cells. Ctrl-C is a KeyboardInterrupt, nothing is kept.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> sx.boundary(result).attrs["kind"]
+    'boundary'
     """
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
         target = (Path(folder) / "boundary.h5" if output is None else Path(output).expanduser()).absolute()

@@ -27,6 +27,11 @@ class linspace:  # noqa: N801
     """`count` values from `first` to `last`, both exact: an axis in two numbers and a count.
 
     The ends are numbers in SI units or texts with a unit.
+
+    Examples
+    --------
+    >>> sx.linspace("-3 mm", "3 mm", 5)
+    linspace('-3 mm', '3 mm', 5)
     """
 
     def __init__(self, first: float | str, last: float | str, count: int) -> None:
@@ -44,6 +49,12 @@ class Case:
     """A case that has been read and found right; use `load`, `Case.from_text` or `Case.from_dict`.
 
     Two cases are equal if they describe the same machine and the same work, however they were written.
+
+    Examples
+    --------
+    >>> case = sx.load("examples/basin_coulomb.toml")
+    >>> case.with_({"drive.ratio": 1.3}).parameters["drive.ratio"].value
+    1.3
     """
 
     def __init__(
@@ -194,7 +205,13 @@ class Case:
 
 
 def load(path: str | Path) -> Case:
-    """Read a case file. CaseError names file, line, key, what was found and what is allowed."""
+    """Read a case file. CaseError names file, line, key, what was found and what is allowed.
+
+    Examples
+    --------
+    >>> sx.load("examples/basin_coulomb.toml").title
+    'Basins at frequency ratio 1.2, Coulomb friction'
+    """
     if not isinstance(path, str | PathLike):
         raise CaseError(f"load: found {path!r}, allowed the name of a file", USAGE)
     path = Path(path).expanduser()

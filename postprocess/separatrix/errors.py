@@ -39,7 +39,16 @@ class SeparatrixError(Exception):
 
 
 class CaseError(SeparatrixError):
-    """A case, a value or a call that the simulator refuses; `code` is that of the program."""
+    """A case, a value or a call that the simulator refuses; `code` is that of the program.
+
+    Examples
+    --------
+    >>> case = sx.load("examples/basin_coulomb.toml")
+    >>> case.with_({"contact.restitution": 1.5})
+    Traceback (most recent call last):
+        ...
+    separatrix.errors.CaseError: ...key 'contact.restitution': found 1.5, allowed from 0.0 to 1.0
+    """
 
 
 class GivenUpError(SeparatrixError):

@@ -358,7 +358,13 @@ class Model:
 
 @functools.cache
 def effects() -> dict[str, Effect]:
-    """Return the catalogue of effects that may be added to a case, by name, as the tables of laws have it."""
+    """Return the catalogue of effects that may be added to a case, by name, as the tables of laws have it.
+
+    Examples
+    --------
+    >>> list(sx.effects())[:2]
+    ['viscous', 'coulomb']
+    """
     found: dict[str, Effect] = {}
     parameters: dict[str, dict[str, Parameter]] = {}
     meanings: dict[str, str] = {}

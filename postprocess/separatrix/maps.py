@@ -185,6 +185,15 @@ def basin(
 
     Ctrl-C raises `Interrupted`, a KeyboardInterrupt whose `resume()` goes on. What is wrong in the case is a
     `CaseError` with the message of the program.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> result.separatrix.attractors[["regime", "share"]].round(2)
+                   regime  share
+    attractor
+    1          non_impact   0.35
+    2              impact   0.65
     """
     case = with_axes(as_case(case), {**(axes or {}), **_paths(more)})
     sizes = [_size(axis) for axis in case.resolved.get("axis", [])]
@@ -245,6 +254,12 @@ def sweep(
     output, ranks, progress, resume, overwrite, time_limit
         As for `basin`. A sweep runs on one core, or on `ranks` of MPI: each value begins where the one
         before ended.
+
+    Examples
+    --------
+    >>> result = sx.sweep("examples/sweep_viscous.toml", "drive.ratio", (0.9, 1.0, 3))
+    >>> result["amplitude"].dims
+    ('direction', 'drive_ratio')
     """
     case = as_case(case)
     table = dict(case.resolved.get("sweep", {}))
@@ -286,6 +301,12 @@ def points(
     `starts` has the columns x0 [m], v0 [m/s] and optionally the drive ratio: a mapping, a DataFrame, a
     Dataset, or an array with two or three columns; or each as a keyword, `points(case, x0=[...], v0=0.0)`.
     The rest is as for `basin`.
+
+    Examples
+    --------
+    >>> result = sx.points("examples/basin_coulomb.toml", x0=[0.7, 0.7], v0=[2.0, 4.0])
+    >>> sx.decode_flags(result["regime"]).values.tolist()
+    ['non_impact', 'impact']
     """
     case = as_case(case)
     table = _starts(case, starts, columns)

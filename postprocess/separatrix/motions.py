@@ -57,6 +57,12 @@ def trajectory(
         Samples per drive period, two or more; those of the case if not given.
     partial
         Return a motion that was given up as far as it went; its attribute `reason` is the cause.
+
+    Examples
+    --------
+    >>> motion = sx.trajectory("examples/basin_coulomb.toml", x0="400 mm", v0=0, duration=10)
+    >>> int((sx.decode_flags(motion["event_kind"]) == "impact_upper").sum())
+    17
     """
     case = as_case(case)
     if isinstance(duration, str):

@@ -31,6 +31,13 @@ def open_result(path: str | Path) -> xr.Dataset:
     The groups `/catalogue` and `/limits` are part of it as `catalogue_*` and `limits_*` (see `table`),
     the texts and attributes of `/provenance` are attributes (`resolved_case`, `provenance_version`, ...).
     Raises SeparatrixError for a missing, foreign, incomplete or too new file.
+
+    Examples
+    --------
+    >>> _ = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20, output="map.h5")
+    >>> with sx.open_result("map.h5") as result:
+    ...     dict(result["attractor"].sizes)
+    {'x0': 20, 'v0': 20}
     """
     if Path(path).is_file():
         try_first(path, lambda: _read_header(Path(path)))
@@ -69,7 +76,14 @@ def reading(path: str | Path) -> Iterator[None]:
 
 
 def table(result: xr.Dataset, name: str) -> xr.Dataset:
-    """Return the catalogue or the limits of an opened file as a Dataset; empty if there is none."""
+    """Return the catalogue or the limits of an opened file as a Dataset; empty if there is none.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> sx.table(result, "catalogue")["period"].values.tolist()
+    [1, 1]
+    """
     prefix = f"{name}_"
     return xr.Dataset(
         {key.removeprefix(prefix): var for key, var in result.data_vars.items() if key.startswith(prefix)}
@@ -77,7 +91,14 @@ def table(result: xr.Dataset, name: str) -> xr.Dataset:
 
 
 def flag_names(variable: xr.DataArray) -> dict[int, str]:
-    """Return the meaning of each code of a coded variable."""
+    """Return the meaning of each code of a coded variable.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> sx.flag_names(result["regime"])[2]
+    'impact'
+    """
     values = np.atleast_1d(variable.attrs.get("flag_values", []))
     names = _text(variable.attrs.get("flag_meanings", "")).split()
     try:
@@ -89,7 +110,14 @@ def flag_names(variable: xr.DataArray) -> dict[int, str]:
 
 
 def decode_flags(variable: xr.DataArray) -> xr.DataArray:
-    """Return a coded variable as text: `regime` 1 -> 'non_impact'. Unknown codes are shown as numbers."""
+    """Return a coded variable as text: `regime` 1 -> 'non_impact'. Unknown codes are shown as numbers.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> str(sx.decode_flags(result["regime"]).values[0, 0])
+    'impact'
+    """
     names = flag_names(variable)
     codes, where = np.unique(variable.values, return_inverse=True)
     texts = np.array([names.get(code, str(code)) for code in codes.tolist()], dtype=object)
@@ -97,7 +125,14 @@ def decode_flags(variable: xr.DataArray) -> xr.DataArray:
 
 
 def decode_words(variable: xr.DataArray) -> xr.DataArray:
-    """Return a variable of event words as text."""
+    """Return a variable of event words as text.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> str(sx.decode_words(result["event_word"]).values[0, 0])
+    'R.'
+    """
     words, where = np.unique(variable.values, return_inverse=True)
     texts = np.array([decode_word(word) for word in words], dtype=object)
     return variable.copy(data=texts[where].reshape(variable.shape))

@@ -93,6 +93,13 @@ def branches(
         kept.
 
     `.separatrix.plot()` draws them, `.separatrix.labelled_points` is the table of their bifurcations.
+
+    Examples
+    --------
+    >>> case = sx.load("examples/basin_coulomb.toml")
+    >>> result = sx.branches(case, "drive.ratio", 1.05, 1.1, searches=2)
+    >>> bool(result["stable"].all())
+    True
     """
     case = as_case(case)
     case = with_axes(case, {name: _ends(name, given) for name, given in (("x0", x0), ("v0", v0)) if given})
@@ -137,6 +144,12 @@ def stability(
         The start: numbers [m, m/s, rad] or texts with a unit; what is not given is that of the case.
     periods
         Drive periods watched, after a quarter as many, 64 or more; 20000 if not given.
+
+    Examples
+    --------
+    >>> found = sx.stability("examples/basin_coulomb.toml", x0=0.4, v0=0)
+    >>> found.motion, round(found.exponents[0], 3)
+    ('periodic', -1.337)
     """
     given = {"start.x0": x0, "start.v0": v0, "start.crank_angle": crank_angle}
     case = as_case(case).with_(
@@ -166,6 +179,12 @@ def stability_of_map(
         Drive periods watched, after a quarter as many, 64 or more; 20000 if not given.
     progress
         As for `basin`, where the map has to be computed. Ctrl-C is a KeyboardInterrupt.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> sx.stability_of_map(result)
+    {}
     """
     events: list[dict] = []
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:

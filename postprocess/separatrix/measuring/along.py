@@ -65,6 +65,13 @@ def measures_along(
     The Dataset has dimensions of the parameter and `basin` (numbers of the attractors), and for each measure
     NAME, NAME_lower and NAME_upper; nan where the attractor is not there, or nothing is known. `exists` tells
     whether an attractor is in the catalogue of a value, `limits` what limits the measures.
+
+    Examples
+    --------
+    >>> case, axes = sx.load("examples/basin_coulomb.toml"), {"x0": 20, "v0": 20}
+    >>> along = sx.measures_along(case, "drive.ratio", [1.2, 1.21], names="integrity_factor", axes=axes)
+    >>> along["integrity_factor"].sizes["drive_ratio"]
+    2
     """
     chosen = (names,) if isinstance(names, str) and names != "all" else names
     chosen = chosen if chosen is None else NAMES if chosen == "all" else tuple(chosen)

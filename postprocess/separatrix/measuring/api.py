@@ -88,6 +88,13 @@ def measures(
         Threads of this process; None: one for each core.
     new_starts
         False: everything is read from the map; what needs new starts is not known.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> found = sx.measures(result, "integrity_factor", attractors=1)
+    >>> found["integrity_factor"].unit
+    'm'
     """
     chosen = _chosen(names, phases)
     if phases is not None and phases < 2:
@@ -204,6 +211,14 @@ def tipping(before: xr.Dataset | str | Path, after: xr.Dataset | str | Path) -> 
 
     The machine has changed between the two at once (a jump of a parameter); numbers are those of either map's
     own catalogue.
+
+    Examples
+    --------
+    >>> case = sx.load("examples/basin_coulomb.toml")
+    >>> before = sx.basin(case, x0=20, v0=20)
+    >>> after = sx.basin(case.with_({"drive.ratio": 1.21}), x0=20, v0=20)
+    >>> sx.tipping(before, after).shares.shape
+    (2, 3)
     """
     one, other = (open_result(item) if isinstance(item, str | Path) else item for item in (before, after))
     for result in (one, other):

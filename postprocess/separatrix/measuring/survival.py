@@ -57,6 +57,13 @@ def survival(
         How many motions are struck, all from the attractor at random crank angles.
     seed, threads
         What is drawn depends on the seed; the result does not depend on `threads`.
+
+    Examples
+    --------
+    >>> result = sx.basin("examples/basin_coulomb.toml", x0=20, v0=20)
+    >>> alive = sx.survival(result, 2, rate=0.05, deviation=1.0, motions=20)
+    >>> 0 <= float(alive["survival"][-1]) <= 1
+    True
     """
     if not (rate > 0 and deviation > 0 and motions >= 10):
         raise SeparatrixError("survival: allowed are rate > 0, deviation > 0 and motions from 10", USAGE)
