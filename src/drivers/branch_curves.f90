@@ -6,6 +6,7 @@ module branch_curves
   use bifurcation_curve, only: can_be_followed, curve_t, passes, trace_curve
   use branch_point, only: label_names, last_label, no_label, point_t
   use branch_search, only: search_t
+  use branches_setup, only: read_end
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names, parameter_value
   use case_type, only: case_t
   use case_values, only: allowed_range, bounds_t
@@ -55,8 +56,11 @@ contains
       call fail(error, exit_bad_case, "--free: found '"//name//"', allowed another one of "//parameter_names(the_case%laws))
       return
     end if
-    given = [command%has_free_from, command%has_free_to]
-    range = [command%free_from, command%free_to]
+    given = .false.
+    range = 0
+    call read_end('--free-from', command%free_from, bounds, range(1), given(1), error)
+    if (.not. allocated(error)) call read_end('--free-to', command%free_to, bounds, range(2), given(2), error)
+    if (allocated(error)) return
     do i = 1, size(the_case%axes)
       if (the_case%axes(i)%name /= name) cycle
       if (.not. given(1)) range(1) = minval(the_case%axes(i)%values)

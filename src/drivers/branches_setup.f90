@@ -15,11 +15,12 @@ module branches_setup
   use kinds, only: wp
   use machine_family, only: fly_to_section, machine_of_family, starts_of_section
   use status, only: exit_bad_case
-  use text, only: to_text
+  use text, only: parse_number, to_text
+  use units, only: allowed_units, read_quantity
   implicit none
   private
 
-  public :: set_range, set_starts
+  public :: read_end, set_range, set_starts
 
   !> Starts at each value at which orbits are searched, and those nearer to rest; over which share of the range these are.
   integer, parameter :: starts = 48, near_starts = 16
@@ -55,9 +56,9 @@ contains
     do i = 1, size(the_case%axes)
       if (the_case%axes(i)%name == name) call take(the_case%axes(i)%values)
     end do
-    if (command%has_from) range(1) = command%from
-    if (command%has_to) range(2) = command%to
-    given = given .or. [command%has_from, command%has_to]
+    call read_end('--from', command%from, bounds, range(1), given(1), error)
+    if (.not. allocated(error)) call read_end('--to', command%to, bounds, range(2), given(2), error)
+    if (allocated(error)) return
     if (.not. all(given)) then
       call fail(error, exit_bad_case, '--from and --to are needed: the case has no sweep or axis of '//name)
       return
@@ -91,6 +92,24 @@ contains
     end subroutine take
 
   end subroutine set_range
+
+  !> An end of the range of a parameter: a number in its SI unit, or a text with a unit. Nothing is changed where `text` is ''.
+  subroutine read_end(option, text, bounds, value, given, error)
+    character(len=*), intent(in) :: option, text
+    type(bounds_t), intent(in) :: bounds
+    real(wp), intent(inout) :: value
+    logical, intent(inout) :: given
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: problem
+    integer :: status
+    if (len_trim(text) == 0) return
+    given = .true.
+    call parse_number(trim(adjustl(text)), value, status)
+    if (status == 0) return
+    call read_quantity(text, trim(bounds%unit), value, problem)
+    if (allocated(problem)) call fail(error, exit_bad_case, option//": found '"//trim(text)//"', allowed "// &
+                                      allowed_units(trim(bounds%unit)))
+  end subroutine read_end
 
   !> Starts over the ranges that the case has for x0 and v0, else over twice the size of the motion that the drive brings about;
   !> where it has none for either some within a quarter of that, too, and its own start, taken on to the section where that is at

@@ -41,13 +41,12 @@ module command_line
     character(len=4) :: device = 'auto'
     !> `branches`: the parameter, its range, and at how many values orbits are searched.
     character(len=:), allocatable :: parameter
-    real(wp) :: from = 0, to = 0
-    logical :: has_from = .false., has_to = .false.
+    !> The range as it was written, '' if it was not.
+    character(len=32) :: from = '', to = ''
     integer :: searches = 12
     !> A second parameter, over which its labels are followed, and its range.
     character(len=:), allocatable :: free
-    real(wp) :: free_from = 0, free_to = 0
-    logical :: has_free_from = .false., has_free_to = .false.
+    character(len=32) :: free_from = '', free_to = ''
     !> Homoclinic contacts are looked for.
     logical :: contacts = .false.
     !> `boundary`: invariant sets are grown within so many times the window of the map; 0 = none.
@@ -133,7 +132,7 @@ contains
       call fail(error, exit_usage, '--periods: found '//to_text(command%periods)//', allowed a whole number from 64')
     else if (command%name == 'branches' .and. len(command%parameter) == 0) then
       call fail(error, exit_usage, 'branches: --parameter NAME is missing, e.g. --parameter drive.ratio')
-    else if (len(command%free) == 0 .and. (command%has_free_from .or. command%has_free_to)) then
+    else if (len(command%free) == 0 .and. len_trim(command%free_from//command%free_to) > 0) then
       call fail(error, exit_usage, '--free-from and --free-to are the range of --free NAME, which is missing')
     else if (command%force .and. command%resume) then
       call fail(error, exit_usage, '--force starts anew and --resume goes on: choose one')
@@ -277,15 +276,15 @@ contains
     case ('--parameter')
       command%parameter = value
     case ('--from')
-      call read_end('the parameter', command%has_from, command%from)
+      call take_end(command%from)
     case ('--to')
-      call read_end('the parameter', command%has_to, command%to)
+      call take_end(command%to)
     case ('--free')
       command%free = value
     case ('--free-from')
-      call read_end('the second parameter', command%has_free_from, command%free_from)
+      call take_end(command%free_from)
     case ('--free-to')
-      call read_end('the second parameter', command%has_free_to, command%free_to)
+      call take_end(command%free_to)
     case ('--grow')
       call read_number_in(name, value, 0.0_wp, 1000.0_wp, 'windows', command%grow, error)
     case ('--searches')
@@ -299,13 +298,14 @@ contains
   contains
 
     !> An end of the range of a parameter.
-    subroutine read_end(what, has, number)
-      character(len=*), intent(in) :: what
-      logical, intent(out) :: has
-      real(wp), intent(out) :: number
-      has = .true.
-      call read_number_in(name, value, -huge(1.0_wp), huge(1.0_wp), what, number, error)
-    end subroutine read_end
+    !> One end of a range; which units it may have is known with the case.
+    subroutine take_end(text)
+      character(len=*), intent(out) :: text
+      text = value
+      if (len_trim(value) == 0 .or. len(value) > len(text)) then
+        call fail(error, exit_usage, name//": found '"//value//"', allowed a number, or one with a unit")
+      end if
+    end subroutine take_end
 
   end subroutine take_value
 

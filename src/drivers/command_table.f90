@@ -36,6 +36,7 @@ module command_table
       'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
       '  Searches orbits, stable and unstable, at several values; follows each through folds and grazes.'//nl// &
       '  Without --from and --to the range is that of the sweep or the axis of this parameter in the case.'//nl// &
+      '  A and B are numbers in SI units, or have a unit (--from "7 Hz").'//nl// &
       '  --searches N       values at which orbits are searched (default 12)'//nl// &
       '  --contacts         looks for homoclinic contacts and boundary crises of the saddles'//nl// &
       '  --free NAME        a second parameter, over which the labels found are followed as curves'//nl// &

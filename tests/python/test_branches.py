@@ -31,7 +31,7 @@ def run(separatrix: Path, source_dir: Path, tmp_path: Path):
     return run_it
 
 
-AMPLITUDE = ("--parameter", "drive.amplitude", "--from", "0.05", "--to", "0.3", "--searches", "3")
+AMPLITUDE = ("--parameter", "drive.amplitude", "--from", "50 mm", "--to", "0.3", "--searches", "3")
 
 
 def test_a_fold_beside_a_graze_is_in_the_file_the_log_and_the_figure(run):
@@ -190,6 +190,12 @@ def test_curves_in_two_parameters_meet_at_the_resonant_graze(run):
         (("--parameter", "body.mass"), 65, "--from and --to are needed"),
         (("--parameter", "drive.amplitude", "--from", "2", "--to", "1"), 65, "a range that rises"),
         (("--parameter", "contact.restitution", "--from", "0.5", "--to", "1.5"), 65, "--to"),
+        (
+            ("--parameter", "drive.amplitude", "--from", "1 s", "--to", "2"),
+            65,
+            "--from: found '1 s', allowed a number in m",
+        ),
+        (("--parameter", "drive.amplitude", "--from", "", "--to", "2"), 64, "--from: found ''"),
         ((*AMPLITUDE, "--free", "drive.amplitude"), 65, "--free: found 'drive.amplitude'"),
         ((*AMPLITUDE, "--free", "drive.ratio"), 65, "--free-from and --free-to are needed"),
         (
