@@ -4,8 +4,8 @@
 
 Dry friction under the petals, a twentieth of the amplitude of the spring force. Both motions survive it,
 and neither sticks; but the cores of the petals fill with ever thinner rings of both colours. There
-friction brings a start almost to rest in front of the wall, and a little more or less of it decides in
-which period of the drive the first impact comes.
+friction brings a start almost to rest in front of the wall. A little more or less of it decides in which
+period of the drive the first impact occurs.
 """
 
 import sys

@@ -6,7 +6,7 @@ With the wall off the rest position and a fast drive, a small motion fits in bef
 the set of starts from which it is reached without a single impact. The colour is the grazing margin, the
 smallest distance at which a turning point has missed the wall: it falls to zero at the lid, where the
 motion grazes. The drive is four times as fast as the spring, so four of its turning points fall on each
-free swing, and the lid has four sides. Beyond it each start has an impact history of its own.
+free oscillation, and the lid has four sides. Beyond it each start has an impact history of its own.
 """
 
 import sys

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Petals.
 
-A mass on a spring swings against a wall that stands at its rest position; the drive is 2.6 times as fast
+A mass on a spring oscillates against a wall that stands at its rest position; the drive is 2.6 times as fast
 as the spring. Two motions are stable. Both hit the wall once in each period of the drive; one repeats
 after a period, the other only after three. Which one a start leads to is shown by its colour; how soon,
 by its lightness. Petals are rolled up within petals.

@@ -3,8 +3,8 @@
 """A frame that pounds.
 
 Three storeys sway in the wind beside a neighbour. Free swaying and pounding against the neighbour, once
-in each period, are both possible in the same wind; the map is over place and velocity of the roof, and
-the lower storeys start at rest.
+in each period, are both possible in the same wind. The map is over position and velocity of the roof; the
+lower storeys start at rest.
 """
 
 import sys

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shells.
 
-A little more bounce, restitution 0.9 in the place of 0.8, and the petals dissolve: the second motion now
-takes twelve periods of the drive, and its basin is threads in the sea of the first. Lightness, the time
-to settle, shows shells around the one attractor that would not be seen in two flat colours.
+With restitution 0.9 instead of 0.8 the petals dissolve. The second motion now takes twelve periods of
+the drive, and its basin consists of threads within that of the first. Lightness, the time to settle,
+shows shells around one attractor that would not be seen in two flat colours.
 """
 
 import sys

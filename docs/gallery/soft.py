@@ -3,10 +3,10 @@
 """How hard is hard?
 
 The rigid wall is an idealisation. Here the wall is a spring and a damper that take the same part of the
-energy, ever stiffer from panel to panel. At thirty times the stiffness of the spring there are no
-petals; at a thousand times they open, but the second motion is not periodic; at thirty thousand times
-they look like those of the rigid wall, and still half of the starts settle on a motion of another
-period. Restitution and stiffness have to be known before a map is believed.
+energy, stiffer from panel to panel. At thirty times the stiffness of the spring there are no petals. At a
+thousand times they open, but the second motion is not periodic. At thirty thousand times they look like
+those of the rigid wall, yet half of the starts settle on a motion of another period. Restitution and
+stiffness have to be known before a map can be relied on.
 """
 
 import sys

@@ -3,10 +3,10 @@
 """Into the boundary.
 
 The map of the shells, then a tenth of its width, then a hundredth: each step shows as much as the one
-before it. What that costs a prediction is the uncertainty exponent. If a start is known to within
+before it. The uncertainty exponent measures what this costs a prediction. If a start is known to within
 $\\varepsilon$, the share of starts whose end is uncertain is proportional to $\\varepsilon^\\alpha$,
-with $\\alpha$ as printed below: a start measured ten times better leaves $10^{-\\alpha}$ of the
-uncertainty, where a smooth boundary would leave a tenth. The boundary of the petals is smooth; that of
+with $\\alpha$ as printed below. A start measured ten times better leaves $10^{-\\alpha}$ of the
+uncertainty; with a smooth boundary a tenth would remain. The boundary of the petals is smooth; that of
 the shells is not.
 """
 

@@ -242,7 +242,7 @@ def _stability(events: list[dict]) -> Stability:
     one = {event["event"]: event for event in reported}
     if "motion" not in one:
         if "not_known" not in one:
-            raise SeparatrixError(f"stability: the program reported nothing on the motion ({report})", INTERNAL)
+            raise SeparatrixError(f"stability: no report of the program on the motion ({report})", INTERNAL)
         return Stability(report=report)
     exponents = [event for event in reported if event["event"] == "exponent"]
     return Stability(

@@ -40,7 +40,7 @@ _MPI_ENVIRONMENT = {
 
 
 class StoppedError(Exception):
-    """A run was stopped at the share `done` and can go on. `ended`: it ended before the signal took effect."""
+    """A run was stopped at the share `done` and can go on. `ended`: before the signal took effect."""
 
     def __init__(self, done: float, ended: bool = False) -> None:
         """Keep how far it went."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reference from what the programs say of themselves: laws, effects, commands, columns, exit codes."""
+"""Reference pages from the output of the programs: laws, effects, commands, columns, exit codes."""
 
 import json
 import re
@@ -40,7 +40,7 @@ def write(program: Path, tools: Path, source: Path, folder: Path, work: Path) ->
 
     `tools`: where the Python commands are; `source`: the top of the repository; `work`: for files in between.
     """
-    laws = json.loads(_said(program, "laws", "--json"))
+    laws = json.loads(_output(program, "laws", "--json"))
     pages = {
         "laws": _laws(laws),
         "effects": _effects(laws),
@@ -53,14 +53,14 @@ def write(program: Path, tools: Path, source: Path, folder: Path, work: Path) ->
         (folder / f"{name}.md").write_text(MADE + text)
 
 
-def _said(*words: str | Path) -> str:
+def _output(*words: str | Path) -> str:
     return subprocess.run(words, capture_output=True, text=True, check=True).stdout
 
 
 def _laws(laws: list[dict]) -> str:
     text = (
         "# Laws\n\nEvery law of `[body]`, `[restoring]`, `[friction]`, `[contact]` and `[drive]` with its "
-        "keys, as `separatrix laws` prints them. [Case files](../case-file.md) say how they are written "
+        "keys, as `separatrix laws` prints them. [Case files](../case-file.md) describe how they are written "
         "down, [effects](effects.md) what can be added to them.\n"
     )
     unknown = {law["family"] for law in laws} - {*FAMILIES, "effect"}
@@ -129,12 +129,12 @@ def _plain(text: str) -> str:
 
 def _commands(program: Path, tools: Path) -> str:
     text = "# Commands\n\nWhat each prints with `--help`.\n\n## separatrix\n\n" + _block(
-        _said(program, "--help")
+        _output(program, "--help")
     )
-    for command in re.findall(r"^  ([a-z]+) ", _said(program, "--help").split("Options:")[0], re.MULTILINE):
-        text += f"\n## separatrix {command}\n\n" + _block(_said(program, command, "--help"))
+    for command in re.findall(r"^  ([a-z]+) ", _output(program, "--help").split("Options:")[0], re.MULTILINE):
+        text += f"\n## separatrix {command}\n\n" + _block(_output(program, command, "--help"))
     for tool in TOOLS:
-        text += f"\n## {tool}\n\n" + _block(_said(tools / tool, "--help"))
+        text += f"\n## {tool}\n\n" + _block(_output(tools / tool, "--help"))
     return text
 
 
@@ -146,7 +146,7 @@ def _columns(program: Path, source: Path, work: Path) -> str:
     text = (
         "# Columns\n\nEvery variable of each kind of file with its type, dimensions, unit and codes, "
         "read from files that the program wrote. "
-        "[Result files](../file-format.md) say what else is in them.\n"
+        "[Result files](../file-format.md) describe what else is in them.\n"
     )
     starts = work / "starts.csv"
     starts.write_text("x0,v0\n0.4,0\n")
@@ -155,7 +155,7 @@ def _columns(program: Path, source: Path, work: Path) -> str:
         words: list[str | Path] = [program, kind, source / "examples" / case, "-o", path, "--force", "-q"]
         for setting in settings:
             words += ["--set", setting]
-        _said(*words, *(["--list", starts] if kind == "points" else []))
+        _output(*words, *(["--list", starts] if kind == "points" else []))
         text += f"\n## {kind}\n\n" + _variables(path, None)
         for group in ("catalogue", "limits"):
             if {"catalogue": "basin", "limits": "sweep"}[group] == kind:
@@ -183,8 +183,8 @@ def _variables(path: Path, group: str | None) -> str:
 
 def _exit_codes(program: Path, source: Path) -> str:
     """The codes that the user guide lists with their advice; those of `--help` must be among them."""
-    said = _said(program, "--help").split("Exit codes:")[1]
-    codes = dict(re.findall(r"(\d+) ([^,.]+)[,.]", said.replace("\n", " ")))
+    listed = _output(program, "--help").split("Exit codes:")[1]
+    codes = dict(re.findall(r"(\d+) ([^,.]+)[,.]", listed.replace("\n", " ")))
     advice = dict(
         re.findall(r"^\| (\d+) \| (.*) \|$", (source / "docs/user-guide.md").read_text(), re.MULTILINE)
     )

@@ -80,9 +80,9 @@ def branch_file(separatrix: Path, results: dict[str, Path], tmp_path_factory: py
 
 @pytest.fixture(scope="module")
 def campaign(source_dir: Path) -> Iterator[SimpleNamespace]:
-    """The modules of scripts/campaign."""
+    """The modules of scripts/evidence/campaign."""
     with pytest.MonkeyPatch.context() as patch:
-        for folder in ("scripts/campaign", "scripts", "tests/generator", "postprocess"):
+        for folder in ("scripts/evidence/campaign", "scripts/evidence", "tests/generator", "postprocess"):
             patch.syspath_prepend(str(source_dir / folder))
         import bars
         import figure

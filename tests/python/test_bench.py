@@ -14,13 +14,13 @@ STARTS = ((0.4, 0.0), (0.8, 0.0), (0.25, 5.5))
 
 
 def test_help_needs_nothing_installed(source_dir):
-    result = subprocess.run([source_dir / "scripts" / "bench", "--help"], capture_output=True, text=True)
+    result = subprocess.run([source_dir / "scripts/evidence/bench", "--help"], capture_output=True, text=True)
     assert result.returncode == 0
     assert "--quick" in result.stdout
 
 
 def test_an_unknown_option_is_named(source_dir):
-    result = subprocess.run([source_dir / "scripts" / "bench", "--fast"], capture_output=True, text=True)
+    result = subprocess.run([source_dir / "scripts/evidence/bench", "--fast"], capture_output=True, text=True)
     assert result.returncode == 64
     assert "--fast" in result.stderr
 
@@ -31,8 +31,8 @@ def test_the_driver_of_a_peer_agrees_with_ours(
 ):
     library = build_dir / "bench_peers" / f"libbench_{peer}.so"
     if not library.is_file():
-        pytest.skip(f"{library} has not been built; scripts/bench does")
-    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+        pytest.skip(f"{library} has not been built; scripts/evidence/bench does")
+    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
     from compiled import Compiled
 
     from machine import CASE, TOLERANCE, published_machine
@@ -48,7 +48,7 @@ def test_the_driver_of_a_peer_agrees_with_ours(
 
 @pytest.mark.parametrize("key", ["hunt_crossley", "kelvin_voigt_cut", "cubic", "power", "dahl"])
 def test_a_peer_has_the_machine_of_the_row(source_dir, separatrix, tmp_path, monkeypatch, key):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
     from compiled import Compiled, build
     from rows import ROWS
 
@@ -65,7 +65,7 @@ def test_a_peer_has_the_machine_of_the_row(source_dir, separatrix, tmp_path, mon
 
 
 def test_every_row_is_a_case(source_dir, separatrix, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
     from rows import ROWS
 
     for row in ROWS:
@@ -73,7 +73,7 @@ def test_every_row_is_a_case(source_dir, separatrix, tmp_path, monkeypatch):
 
 
 def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separatrix, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
     import reference_run
 
     from machine import CASE

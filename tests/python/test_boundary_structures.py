@@ -23,9 +23,9 @@ COUPLED = np.array([[2.0, -1.0], [-1.0, 1.0]])
 @pytest.fixture(scope="module")
 def closed_form(source_dir):
     """Section point and multipliers of the saddle with one impact a period, by its quadratic equation."""
-    sys.path.insert(0, str(source_dir / "scripts"))
+    sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     orbits = importlib.import_module("validation_structures").orbits
-    sys.path.remove(str(source_dir / "scripts"))
+    sys.path.remove(str(source_dir / "scripts" / "evidence"))
     damping, force = 0.04 * COUPLED, np.array([1.0, 0.0])
     speed, phase, position, velocity = min(
         orbits(FREQUENCY, np.eye(2), damping, COUPLED, force, [0, 1], 1, LOSS), key=lambda found: found[0]

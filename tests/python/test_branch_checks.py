@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""scripts/branch_checks.py: its quick cases, that every example is in it, and that it sees what is wrong."""
+"""scripts/evidence/branch_checks.py: its quick cases, every example, and that errors are seen."""
 
 import importlib
 import sys
@@ -12,9 +12,9 @@ import pytest
 
 @pytest.fixture(scope="module")
 def checks(source_dir):
-    sys.path.insert(0, str(source_dir / "scripts"))
+    sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     yield importlib.import_module("branch_checks")
-    sys.path.remove(str(source_dir / "scripts"))
+    sys.path.remove(str(source_dir / "scripts" / "evidence"))
 
 
 @pytest.mark.parametrize("name", ["validation/impact_coco", "structure_two_masses"])

@@ -76,7 +76,7 @@ def test_the_families_are_those_of_the_library(campaign, library):
 
 @pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--many", 64), ("--cases", 64)])
 def test_the_command_line(source_dir, option, code):
-    command = [source_dir / "scripts" / "discovery_campaign", option]
+    command = [source_dir / "scripts/evidence/discovery_campaign", option]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == code
     assert (option in result.stderr) == (code != 0)
@@ -138,7 +138,7 @@ def start(source_dir, folder, pause: float, *more: str, doubts: bool = False) ->
     (folder / "stand_in" / "baselines.py").write_text(
         "verdicts = lambda *_: {'STLSQ': 'none', 'ensemble SINDy': 'none'}\n"
     )
-    program = source_dir / "scripts" / "campaign" / "campaign.py"
+    program = source_dir / "scripts/evidence/campaign/campaign.py"
     # the finder of an editable installation comes before the path
     code = "import sys, runpy, importlib.machinery as m; sys.meta_path.insert(0, m.PathFinder); "
     code += f"sys.path.insert(0, {str(folder / 'stand_in')!r}); import baselines; "

@@ -19,7 +19,7 @@ def test_a_few_hidden_effects_are_found(source_dir, build_dir, separatrix, tmp_p
         "PYTHONPATH": str(source_dir / "postprocess"),
         "OPENBLAS_NUM_THREADS": "1",
     }
-    program = source_dir / "scripts" / "campaign" / "campaign.py"
+    program = source_dir / "scripts/evidence/campaign/campaign.py"
     words = [program, "--subset", "ci", "--out", tmp_path, "--output", tmp_path / "page.md"]
     result = subprocess.run(
         [sys.executable, *map(str, words)], env=environment, capture_output=True, text=True

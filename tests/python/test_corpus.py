@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Inputs that once made a reader crash, hang or read beyond its memory, and awkward ones: a message or a run.
 
-`scripts/fuzz` found those of tests/faults/corpus, and uses them as seeds.
+`scripts/evidence/fuzz` found those of tests/faults/corpus, and uses them as seeds.
 """
 
 import subprocess

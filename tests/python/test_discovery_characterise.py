@@ -32,7 +32,7 @@ def hide(source_dir, tmp_path_factory):
     """Records and the sealed truth of a case without imperfections of the rig."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(source_dir / "tests" / "generator"))
-        patch.syspath_prepend(str(source_dir / "scripts"))
+        patch.syspath_prepend(str(source_dir / "scripts" / "evidence"))
         import records
         from design import draw
 

@@ -26,7 +26,7 @@ def test_jumps_are_steps_beyond_the_noise_and_beyond_the_steps_beside_them():
 def test_a_sample_on_the_wrong_side_of_an_impact_holds_no_fit(source_dir, tmp_path, monkeypatch):
     """In five of 54 segments one velocity before an impact was fitted by one after it: chi^2 of 6000 each."""
     monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
-    monkeypatch.syspath_prepend(str(source_dir / "scripts"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "evidence"))
     import records
     from design import draw
 

@@ -26,9 +26,9 @@ OPTIONS = {
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
-    """The records that scripts/measured_records makes."""
+    """The records that scripts/evidence/measured_records makes."""
     out = tmp_path_factory.mktemp("records")
-    make = runpy.run_path(str(ROOT / "scripts" / "measured_records"))["main"]
+    make = runpy.run_path(str(ROOT / "scripts/evidence/measured_records"))["main"]
     assert make([FOLDER, "--out", str(out)]) == 0
     return out
 
@@ -47,7 +47,7 @@ def found(records: Path, *names: str) -> dict:
         arguments += ["--out", str(folder), *OPTIONS[name]]
         assert main([*arguments, "--partial", "--quick", "--quiet"]) == 0
     verdict = json.loads((folder / "verdict.json").read_text())
-    figures = runpy.run_path(str(ROOT / "scripts" / "measured_figures"))
+    figures = runpy.run_path(str(ROOT / "scripts/evidence/measured_figures"))
     options = figures["parsed"]([FOLDER, "--records", str(records)])
     measured = figures["force_errors" if name == "emps" else "loss_errors"](options, folder, verdict)
     return verdict | {"errors": measured}
@@ -93,7 +93,7 @@ def test_a_spring_that_small_oscillations_suggest_is_refuted_by_large_ones(recor
 
 def test_half_periods_alone_predict_the_small_pendulum_no_better(records):
     """Constant friction misses by more than the scatter; friction that may change is hardly known."""
-    figures = runpy.run_path(str(ROOT / "scripts" / "measured_figures"))
+    figures = runpy.run_path(str(ROOT / "scripts/evidence/measured_figures"))
     turns = [figures["half_periods"](records, name) for name in ("pendulum_small", "pendulum_small_low")]
     own, held_out, error = figures["half_periods_alone"](*turns[0], *turns[1], 0)
     assert own < 2 < 5 < held_out

@@ -32,7 +32,7 @@ def regions(folder, records, drawn, louder: float = 1.0) -> list[dict]:
 def test_the_clearest_region_of_a_drag_is_one_of_the_speed(source_dir, tmp_path, monkeypatch):
     """A bin of slow speeds was the clearest one by itself, though these bins together explain less."""
     monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
-    monkeypatch.syspath_prepend(str(source_dir / "scripts"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "evidence"))
     import records
     from design import draw
 
@@ -43,7 +43,7 @@ def test_the_clearest_region_of_a_drag_is_one_of_the_speed(source_dir, tmp_path,
 
 def test_a_loss_that_grows_with_the_speed_of_impacts_is_missing_at_impacts(source_dir, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
-    monkeypatch.syspath_prepend(str(source_dir / "scripts"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "evidence"))
     import records
     from design import draw
 
@@ -55,7 +55,7 @@ def test_a_loss_that_grows_with_the_speed_of_impacts_is_missing_at_impacts(sourc
 def test_nothing_is_reported_where_the_noise_explains_all(source_dir, tmp_path, monkeypatch):
     """No map explains more than its bins: the best of none was asked for."""
     monkeypatch.syspath_prepend(str(source_dir / "tests" / "generator"))
-    monkeypatch.syspath_prepend(str(source_dir / "scripts"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "evidence"))
     import records
     from design import draw
 

@@ -7,13 +7,12 @@ import inspect
 from pathlib import Path
 
 import pytest
-
 import separatrix as sx
 
 # Exceptions that carry what a run leaves behind, values that functions return, and the version.
 WITHOUT = {
-    "Discovery", "GivenUpError", "Interrupted", "SeparatrixError", "SeparatrixWarning", "Stability", "__version__",
-    "discover",
+    "Discovery", "GivenUpError", "Interrupted", "SeparatrixError", "SeparatrixWarning", "Stability",
+    "__version__", "discover",
 }  # fmt: skip
 
 

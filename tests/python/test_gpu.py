@@ -243,7 +243,7 @@ def test_a_gpu_stops_within_a_tile(separatrix, tmp_path, on_host):
 @pytest.fixture(scope="module")
 def check(source_dir: Path):
     """The script that reads the code for GPUs, as a module."""
-    path = str(source_dir / "scripts" / "gpu_check")
+    path = str(source_dir / "scripts/evidence/gpu_check")
     loader = importlib.machinery.SourceFileLoader("gpu_check", path)
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader("gpu_check", loader))
     loader.exec_module(module)
@@ -270,7 +270,14 @@ def test_fused_operations_of_divisions_are_distinguished(check):
 
 def test_the_benchmark_measures_nothing_without_a_gpu(source_dir, separatrix, build_dir, tmp_path, on_host):
     """Not even the stand-in's time, which would be no figure of a GPU."""
-    command = [source_dir / "scripts" / "bench", "--gpu", "--build", build_dir, "-o", tmp_path / "page.md"]
+    command = [
+        source_dir / "scripts/evidence/bench",
+        "--gpu",
+        "--build",
+        build_dir,
+        "-o",
+        tmp_path / "page.md",
+    ]
     ended = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert "no GPU: nothing was measured, no page was written" in ended.stdout
     assert not (tmp_path / "page.md").exists()
@@ -278,7 +285,7 @@ def test_the_benchmark_measures_nothing_without_a_gpu(source_dir, separatrix, bu
 
 @pytest.mark.long
 def test_the_page_of_the_benchmark(source_dir, separatrix, tmp_path, on_host, monkeypatch):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
     import gpu
 
     runs, size = gpu.Runs(separatrix, tmp_path), gpu.Size(4, 12, 100.0, 1, 1, 12)

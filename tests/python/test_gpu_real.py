@@ -57,7 +57,7 @@ def test_examples_have_the_same_bits(separatrix, source_dir, tmp_path, example, 
 
 def machines_of_one_body() -> list[str]:
     """Keys of the machines of the benchmark that a GPU flies; read as text, as its modules are no package."""
-    text = (Path(__file__).resolve().parents[2] / "scripts" / "bench_peers" / "rows.py").read_text()
+    text = (Path(__file__).resolve().parents[2] / "scripts/evidence/bench_peers/rows.py").read_text()
     keys = [part.split('"')[1] for part in text.split("ROWS = (")[1].split("\n    Row(")[1:]]
     return [key for key in keys if not key.startswith("chain_") and key != "pair"]
 
@@ -65,7 +65,7 @@ def machines_of_one_body() -> list[str]:
 @pytest.mark.parametrize("span", ["settled", "full"])
 @pytest.mark.parametrize("key", machines_of_one_body())
 def test_machines_have_the_same_bits(separatrix, source_dir, tmp_path, monkeypatch, key, span):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts" / "bench_peers"))
+    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
     from rows import ROWS
 
     case = next(row for row in ROWS if row.key == key).write(tmp_path)

@@ -16,9 +16,9 @@ OUR_IMPACTING = {"coulomb": 1643, "viscous": 2119, "stribeck": 1640}
 
 @pytest.fixture(scope="module")
 def tables(source_dir):
-    sys.path.insert(0, str(source_dir / "scripts"))
+    sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     yield importlib.import_module("published_tables")
-    sys.path.remove(str(source_dir / "scripts"))
+    sys.path.remove(str(source_dir / "scripts" / "evidence"))
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ SECTIONS = ("pair", "impacts", "books", "hard")
 
 @pytest.fixture(scope="module")
 def page(source_dir):
-    sys.path.insert(0, str(source_dir / "scripts"))
+    sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     yield importlib.import_module("published_pair")
-    sys.path.remove(str(source_dir / "scripts"))
+    sys.path.remove(str(source_dir / "scripts" / "evidence"))
 
 
 @pytest.mark.parametrize("section", SECTIONS)

@@ -10,7 +10,7 @@ import pytest
 from program import differences, run, succeed
 
 SOURCE = Path(__file__).resolve().parents[2]
-sys.path.append(str(SOURCE / "scripts" / "bench_peers"))
+sys.path.append(str(SOURCE / "scripts/evidence/bench_peers"))
 import rows  # noqa: E402
 
 SMALL = ("axis[1].count=9", "axis[2].count=11", "run.duration=12", "run.window=3", "attractors.sample=16")

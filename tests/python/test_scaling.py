@@ -14,9 +14,9 @@ SHAPES = [(1, 1, 50), (2, 1, 50), (5, 2, 333), (16, 4, 17), (64, 8, 1000), (300,
 
 @pytest.fixture(scope="module")
 def scaling(source_dir, tmp_path_factory):
-    """The modules of scripts/scaling_model, and the compiled model."""
+    """The modules of scripts/evidence/scaling_model, and the compiled model."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(source_dir / "scripts" / "scaling_model"))
+        patch.syspath_prepend(str(source_dir / "scripts/evidence/scaling_model"))
         import costs
         import model
     return model, costs, model.Model(tmp_path_factory.mktemp("model"))
@@ -29,7 +29,7 @@ def uneven(count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("option", ["--help", "--fast"])
 def test_the_command_line(source_dir, option):
-    result = subprocess.run([source_dir / "scripts" / "scaling", option], capture_output=True, text=True)
+    result = subprocess.run([source_dir / "scripts/evidence/scaling", option], capture_output=True, text=True)
     assert (result.returncode, "--quick" in result.stdout) == (
         (0, True) if option == "--help" else (64, False)
     )

@@ -10,9 +10,9 @@ import pytest
 
 @pytest.fixture(scope="module")
 def rows(source_dir):
-    sys.path.insert(0, str(source_dir / "scripts"))
+    sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     yield importlib.import_module("validation_rows")
-    sys.path.remove(str(source_dir / "scripts"))
+    sys.path.remove(str(source_dir / "scripts" / "evidence"))
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ import pytest
 
 @pytest.fixture(scope="module")
 def rows(source_dir):
-    sys.path.insert(0, str(source_dir / "scripts"))
+    sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     yield importlib.import_module("validation_structures")
-    sys.path.remove(str(source_dir / "scripts"))
+    sys.path.remove(str(source_dir / "scripts" / "evidence"))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,9 @@ def test_what_is_off_is_settled_by_a_closed_form(public, separatrix, build_dir, 
 
 
 def test_every_public_case_is_run(source_dir):
-    scripts = "".join(path.read_text() for path in (source_dir / "scripts").glob("validation_public_*.py"))
+    scripts = "".join(
+        path.read_text() for path in (source_dir / "scripts/evidence").glob("validation_public_*.py")
+    )
     for path in (source_dir / "examples" / "validation" / "public").glob("*.toml"):
         assert f'"{path.stem}"' in scripts or f'"{path.name}"' in scripts
 

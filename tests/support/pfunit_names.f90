@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-! Written by scripts/pfunit_check --write.
+! Written by scripts/evidence/pfunit_check --write.
 
 !> Names that pFUnit's module funit exports, beside those that its stand-in here gives a meaning.
 module funit_names

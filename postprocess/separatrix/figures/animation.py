@@ -34,7 +34,7 @@ def animate(
     frames_per_second: float = 5.0,
     dpi: int = 150,
 ) -> Path:
-    """Write the maps over the values of a parameter one after the other; the suffix of `path` says how.
+    """Write the maps over the values of a parameter as frames; the suffix of `path` sets the format.
 
     Colours and legend are the same in all frames; shares are those of all. Other parameters are fixed by
     `look.slice`.

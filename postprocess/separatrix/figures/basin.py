@@ -88,15 +88,15 @@ def basin_map(
     """Return the map of one field over the initial conditions, one panel per value of the other axes.
 
     `totals`: the points of each class in the legend, where it is to be that of more than is drawn. `over`: a
-    variable of 0 and 1, black where it is 1. `curves` draws more into the panels, given their places on the
+    variable of 0 and 1, black where it is 1. `curves` draws more into the panels, given their values on the
     other axes, and returns what the legend needs of it; `notes` are for the caption.
     """
     whole, result = result, look.selected(result)
     path = path if look.whole else None
     down, across = plane_axes(result, look)
     others = [name for name in result[field].dims if name not in (down, across)]
-    places_of_all = list(product(*(range(result.sizes[name]) for name in others)))
-    chosen = _spread(places_of_all, MOST_PANELS)
+    slices = list(product(*(range(result.sizes[name]) for name in others)))
+    chosen = _spread(slices, MOST_PANELS)
     axes, shaded = (down, across), look.shade and field in CLASS_FIELDS and "settle_time" in result
     panels = _read_panels(path, result, field, axes, others, chosen, shaded)
     part = inset.enlarged(whole, axes, len(panels), look) if look.inset else None
@@ -116,13 +116,13 @@ def basin_map(
     if part is not None:
         inset.frame(*grid, part, axes)
     if look.attractors and field in ("attractor", "regime", "settle_time") and {down, across} == {"x0", "v0"}:
-        places = chosen + chosen[: len(grid) - len(panels)]
-        marked, lacking = marks.draw(grid, whole, result, across, others, places, look)
+        chosen_slices = chosen + chosen[: len(grid) - len(panels)]
+        marked, lacking = marks.draw(grid, whole, result, across, others, chosen_slices, look)
         handles = [marks.on_legend(handle, marked) for handle in handles]
         caption += ["markers: points of the attractors on the section", *lacking] if marked else []
         if section.coordinates(result) > 2:
             caption.append("attractors are not marked: they have more coordinates than the picture")
-    caption += _count_caption(result, field, panels, len(places_of_all), look)
+    caption += _count_caption(result, field, panels, len(slices), look)
     if part is not None:
         caption.append(f"right: the part framed, {count_text(part[field].size)} points")
     if over is not None:
@@ -130,10 +130,10 @@ def basin_map(
         closer = [] if part is None else _read_panels(None, part, over, axes, others, [(0,) * len(others)])
         handles.append(_draw_over(grid, black, closer))
     if curves is not None:
-        places = chosen + chosen[: len(grid) - len(panels)]
+        chosen_slices = chosen + chosen[: len(grid) - len(panels)]
         at = [
-            {name: float(result[name].values[k]) for name, k in zip(others, place, strict=True)}
-            for place in places
+            {name: float(result[name].values[k]) for name, k in zip(others, index, strict=True)}
+            for index in chosen_slices
         ]
         handles += curves(grid, at)
     caption += notes
@@ -181,29 +181,29 @@ def _read_panels(
     field: str,
     axes: tuple,
     others: list[str],
-    places: list[tuple],
+    slices: list[tuple],
     shaded: bool = False,
 ) -> list[_Panel]:
-    """Read a field at places of the other axes, with the settling time where the map is shaded by it."""
+    """Read a field at indices of the other axes, with the settling time where the map is shaded by it."""
     dims = result[field].dims
     panels = []
     with _source(path, result, field) as dataset:
         if axes[0] is None:
             dataset = Strip(dataset)
         plane = (dims.index(axes[0]), dims.index(axes[1])) if axes[0] else (1, 0)
-        for place in places:
+        for index in slices:
             heading = ", ".join(
                 value_label(result[name], float(result[name].values[k]))
-                for name, k in zip(others, place, strict=True)
+                for name, k in zip(others, index, strict=True)
             )
             if field in (*CLASS_FIELDS, "differs"):
-                data = majority_plane(dataset, plane, place)
+                data = majority_plane(dataset, plane, index)
             else:
-                data = scalar_plane(dataset, plane, place, smallest=field == "grazing_margin")
+                data = scalar_plane(dataset, plane, index, smallest=field == "grazing_margin")
             panels.append(_Panel(heading, data, _edges(result, axes, data)))
     if shaded:
         for panel, times in zip(
-            panels, _read_panels(path, result, "settle_time", axes, others, places), strict=True
+            panels, _read_panels(path, result, "settle_time", axes, others, slices), strict=True
         ):
             panel.settle_time = times.plane.image
     return panels
@@ -228,11 +228,11 @@ def _source(path: str | Path | None, result: xr.Dataset, field: str) -> Iterator
             yield file[field]
 
 
-def _spread(places: list, most: int) -> list:
-    """Return at most `most` of the places, evenly spread, first and last among them."""
-    if len(places) <= most:
-        return places
-    return [places[k] for k in np.linspace(0, len(places) - 1, most).round().astype(int)]
+def _spread(items: list, most: int) -> list:
+    """Return at most `most` items, evenly spread, first and last among them."""
+    if len(items) <= most:
+        return items
+    return [items[k] for k in np.linspace(0, len(items) - 1, most).round().astype(int)]
 
 
 def _page(number: int, height: float, look: Look) -> Page:

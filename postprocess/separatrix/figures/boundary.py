@@ -100,9 +100,9 @@ def _over(path: Path | None, found: xr.Dataset, result: xr.Dataset, title: str, 
 
     def curves(grid: Sequence[Axes], panels: Sequence[dict[str, float]]) -> list[Line2D]:
         handles: list[Line2D] = []
-        for ax, place in zip(grid, panels, strict=True):
+        for ax, fixed in zip(grid, panels, strict=True):
             limits = ax.get_xlim(), ax.get_ylim()
-            handles = _merged(handles, draw(ax, result, across, str(down), look, place))
+            handles = _merged(handles, draw(ax, result, across, str(down), look, fixed))
             ax.set_xlim(limits[0])
             ax.set_ylim(limits[1])
         return handles
@@ -138,7 +138,7 @@ def _in_units(variable: xr.DataArray, look: Look) -> xr.DataArray:
 
 
 def _notes(result: xr.Dataset, look: Look) -> list[str]:
-    """What a caption says of the boundaries."""
+    """The pieces of a caption on the boundaries."""
     number = int((result["across"].values >= 0).sum())
     if number == 0:
         return ["no boundary: all points have the same label"]
@@ -179,7 +179,7 @@ def _multipliers_text(values: np.ndarray) -> str:
 
 
 def draw(
-    ax: Axes, result: xr.Dataset, across: str, down: str, look: Look, place: dict[str, float]
+    ax: Axes, result: xr.Dataset, across: str, down: str, look: Look, fixed: dict[str, float]
 ) -> list[Line2D]:
     """Draw the pieces and the saddles of one panel; return what the legend needs."""
     handles: dict[str, Line2D] = {}
@@ -188,7 +188,7 @@ def draw(
     names = decode_flags(result["piece_name"]).values
     known = (result["label_one"].values != 0) & (result["label_two"].values != 0)
     for piece in range(result.sizes["piece"]):
-        if not _belongs(result, "piece_", piece, place, look):
+        if not _belongs(result, "piece_", piece, fixed, look):
             continue
         chosen = np.arange(result["points"].values[piece]) + result["first"].values[piece]
         if result["closed"].values[piece]:
@@ -203,9 +203,9 @@ def draw(
         ax.plot(x[chosen], y[chosen], linestyle=line, color=colour, linewidth=0.8, zorder=4)
         handles.setdefault(text, Line2D([], [], color=colour, linestyle=line, label=text))
     handles = dict(sorted(handles.items(), key=lambda item: _rank(item[0])))
-    if (across, down) in (("x0", "v0"), ("v0", "x0")) and _on_section(result, place):
-        handles |= _draw_sets(ax, result, across, factors, place, look)
-        handles |= _draw_saddles(ax, result, across, factors, place, look)
+    if (across, down) in (("x0", "v0"), ("v0", "x0")) and _on_section(result, fixed):
+        handles |= _draw_sets(ax, result, across, factors, fixed, look)
+        handles |= _draw_saddles(ax, result, across, factors, fixed, look)
     return list(handles.values())
 
 
@@ -216,7 +216,7 @@ def _rank(text: str) -> tuple[int, int]:
 
 
 def _draw_sets(
-    ax: Axes, result: xr.Dataset, across: str, factors: list[float], place: dict[str, float], look: Look
+    ax: Axes, result: xr.Dataset, across: str, factors: list[float], fixed: dict[str, float], look: Look
 ) -> dict[str, Line2D]:
     """Draw the stable and unstable sets of the saddles: thin lines that end at cuts."""
     handles: dict[str, Line2D] = {}
@@ -225,7 +225,7 @@ def _draw_sets(
     across_points, down_points = points if across == "x0" else points[::-1]
     breaks = np.flatnonzero((np.diff(curve) != 0) | (np.diff(part) != 0)) + 1
     for side in range(result.sizes["side"]):
-        if not _belongs(result, "saddles_", int(result["sets_saddle"].values[side]) - 1, place, look):
+        if not _belongs(result, "saddles_", int(result["sets_saddle"].values[side]) - 1, fixed, look):
             continue
         stable = bool(result["sets_stable"].values[side])
         text = "stable set of a saddle" if stable else "unstable set of a saddle"
@@ -242,7 +242,7 @@ def _draw_sets(
 
 
 def _draw_saddles(
-    ax: Axes, result: xr.Dataset, across: str, factors: list[float], place: dict[str, float], look: Look
+    ax: Axes, result: xr.Dataset, across: str, factors: list[float], fixed: dict[str, float], look: Look
 ) -> dict[str, Line2D]:
     """Mark the saddles that the boundary leads to, and those within a basin."""
     handles: dict[str, Line2D] = {}
@@ -252,7 +252,7 @@ def _draw_saddles(
     points = (x, v) if across == "x0" else (v, x)
     for on_boundary, text in ((True, "saddle"), (False, "saddle within a basin")):
         chosen = reached[owner] == on_boundary
-        chosen &= [_belongs(result, "saddles_", int(one), place, look) for one in owner]
+        chosen &= [_belongs(result, "saddles_", int(one), fixed, look) for one in owner]
         if not chosen.any():
             continue
         drawn = {"marker": "X", "markersize": 5.0, "markeredgecolor": "black", "linestyle": ""}
@@ -265,19 +265,19 @@ def _draw_saddles(
     return handles
 
 
-def _on_section(result: xr.Dataset, place: dict[str, float]) -> bool:
+def _on_section(result: xr.Dataset, fixed: dict[str, float]) -> bool:
     """Whether the starts of a panel are on the section at crank angle 0, where the saddles are given."""
     if "saddles_section" in result:
         # in 2n dimensions: nothing puts them into the slice
         return False
     start = resolved_case(result).get("start", {})
-    angle = place.get("crank_angle", start.get("crank_angle", 0.0) if isinstance(start, dict) else 0.0)
+    angle = fixed.get("crank_angle", start.get("crank_angle", 0.0) if isinstance(start, dict) else 0.0)
     return bool(np.isclose(np.sin(float(angle) / 2), 0, atol=1e-12))
 
 
-def _belongs(result: xr.Dataset, prefix: str, row: int, place: dict[str, float], look: Look) -> bool:
+def _belongs(result: xr.Dataset, prefix: str, row: int, fixed: dict[str, float], look: Look) -> bool:
     """Whether a piece or a saddle is of the slice of the map that a panel shows."""
-    for name, value in place.items():
+    for name, value in fixed.items():
         variable = result[f"{prefix}{name}"]
         mine = variable.values[row] * look.factor(str(variable.attrs.get("units")))
         if not np.isclose(mine, value, rtol=1e-12, atol=0):

@@ -73,8 +73,8 @@ def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         handles["double"] = Line2D(
             [], [], marker="o", color="black", linestyle="none", markersize=4, label="codimension two"
         )
-    for name, place in (("parameter", ax.set_xlabel), ("free", ax.set_ylabel)):
-        _set_label(result[f"curve_{name}"].copy(), str(result.attrs[name]), place)
+    for name, set_text in (("parameter", ax.set_xlabel), ("free", ax.set_ylabel)):
+        _set_label(result[f"curve_{name}"].copy(), str(result.attrs[name]), set_text)
     caption = [
         *caption_pieces(result, look, describe_case(result)),
         f"{np.unique(number).size} curves of labelled points; there may be others",
@@ -83,11 +83,11 @@ def chart(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     return page.finish(title, caption, list(handles.values()), columns=4)
 
 
-def _set_label(axis: xr.DataArray, parameter: str, place: Callable[[str], object]) -> None:
+def _set_label(axis: xr.DataArray, parameter: str, set_text: Callable[[str], object]) -> None:
     """Label an axis with the parameter that it is."""
     axis.name = parameter.replace(".", "_")
     axis.attrs["long_name"] = parameter.replace(".", " ").replace("_", " ")
-    place(axis_label(axis))
+    set_text(axis_label(axis))
 
 
 # So large a share of orbits that touch both stops have one and the same amplitude: it would show little.
@@ -98,11 +98,11 @@ def height(result: xr.Dataset, look: Look = DEFAULT) -> tuple[np.ndarray, str]:
     """Return what is drawn over the parameter, in the units asked for, and its name; `result` is in SI units.
 
     The amplitude; between two stops, where that of all that touches both is the play, a point on the section.
-    Of a file of equilibria or of places of rest alone their position.
+    In a file of equilibria or rest sets alone it is their position.
     """
     if "x_max" not in result:
-        place = "equilibrium_x" if "equilibrium_x" in result else "rest_x_low"
-        return np.empty(0), f"position at rest ({look.unit(unit(result[place]))})"
+        position = "equilibrium_x" if "equilibrium_x" in result else "rest_x_low"
+        return np.empty(0), f"position at rest ({look.unit(unit(result[position]))})"
     amplitude = (result["x_max"].values - result["x_min"].values) / 2
     factor, lengths = look.factor(unit(result["x_max"])), look.unit(unit(result["x_max"]))
     both = np.zeros(amplitude.shape, bool)
@@ -187,13 +187,13 @@ def draw(ax: Axes, result: xr.Dataset, look: Look = DEFAULT) -> list[Line2D]:
     if "equilibrium_branch" in result:
         handles += [Line2D([], [], color="C0", linestyle="-", label="equilibrium (broken: unstable)")]
     if "rest_parameter" in result and not name.startswith("amplitude"):
-        handles.append(Line2D([], [], color="C4", linewidth=3, label="friction holds: places of rest"))
+        handles.append(Line2D([], [], color="C4", linewidth=3, label="friction holds: rest set"))
     for number, (name, (marker, text)) in enumerate(_MARKS.items()):
-        places = [points[chosen == name] for points, chosen in labels if (chosen == name).any()]
-        if not places:
+        marked = [points[chosen == name] for points, chosen in labels if (chosen == name).any()]
+        if not marked:
             continue
         colour = f"C{number % 10}"
-        ax.plot(*np.concatenate(places).T, marker, color=colour, markersize=4, linestyle="none")
+        ax.plot(*np.concatenate(marked).T, marker, color=colour, markersize=4, linestyle="none")
         handles.append(
             Line2D([], [], marker=marker, color=colour, linestyle="none", markersize=4, label=text)
         )

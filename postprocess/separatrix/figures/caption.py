@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a figure says about the case that it shows, taken from the resolved case of the file."""
+"""Captions: the case that a figure shows, from the resolved case of its file."""
 
 import functools
 import re
@@ -59,7 +59,7 @@ _OF_ROTATION = {
 }  # fmt: skip
 # values beyond this mean "absent", and are not numbers to print
 _HUGE = 1e300
-# of a list; of more the range is told
+# of a list; of a longer one the range is given
 _MOST_NUMBERS = 12
 
 
@@ -103,7 +103,7 @@ def describe_case(result: xr.Dataset) -> list[str]:
 
 
 def caption_pieces(result: xr.Dataset, look: Look, short: list[str]) -> list[str]:
-    """Return the pieces of a caption that say what was computed: `short`, and all else in a full one."""
+    """Return the pieces of a caption on what was computed: `short`, and all else in a full one."""
     return [*short, *(machine_pieces(result) if look.caption == "full" else [])]
 
 
@@ -142,13 +142,13 @@ def _has_weight(case: dict) -> bool:
 
 
 def _law_pieces(case: dict, family: str, law: dict, axes: set[str], units: dict[str, str]) -> list[str]:
-    said = {"friction": _FRICTION, "contact": {**_CONTACT, **_STOP}, "body": _BODIES}.get(family, {})
+    worded = {"friction": _FRICTION, "contact": {**_CONTACT, **_STOP}, "body": _BODIES}.get(family, {})
     if family == "body" and "driven_mass" not in law:
-        said = {}
+        worded = {}
     texts = []
     for key, value in law.items():
         path = f"{family}.{key}"
-        if key == "law" or key in said or path == "drive.ratio" or path.replace(".", "_") in axes:
+        if key == "law" or key in worded or path == "drive.ratio" or path.replace(".", "_") in axes:
             continue
         numbers = value if isinstance(value, list) else [value]
         if (value == 0 and path in _ZERO) or (path == "body.gravity" and not _has_weight(case)):

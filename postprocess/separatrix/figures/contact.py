@@ -35,8 +35,8 @@ def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     if len(found) > MOST_LOOPS:
         order = order[np.linspace(0, len(found) - 1, MOST_LOOPS).round().astype(int)]
     handles = []
-    for place, index in enumerate(order):
-        colour = style.OKABE_ITO[place]
+    for number, index in enumerate(order):
+        colour = style.OKABE_ITO[number]
         _draw(page.axes, found[index], colour, look.factor(unit(result["x"])), look.factor("s"))
         label = f"impact at {found[index][1] * speed:.3g} {shown}"
         handles.append(Line2D([], [], color=colour, label=label))
@@ -49,11 +49,11 @@ def beside(results: Sequence[xr.Dataset], title: str) -> Figure:
     """Return the fastest contact of each trajectory over penetration and time, one colour for each."""
     page = _panels(results[0], DEFAULT)
     handles, captions = [], []
-    for place, result in enumerate(results):
+    for number, result in enumerate(results):
         found = contacts(pair.relative_to_stop(result))
         if not found:
             continue
-        colour = style.OKABE_ITO[place % len(style.OKABE_ITO)]
+        colour = style.OKABE_ITO[number % len(style.OKABE_ITO)]
         fastest = max(found, key=lambda item: item[1])
         _draw(page.axes, fastest, colour)
         law = resolved_case(result)["contact"]["law"].replace("_", " ")

@@ -37,7 +37,7 @@ class Look:
     inset: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     #: which axis is horizontal and which vertical
     axes: tuple[str, str] | None = None
-    #: units in the place of the SI units, each for all that has its SI unit
+    #: units instead of the SI units, each for all that has its SI unit
     units: str | Sequence[str] = ()
     #: the settling time as lightness under the colours of a map
     shade: bool = False
@@ -106,26 +106,26 @@ class Look:
 
     def selected(self, result: xr.Dataset, wish: str = "region") -> xr.Dataset:
         """Return what is to be shown of a result, in the units asked for; `wish`: its name in errors."""
-        places = {}
+        ranges = {}
         for name, value in self.slice.items():
             dim = _axis(result, name)
             nearest = int(np.abs(result[dim].values - value).argmin())
-            places[dim] = slice(nearest, nearest + 1)
+            ranges[dim] = slice(nearest, nearest + 1)
         for name, (low, high) in self.region.items():
             dim = _axis(result, name)
             inside = np.flatnonzero((result[dim].values >= low) & (result[dim].values <= high))
             if inside.size == 0:
                 ends = f"{result[dim].values.min():g} to {result[dim].values.max():g}"
                 raise SeparatrixError(f"{wish} {name}: found {low:g} to {high:g}, allowed {ends}", USAGE)
-            places[dim] = slice(int(inside[0]), int(inside[-1]) + 1)
-        return self._in_units(result.isel(places))
+            ranges[dim] = slice(int(inside[0]), int(inside[-1]) + 1)
+        return self._in_units(result.isel(ranges))
 
     def factor(self, unit: str) -> float:
         """Return by what a number in an SI unit is multiplied."""
         return next((1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit), 1.0)
 
     def unit(self, si: str) -> str:
-        """Return the unit that takes the place of an SI unit."""
+        """Return the unit that is used instead of an SI unit."""
         return next((name for name in self.units if UNITS[name][0] == si), si)
 
     def _in_units(self, result: xr.Dataset) -> xr.Dataset:

@@ -32,10 +32,10 @@ def shaded(
     """
     image = np.empty((*index.shape, 3))
     ranked, times_ranked = by or (index, settle_time)
-    for place, entry in enumerate(entries):
-        mine = index == place
+    for position, entry in enumerate(entries):
+        mine = index == position
         times = settle_time[mine]
-        values, numbers = np.unique(times_ranked[ranked == place], return_counts=True)
+        values, numbers = np.unique(times_ranked[ranked == position], return_counts=True)
         ranks = (np.cumsum(numbers) - 0.5 * numbers) / max(1, numbers.sum())
         known = np.isfinite(values)
         rank = np.full(times.shape, 0.5)
@@ -53,16 +53,16 @@ def draw(
     result: xr.Dataset,
     across: str,
     others: list[str],
-    places: list[tuple],
+    slices: list[tuple],
     look: Look,
 ) -> tuple[dict[int, dict], list[str]]:
     """Mark the points of each attractor on the section; return how, by label, and what the picture lacks."""
     marked: dict[int, dict] = {}
     lacking: dict[str, None] = {}
-    for ax, place in zip(grid, places, strict=True):
-        # The place in the whole result: the catalogue counts its slices.
+    for ax, indices in zip(grid, slices, strict=True):
+        # Indices in the whole result: the catalogue counts its slices.
         at = {}
-        for name, k in zip(others, place, strict=True):
+        for name, k in zip(others, indices, strict=True):
             old = whole[name].values
             at[name] = int(
                 np.abs(old - result[name].values[k] / look.factor(whole[name].attrs.get("units"))).argmin()
@@ -90,7 +90,7 @@ def draw(
 
 
 def _not_shown(whole: xr.Dataset, identity: int, x: np.ndarray, v: np.ndarray) -> list[str]:
-    """Say how many points of an attractor the map has no place for."""
+    """Note how many points of an attractor are outside the map."""
     if not np.isfinite(x).all():
         return [f"points of attractor {identity}: not known"]
     outside = np.zeros(x.size, bool)

@@ -37,9 +37,9 @@ def history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     apart.plot(time, distance, color=style.MOTION)
     apart.set_ylabel(f"{name} ({unit(result['x'])})")
     grounded = [] if carried_stop(result) else _stops(result)
-    for ax, places in ((both, grounded), (apart, stops)):
-        for place in places:
-            ax.axhline(place, color=style.BARRIER, linewidth=1.2, zorder=1)
+    for ax, levels in ((both, grounded), (apart, stops)):
+        for level in levels:
+            ax.axhline(level, color=style.BARRIER, linewidth=1.2, zorder=1)
     apart.set_xlabel(axis_label(result["time"]))
     shaded = set()
     for ax in page.axes:

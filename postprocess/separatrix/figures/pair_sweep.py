@@ -26,11 +26,11 @@ def regimes(result: xr.Dataset, name: str, title: str, look: Look = DEFAULT) -> 
     top, bottom = page.axes
     values = result[name].values
     handles = []
-    for place, code in enumerate(result["direction"].values):
-        if not np.any(result["reason"].isel(direction=place).values):
+    for run, code in enumerate(result["direction"].values):
+        if not np.any(result["reason"].isel(direction=run).values):
             continue
-        largest = result["v_max"].isel(direction=place).values
-        section = result["section_v"].isel(direction=place).transpose(name, "sample").values
+        largest = result["v_max"].isel(direction=run).values
+        section = result["section_v"].isel(direction=run).transpose(name, "sample").values
         marks = {"linestyle": "", "marker": "o", "color": _COLOURS[int(code)], "markeredgewidth": 0.6}
         shape = {"markersize": 3.4, "markerfacecolor": "none"} if code == 0 else {"markersize": 1.5}
         top.plot(values, largest, **marks, **shape)
@@ -63,8 +63,8 @@ def regimes(result: xr.Dataset, name: str, title: str, look: Look = DEFAULT) -> 
 def spans(result: xr.Dataset, name: str) -> list[tuple[float, float, str]]:
     """Return intervals of the parameter and the regime of the first run in them, bounded by the limits."""
     values = result[name].values
-    place = int(np.flatnonzero(result["reason"].transpose("direction", name).values.any(axis=1))[0])
-    codes = result["regime"].isel(direction=place).values
+    run = int(np.flatnonzero(result["reason"].transpose("direction", name).values.any(axis=1))[0])
+    codes = result["regime"].isel(direction=run).values
     names = flag_names(result["regime"])
     order = np.argsort(values)
     values, codes = values[order], codes[order]

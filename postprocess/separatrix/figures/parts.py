@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a caption says about a machine of several bodies and structures, taken from its resolved case."""
+"""Captions of a machine of several bodies and structures, from its resolved case."""
 
 from collections.abc import Iterator, Mapping, Set
 
 _JOINTS = ("spring", "friction", "contact")
-# 0 unless the case says otherwise, so not mentioned where they are 0
+# 0 by default, so not mentioned where they are 0
 _ZERO = (
     "load", "x0", "v0", "quadratic", "cubic", "modulation", "damping", "damping_ratios", "free_length",
     "velocity", "tension", "mean", "amplitude", "angle",
@@ -90,5 +90,5 @@ def _listed(values: list, path: str = "", axes: Set[str] = frozenset()) -> str:
     """A list as text, with a dash for an element that is an axis; a long one is in the file."""
     if len(values) > _LONGEST:
         return f"of {len(values)} numbers, in the result file"
-    varies = [f"{path.replace('.', '_')}_{place}" in axes for place in range(1, len(values) + 1)]
+    varies = [f"{path.replace('.', '_')}_{number}" in axes for number in range(1, len(values) + 1)]
     return f"({', '.join('-' if axis else f'{one:.6g}' for one, axis in zip(values, varies, strict=True))})"

@@ -20,11 +20,11 @@ _MOST, _LONGEST = 12, 64
 _PLANE = 2
 
 
-def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+def points(result: xr.Dataset, indices: Mapping[str, int]) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Yield label, positions and velocities of each periodic attractor of one slice.
 
     They are those at the crank angle of the starts, not numbers where they cannot be computed.
-    `place`: the position on the axes that are not x0 and v0.
+    `indices`: those on the axes that are not x0 and v0.
     Nothing comes of several bodies, whose section has more coordinates, of a file without a case, and without
     the library.
     """
@@ -36,15 +36,15 @@ def points(result: xr.Dataset, place: Mapping[str, int]) -> Iterator[tuple[int, 
         return
     parameters = [name for name in result["regime"].dims if not is_start(name)]
     shape = tuple(result.sizes[name] for name in parameters)
-    number = int(np.ravel_multi_index([place[name] for name in parameters], shape)) if parameters else 0
+    number = int(np.ravel_multi_index([indices[name] for name in parameters], shape)) if parameters else 0
     rows = np.flatnonzero((catalogue["slice"].values == number) & (catalogue["count"].values > 0))
     angle = float(case.get("start", {}).get("crank_angle", 0.0))
-    if "crank_angle" in place:
-        angle = float(result["crank_angle"].values[place["crank_angle"]])
+    if "crank_angle" in indices:
+        angle = float(result["crank_angle"].values[indices["crank_angle"]])
     try:
         model = Model.from_text(str(result.attrs["resolved_case"]))
         paths = {path.replace(".", "_"): path for path in model.parameters}
-        values = {paths[name]: float(result[name].values[place[name]]) for name in parameters}
+        values = {paths[name]: float(result[name].values[indices[name]]) for name in parameters}
         for row in rows[:_MOST]:
             entry = {name: catalogue[name].values[row] for name in ("attractor", "period", "x", "v")}
             if 0 < entry["period"] <= _LONGEST:

@@ -72,7 +72,7 @@ def sampled(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     codes, numbers = np.unique(labels.values, return_counts=True)
     totals = dict(zip(codes.tolist(), numbers.tolist(), strict=True))
     entries = recoloured(classes(result, "attractor", totals), look.colours)
-    places = result[varying[0]].values if varying else np.array([0.0])
+    positions = result[varying[0]].values if varying else np.array([0.0])
     page = Page(look, (style.SINGLE_COLUMN, 50.0))
     (ax,) = page.axes
     columns = {
@@ -82,7 +82,7 @@ def sampled(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
         mine = np.isin(columns["attractor"], entry.codes)
         if not mine.any():
             continue
-        at = places[columns["slice"][mine]] if varying else np.full(mine.sum(), number)
+        at = positions[columns["slice"][mine]] if varying else np.full(mine.sum(), number)
         share, low, high = (100 * columns[name][mine] for name in ("share", "share_lower", "share_upper"))
         ax.errorbar(
             at, share, np.abs([share - low, high - share]), color=entry.colour, marker="o", markersize=3,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The share of motions that random impulses have not taken out of their basin, and the law of rare impulses."""
+"""The share of motions that stay in their basin under random impulses, and the law of rare impulses."""
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -38,8 +38,8 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     about = result.attrs
     caption = [
         *caption_pieces(result, look, describe_case(result)),
-        f"attractor {about['attractor']}, {about['motions']} motions, {about['rate']:.4g} impulses a second of "
-        f"standard deviation {about['deviation']:.4g} m/s, p = {about['p']:.4g}; bands: 95 % confidence",
+        f"attractor {about['attractor']}, {about['motions']} motions, {about['rate']:.4g} impulses a second "
+        f"of standard deviation {about['deviation']:.4g} m/s, p = {about['p']:.4g}; bands: 95 % confidence",
         plain(version_text(result)),
     ]
     return page.finish(title, caption, lines)

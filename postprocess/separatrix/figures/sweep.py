@@ -73,9 +73,9 @@ def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) ->
     runs = _directions(result)
     agree = _runs_agree(section) if len(runs) == 2 else np.zeros(values.size, bool)
     colours = {code: (style.RUN_UP, style.RUN_DOWN)[code] for _, code in runs}
-    for place, code in runs:
-        _thin_points(top, values, section[place], ~agree, colours[code])
-        _thin_points(bottom, values, speed[place][:, np.newaxis], ~agree, colours[code])
+    for index, code in runs:
+        _thin_points(top, values, section[index], ~agree, colours[code])
+        _thin_points(bottom, values, speed[index][:, np.newaxis], ~agree, colours[code])
     _thin_points(top, values, section[0], agree, style.BOTH_RUNS)
     _thin_points(bottom, values, speed[0][:, np.newaxis], agree, style.BOTH_RUNS)
     _draw_barriers(top, result)
@@ -151,10 +151,10 @@ def _draw_runs(ax: Axes, result: xr.Dataset, name: str) -> list[Line2D]:
 
 def _draw_run_pair(ax: Axes, values: np.ndarray, runs: np.ndarray, result: xr.Dataset) -> None:
     """Draw run-up as open circles and run-down as dots inside them: both stay visible where they agree."""
-    for (place, code), handle in zip(_directions(result), _run_handles(result), strict=True):
+    for (index, code), handle in zip(_directions(result), _run_handles(result), strict=True):
         ax.plot(
             values,
-            runs[place],
+            runs[index],
             linestyle="",
             marker=handle.get_marker(),
             markersize=handle.get_markersize(),
@@ -181,11 +181,11 @@ def _run_handles(result: xr.Dataset) -> list[Line2D]:
 def _directions(result: xr.Dataset) -> list[tuple[int, int]]:
     """Return position and code of the directions that were run; a sweep may have been one-way."""
     done = (np.isfinite(result["x_max"]) & (result["reason"] != _NOT_RUN)).any(swept_axis(result)).values
-    return [(place, int(code)) for place, code in enumerate(result["direction"].values) if done[place]]
+    return [(index, int(code)) for index, code in enumerate(result["direction"].values) if done[index]]
 
 
 def _barriers(result: xr.Dataset) -> list[float]:
-    """Their places in the unit of the positions."""
+    """Their positions in the unit of the result."""
     one = UNITS.get(unit(result["x_max"]), ("m", 1.0))[1]
     return [
         float(result.attrs[key]) / one for key in ("barrier_upper", "barrier_lower") if key in result.attrs
@@ -252,12 +252,12 @@ def _name_region(ax: Axes, region: Region, width: float, height: float) -> None:
 
 
 def _write_above(
-    ax: Axes, place: float, text: str, offset: tuple[float, float], rotation: float = 0, **options: float
+    ax: Axes, x: float, text: str, offset: tuple[float, float], rotation: float = 0, **options: float
 ) -> None:
-    """Write text `offset` points from a place; turned text starts there instead of straddling it."""
+    """Write text `offset` points from x; turned text starts there instead of straddling it."""
     ax.annotate(
         text,
-        (place, 1.0),
+        (x, 1.0),
         xycoords=("data", "axes fraction"),
         xytext=offset,
         textcoords="offset points",

@@ -25,7 +25,7 @@ from separatrix.open import flag_names
 ZOOM_PERIODS = 5
 _MOST_SAMPLES = 4000
 _MOST_MARKERS = 150
-# lines of the bodies beside the watched one, as many as can be told apart
+# lines of the bodies beside the watched one, as many as can be distinguished
 _OTHER_LINES = ("-", (0, (4, 2)), (0, (1, 1)), (0, (6, 2, 1, 2)))
 # numbers among the attributes, and the variable whose unit each has
 _NUMBERS = {
@@ -187,7 +187,7 @@ def steady_path(result: xr.Dataset, start: float) -> tuple[np.ndarray, np.ndarra
     hits = hits[result["event_time"].values[hits] >= start]
     event_time, event_x = result["event_time"].values[hits], result["event_x"].values[hits]
     before, after = result["event_v_before"].values[hits], result["event_v_after"].values[hits]
-    # a sample at the instant of an impact may hold either velocity: the event says both
+    # a sample at the instant of an impact may hold either velocity: the event has both
     steady &= ~np.isin(np.arange(time.size), _at_instants(time, event_time))
     where = np.searchsorted(time[steady], event_time)
     gap = np.full(hits.size, np.nan)
@@ -200,8 +200,8 @@ def steady_path(result: xr.Dataset, start: float) -> tuple[np.ndarray, np.ndarra
 def on_circle(position: np.ndarray, velocity: np.ndarray, turn: float) -> tuple[np.ndarray, np.ndarray]:
     """Return a path of an angle within half a turn of zero, broken by a NaN where it leaves one side."""
     turns = np.floor(position / turn + 0.5)
-    seams = np.flatnonzero(np.diff(turns) != 0) + 1
-    return np.insert(position - turn * turns, seams, np.nan), np.insert(velocity, seams, np.nan)
+    jumps = np.flatnonzero(np.diff(turns) != 0) + 1
+    return np.insert(position - turn * turns, jumps, np.nan), np.insert(velocity, jumps, np.nan)
 
 
 def _at_instants(time: np.ndarray, instants: np.ndarray) -> np.ndarray:
@@ -239,7 +239,7 @@ def _mark_impacts(ax: Axes, result: xr.Dataset) -> bool:
 
 
 def _envelope(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return fewer samples with the same extremes: the smallest and the largest one of each stretch."""
+    """Return fewer samples with the same extremes: the smallest and the largest one of each interval."""
     if time.size <= _MOST_SAMPLES:
         return time, values
     starts = np.linspace(0, time.size, _MOST_SAMPLES // 2 + 1).astype(int)

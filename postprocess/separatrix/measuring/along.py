@@ -15,7 +15,7 @@ from separatrix.cases import Case, as_case
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.maps import Values, basin
 from separatrix.measuring.api import NAMES, measures
-from separatrix.measuring.maps import place_of
+from separatrix.measuring.maps import indices_of
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.variables import FORMAT_VERSION, is_start
@@ -63,8 +63,8 @@ def measures_along(
         Those of `measures`: frequency, deviation, starts, phases, seed, threads, new_starts, attractors.
 
     The Dataset has dimensions of the parameter and `basin` (numbers of the attractors), and for each measure
-    NAME, NAME_lower and NAME_upper; nan where the attractor is not there, or nothing is known. `exists` tells
-    whether an attractor is in the catalogue of a value, `limits` what limits the measures.
+    NAME, NAME_lower and NAME_upper; nan where the attractor is not there, or nothing is known. `exists` is
+    1 if an attractor is in the catalogue of a value, `limits` what limits the measures.
 
     Examples
     --------
@@ -84,17 +84,17 @@ def measures_along(
     dim = _parameter(result, parameter, slice)
     done = _Done(target, _identity(result, dim, chosen, slice, options), resume)
     rows = []
-    with Progress(progress) as told:
+    with Progress(progress) as report:
         for number, value in enumerate(result[dim].values.tolist()):
             row = done.row(number)
             if row is None:
-                place = {**(slice or {}), dim: value}
+                fixed = {**(slice or {}), dim: value}
                 found = measures(
-                    result, chosen, slice=place, progress=False, **_there(result, place, options)
+                    result, chosen, slice=fixed, progress=False, **_there(result, fixed, options)
                 )
                 row = done.keep(number, [one.as_dict() for one in found])
             rows.append(row)
-            told("values", number + 1, result.sizes[dim])
+            report("values", number + 1, result.sizes[dim])
     data = _dataset(result, dim, rows)
     if target is None:
         return data
@@ -103,7 +103,7 @@ def measures_along(
     return open_result(target)
 
 
-def _there(result: xr.Dataset, place: Mapping[str, float], options: Mapping) -> dict:
+def _there(result: xr.Dataset, fixed: Mapping[str, float], options: Mapping) -> dict:
     """The options with those of the attractors asked for that have a basin at a value."""
     wanted = options.get("attractors")
     if wanted is None:
@@ -117,7 +117,9 @@ def _there(result: xr.Dataset, place: Mapping[str, float], options: Mapping) -> 
         )
     if "sample" in result["attractor"].dims:
         return dict(options)
-    present = {int(one) for one in np.unique(result["attractor"].isel(place_of(result, dict(place))).values)}
+    present = {
+        int(one) for one in np.unique(result["attractor"].isel(indices_of(result, dict(fixed))).values)
+    }
     return {**options, "attractors": [one for one in asked if one in present]}
 
 
@@ -162,8 +164,8 @@ def _identity(result: xr.Dataset, dim: str, *more: object) -> str:
     more = tuple(
         {k: v for k, v in one.items() if k != "threads"} if isinstance(one, dict) else one for one in more
     )
-    said = json.dumps([result.attrs.get("resolved_case"), dim, *more], default=str, sort_keys=True)
-    return f"{zlib.crc32(said.encode()):08x}{zlib.crc32(labels.tobytes()):08x}"
+    content = json.dumps([result.attrs.get("resolved_case"), dim, *more], default=str, sort_keys=True)
+    return f"{zlib.crc32(content.encode()):08x}{zlib.crc32(labels.tobytes()):08x}"
 
 
 class _Done:
@@ -252,8 +254,8 @@ def _existence(result: xr.Dataset, dim: str, numbers: list[int], count: int) -> 
     """Which attractors the catalogue has at each value, at any of the other parameters."""
     exists = np.zeros((count, len(numbers)), np.int8)
     dims = [str(name) for name in result["attractor"].dims if not is_start(str(name))]
-    places = np.unravel_index(result["catalogue_slice"].values, [result.sizes[name] for name in dims])
-    for at, label in zip(places[dims.index(dim)], result["catalogue_attractor"].values, strict=True):
+    indices = np.unravel_index(result["catalogue_slice"].values, [result.sizes[name] for name in dims])
+    for at, label in zip(indices[dims.index(dim)], result["catalogue_attractor"].values, strict=True):
         exists[int(at), numbers.index(int(label))] = 1
     return {
         "exists": (

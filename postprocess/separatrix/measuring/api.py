@@ -10,7 +10,7 @@ import xarray as xr
 
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.measuring import boundaries, integrity, phases
-from separatrix.measuring.maps import Slice, place_of, slice_of
+from separatrix.measuring.maps import Slice, indices_of, slice_of
 from separatrix.measuring.report import Measure, Measures
 from separatrix.measuring.sampling import share_interval
 from separatrix.measuring.tipping import Tipping, tipping_matrix
@@ -115,10 +115,10 @@ def measures(
     work = [(name, own) for name in chosen if name in EACH for own in owns]
     work += [(name, None) for name in chosen if name in WHOLE]
     answers: list[Measure] = []
-    with Progress(progress) as told:
+    with Progress(progress) as report:
         for number, (name, own) in enumerate(work):
             answers += _one(found, name, own, deviation)
-            told("measures", number + 1, len(work))
+            report("measures", number + 1, len(work))
     about = dict(found.about)
     about["new starts"] = found.machine.counted if found.machine else 0
     about["seed"] = seed
@@ -173,10 +173,10 @@ def _of_sample(
     result: xr.Dataset, chosen: Mapping[str, float] | None, wanted: Sequence[int] | int | None
 ) -> Measures:
     """Of starts drawn at random: the shares, which are basin stability under the density of the case."""
-    place = place_of(result, dict(chosen or {})) if chosen else {}
+    indices = indices_of(result, dict(chosen or {})) if chosen else {}
     asked = None if wanted is None else {wanted} if isinstance(wanted, int) else set(wanted)
     catalogue = table(result, "catalogue")
-    told = (
+    definition = (
         "basin stability: the probability that a start drawn from the density of the case ends in the basin"
     )
     dims = [str(name) for name in result["attractor"].dims if not is_start(str(name))]
@@ -188,13 +188,13 @@ def _of_sample(
         at = np.unravel_index(int(catalogue["slice"].values[row]), shape) if shape else ()
         number = int(catalogue["attractor"].values[row])
         at = dict(zip(dims, map(int, at), strict=True))
-        if any(at.get(name, i) != i for name, i in place.items()) or (asked and number not in asked):
+        if any(at.get(name, i) != i for name, i in indices.items()) or (asked and number not in asked):
             continue
         where = {name: float(result[name].values[i]) for name, i in at.items()}
         found.append(
             Measure(
                 "basin_stability",
-                told,
+                definition,
                 "1",
                 number,
                 hits / count,

@@ -66,8 +66,8 @@ def in_cells(
 def missed_pieces(grid: np.ndarray, own: int) -> tuple[float, float]:
     """Return which share of cells of the basin may be of others, and of other cells which may be of it.
 
-    What lies between the points is told by the map of every second point: of the points that it leaves out,
-    so many in its cells of one label have another. These are the upper ends of Clopper and Pearson; on the
+    The map of every second point shows what lies between the points: of those that it leaves out, so many in
+    its cells of one label have another. These are the upper ends of Clopper and Pearson; on the
     finer grid less is missed.
     """
     odd = grid[tuple(slice(0, size - (size + 1) % 2) for size in grid.shape)]
@@ -92,9 +92,9 @@ def global_share(
     """Return the share of a window that one basin has.
 
     With a labelling function `starts` are drawn in the cells whose corners differ, and half as many each in
-    those of the basin and in those of others: the share is that of stratified sampling, the interval adds the
-    ends of Clopper and Pearson of the parts, or what `missed_pieces` says of cells whose corners are alike
-    where that is narrower. Without one cells with unlike corners count from none to all, and the value counts
+    those of the basin and in those of others. The share is that of stratified sampling. The interval adds the
+    ends of Clopper and Pearson of the parts; for cells whose corners are alike it takes `missed_pieces` where
+    that is narrower. Without one cells with unlike corners count from none to all, and the value counts
     points.
     """
     widths = np.ones(())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The largest ball round a motion (LIM), the largest ball of a basin (IF), the least impulse out of a basin."""
+"""The largest ball round a motion (LIM) and of a basin (IF), and the least impulse out of a basin."""
 
 from dataclasses import dataclass
 
@@ -167,11 +167,11 @@ def inscribed_ball(
     """
     spacing = np.array([axis[1] - axis[0] for axis in axes])
     half = float(np.linalg.norm(spacing)) / 2
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     away = map_distances(grid == own, spacing, region, axes)
-    others = places[grid != own]
+    others = points[grid != own]
     best: Ball | None = None
-    for centre, bound in _peaks(places, away, candidates):
+    for centre, bound in _peaks(points, away, candidates):
         if best is not None and bound + half <= best.inner:
             continue
         ball = _grown(labels, centre, own, bound, half, others, region, samples, seed)
@@ -187,8 +187,8 @@ def map_distances(
     mask: np.ndarray, spacing: np.ndarray, region: Region, axes: list[np.ndarray]
 ) -> np.ndarray:
     """Distance of every point of a mask to the nearest point outside it, or to the edge of the region."""
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
-    edge = np.maximum(region.edge(places), 0).reshape(mask.shape)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    edge = np.maximum(region.edge(points), 0).reshape(mask.shape)
     return edge if mask.all() else np.minimum(edge, _distances(mask, spacing, region))
 
 
@@ -202,15 +202,15 @@ def _distances(mask: np.ndarray, spacing: np.ndarray, region: Region) -> np.ndar
     return away[tuple(slice(a, a + n) for (a, _), n in zip(pad, mask.shape, strict=True))]
 
 
-def _peaks(places: np.ndarray, away: np.ndarray, count: int) -> list[tuple[np.ndarray, float]]:
+def _peaks(points: np.ndarray, away: np.ndarray, count: int) -> list[tuple[np.ndarray, float]]:
     """The best centres that are apart from one another by more than half their radius."""
     left, found = away.copy(), []
     for _ in range(count):
         at = np.unravel_index(int(np.argmax(left)), left.shape)
         if not left[at] > 0:
             break
-        found.append((places[at].copy(), float(away[at])))
-        left[np.linalg.norm(places - places[at], axis=-1) < away[at] / 2] = 0
+        found.append((points[at].copy(), float(away[at])))
+        left[np.linalg.norm(points - points[at], axis=-1) < away[at] / 2] = 0
     return found
 
 

@@ -20,7 +20,7 @@ _NEEDS = "needs new starts"
 
 def basin_entropy(found: Slice) -> list[Measure]:
     """Entropy of all discs and of those with two basins, over several radii."""
-    told = (
+    definition = (
         "Sb: the mean over discs of -sum p ln p, p the shares of the basins among the starts drawn in a disc"
     )
     edge = "Sbb: the same over the discs in which more than one basin was found; above ln 2 it is fractal"
@@ -28,7 +28,7 @@ def basin_entropy(found: Slice) -> list[Measure]:
     if found.machine is None:
         return [
             Measure(name, text, limits=(*found.limits, _NEEDS))
-            for name, text in zip(names, (told, edge), strict=True)
+            for name, text in zip(names, (definition, edge), strict=True)
         ]
     size = float(found.region.size.min())
     radii = [size * part for part in RADII]
@@ -63,7 +63,7 @@ def basin_entropy(found: Slice) -> list[Measure]:
     return [
         Measure(
             names[0],
-            told,
+            definition,
             "1",
             None,
             *first.bounds(first.all_discs, first.discs),
@@ -87,7 +87,7 @@ def basin_entropy(found: Slice) -> list[Measure]:
 
 
 def verdict(results: list[entropy.Entropy]) -> str:
-    """Say what the test of smoothness finds; a Bonferroni bound over the radii."""
+    """Return what the test of smoothness finds; a Bonferroni bound over the radii."""
     probability = min(1.0, len(results) * min(one.probability for one in results))
     finest = results[-1]
     if any(one.unsure for one in results):
@@ -107,21 +107,19 @@ def verdict(results: list[entropy.Entropy]) -> str:
 
 def uncertainty_exponent(found: Slice) -> Measure:
     """Exponent of the share of uncertain starts over the decades of their uncertainty."""
-    told = (
+    definition = (
         "alpha: the share of starts whose label differs at the distance eps goes as eps^alpha; 1 of "
         "a smooth "
         "boundary, its dimension is that of the window less alpha"
     )
     if found.machine is None:
-        return Measure("uncertainty_exponent", told, limits=(*found.limits, _NEEDS))
+        return Measure("uncertainty_exponent", definition, limits=(*found.limits, _NEEDS))
     one = uncertainty.uncertainty_exponent(found.machine.labels, found.region, seed=found.seed)
     limits = list(found.limits)
     if one.lost > 0:
         limits.append(f"{100 * one.lost:.3g} % of the starts have no known label and count as certain")
     size = float(found.region.size.min())
-    limits.append(
-        "says nothing of what is smaller than the least eps, 1e-10 of the shortest side of the window"
-    )
+    limits.append("structure below the least eps is not resolved: 1e-10 of the shortest side of the window")
     if not math.isfinite(one.value):
         limits.append("no uncertain starts: no boundary was met")
     fitted = one.sizes[(one.sizes <= 1e-2 * size * (1 + 1e-9)) & (one.shares > 0)]
@@ -134,7 +132,7 @@ def uncertainty_exponent(found: Slice) -> Measure:
         }
     return Measure(
         "uncertainty_exponent",
-        told,
+        definition,
         "1",
         None,
         one.value,
@@ -149,7 +147,7 @@ def uncertainty_exponent(found: Slice) -> Measure:
 
 def wada_merging(found: Slice) -> Measure:
     """Share of boundary points of the map that are not on the boundary of every basin."""
-    told = (
+    definition = (
         "share of the boundary points of the map that are farther than 2 points from the boundary "
         "of some basin "
         "against all others merged; 0 if all basins share one boundary"
@@ -157,16 +155,16 @@ def wada_merging(found: Slice) -> Measure:
     basins = [label for label in np.unique(found.grid) if label > 0]
     if len(basins) < 3:
         return Measure(
-            "wada_merging", told, limits=(*found.limits, f"{len(basins)} basins: Wada needs three")
+            "wada_merging", definition, limits=(*found.limits, f"{len(basins)} basins: Wada needs three")
         )
     distances, shares = wada.merging(found.grid, tuple(np.isfinite(found.region.turns)))
     if not len(distances):
         limits = (*found.limits, "no two basins of the map are neighbours")
-        return Measure("wada_merging", told, limits=limits)
+        return Measure("wada_merging", definition, limits=limits)
     value = float(shares[min(2, len(shares) - 1)])
     return Measure(
         "wada_merging",
-        told,
+        definition,
         "1",
         None,
         value,
@@ -174,33 +172,35 @@ def wada_merging(found: Slice) -> Measure:
         math.nan,
         "",
         {"basins": tuple(map(int, basins)), "distance": "2 points"},
-        (*found.limits, "resolution of the map: says nothing of what is smaller than its points"),
+        (*found.limits, "resolution of the map: structure between its points is not resolved"),
         {"distances": distances, "shares_farther": shares, "largest_distance": float(distances[-1])},
     )
 
 
 def wada_grid(found: Slice) -> Measure:
     """Share of the cells on boundaries that show all basins when refined."""
-    told = (
+    definition = (
         "W_N: the share of the map's cells with corners of two labels that show all N basins once "
         "the segments "
-        "between their corners are bisected with new starts; 1 says Wada, 0 that no cell shows all of "
+        "between their corners are bisected with new starts; 1 indicates Wada, 0 that no cell shows all of "
         "them"
     )
     basins = [label for label in np.unique(found.grid) if label > 0]
     if len(basins) < 3:
-        return Measure("wada_grid", told, limits=(*found.limits, f"{len(basins)} basins: Wada needs three"))
+        return Measure(
+            "wada_grid", definition, limits=(*found.limits, f"{len(basins)} basins: Wada needs three")
+        )
     if found.machine is None:
-        return Measure("wada_grid", told, limits=(*found.limits, _NEEDS))
+        return Measure("wada_grid", definition, limits=(*found.limits, _NEEDS))
     cells = wada.grid_method(found.machine.labels, found.grid, found.axes, seed=found.seed)
     steps = len(cells.shares) - 1
     total = int(cells.counts[-1].sum())
     if total == 0:
-        return Measure("wada_grid", told, limits=(*found.limits, "no cell has corners of two labels"))
+        return Measure("wada_grid", definition, limits=(*found.limits, "no cell has corners of two labels"))
     hits = int(cells.counts[-1][-1])
     return Measure(
         "wada_grid",
-        told,
+        definition,
         "1",
         None,
         hits / total,

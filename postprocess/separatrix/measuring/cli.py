@@ -50,7 +50,7 @@ def _check(options: argparse.Namespace) -> None:
         raise SeparatrixError("--along: needs -o FILE.h5", USAGE)
 
 
-def _judge(options: argparse.Namespace, *results: xr.Dataset) -> None:
+def _refuse_given_up(options: argparse.Namespace, *results: xr.Dataset) -> None:
     """Refuse maps all of whose points were given up, unless they are asked for."""
     for path, result in zip(options.files, results, strict=True):
         if not options.partial:
@@ -64,11 +64,11 @@ def _answer(options: argparse.Namespace) -> str:
             open_result(options.files[0]) as one,
             open_result(options.files[1]) as two,
         ):
-            _judge(options, one, two)
+            _refuse_given_up(options, one, two)
             matrix = tipping(one, two)
         return _written(options, tipping_text(matrix), tipping_dict(matrix))
     with reading(options.files[0]), open_result(options.files[0]) as result:
-        _judge(options, result)
+        _refuse_given_up(options, result)
         given = {
             "attractors": options.attractor,
             "frequency": options.frequency,
@@ -94,15 +94,15 @@ def _answer(options: argparse.Namespace) -> str:
 
 
 def _written(options: argparse.Namespace, text: str, data: dict) -> str:
-    said = json.dumps(data, indent=1)
+    document = json.dumps(data, indent=1)
     if options.output:
         try:
-            options.output.write_text(said + "\n")
+            options.output.write_text(document + "\n")
         except OSError as error:
             raise SeparatrixError(
                 f"{options.output}: cannot be written ({error.strerror})", CANNOT_CREATE
             ) from error
-    return said if options.json else text
+    return document if options.json else text
 
 
 def tipping_text(matrix: Tipping) -> str:
@@ -187,7 +187,8 @@ def _parser() -> Parser:
         "--phases",
         metavar="N",
         type=whole_number(2),
-        help="also the measures over N crank angles; critical impulse, safe basin, local integrity of the orbit",
+        help="also the measures over N crank angles; critical impulse, safe basin, local integrity of the "
+        "orbit",
     )
     parser.add_argument(
         "--along",
@@ -199,7 +200,7 @@ def _parser() -> Parser:
         action="store_true",
         help="two maps: where the starts of each basin of the first lie in the second",
     )
-    parser.add_argument("--map-only", action="store_true", help="no new starts: what the map alone tells")
+    parser.add_argument("--map-only", action="store_true", help="no new starts: what the map alone shows")
     parser.add_argument(
         "--seed", metavar="N", type=whole_number(0), default=1, help="of all that is drawn [1]"
     )

@@ -55,18 +55,20 @@ def global_integrity(found: Slice, own: int) -> Measure:
 
 def local_integrity(found: Slice, own: int) -> Measure:
     """Radius of the largest ball round the motion, over its points on the section of the map."""
-    told = (
+    definition = (
         "LIM: the largest distance within which every start belongs to the basin, round each "
         "section point of "
         "the motion; the least of them"
     )
     points = found.machine.section(own) if found.machine else None
     if points is None:
-        return Measure("local_integrity", told, found.unit, own, limits=(*found.limits, _no_points(found)))
-    return ball_at(found, own, points, None, told)
+        return Measure(
+            "local_integrity", definition, found.unit, own, limits=(*found.limits, _no_points(found))
+        )
+    return ball_at(found, own, points, None, definition)
 
 
-def ball_at(found: Slice, own: int, points: np.ndarray, angle: float | None, told: str) -> Measure:
+def ball_at(found: Slice, own: int, points: np.ndarray, angle: float | None, definition: str) -> Measure:
     """The least of the largest balls round section points at a crank angle."""
     machine = found.machine
 
@@ -79,7 +81,7 @@ def ball_at(found: Slice, own: int, points: np.ndarray, angle: float | None, tol
         if labels(point[None])[0] != own:
             return Measure(
                 "local_integrity",
-                told,
+                definition,
                 found.unit,
                 own,
                 limits=(
@@ -102,11 +104,11 @@ def ball_at(found: Slice, own: int, points: np.ndarray, angle: float | None, tol
         ball = balls.largest_ball(labels, point, own, reach, known, seed=found.seed)
         if best is None or ball.inner < best.inner:
             best, reach_limited = ball, math.isinf(ball.outer)
-    return _ball(found, own, best, told, reach_limited, angle)
+    return _ball(found, own, best, definition, reach_limited, angle)
 
 
 def _ball(
-    found: Slice, own: int, ball: balls.Ball, told: str, reach_limited: bool, angle: float | None
+    found: Slice, own: int, ball: balls.Ball, definition: str, reach_limited: bool, angle: float | None
 ) -> Measure:
     limits = list(found.limits)
     value, lower, upper = ball.inner, ball.inner, ball.outer
@@ -134,27 +136,37 @@ def _ball(
     )
     parameters = {} if angle is None else {"crank_angle": angle}
     return Measure(
-        "local_integrity", told, found.unit, own, value, lower, upper, RAY, parameters, tuple(limits), details
+        "local_integrity",
+        definition,
+        found.unit,
+        own,
+        value,
+        lower,
+        upper,
+        RAY,
+        parameters,
+        tuple(limits),
+        details,
     )
 
 
 def _no_points(found: Slice) -> str:
     if found.machine is None:
         return "needs new starts"
-    return "needs a motion with section points over x0 and v0: a cycle, or one place of rest"
+    return "needs a motion with section points over x0 and v0: a cycle, or one rest position"
 
 
 def integrity_factor(found: Slice, own: int) -> Measure:
     """Radius of the largest ball anywhere in the basin."""
-    told = "IF: the radius of the largest ball of starts within the window that all belong to the basin"
+    definition = "IF: the radius of the largest ball of starts within the window that all belong to the basin"
     interval = "a ball that was tried; its radius in the map and half a diagonal of its cells"
     if not found.even:
         limit = "needs evenly spaced axes with two values or more"
-        return Measure("integrity_factor", told, found.unit, own, limits=(*found.limits, limit))
+        return Measure("integrity_factor", definition, found.unit, own, limits=(*found.limits, limit))
     if not (found.grid == own).any():
         return Measure(
             "integrity_factor",
-            told,
+            definition,
             found.unit,
             own,
             0.0,
@@ -164,12 +176,16 @@ def integrity_factor(found: Slice, own: int) -> Measure:
         )
     labels = found.machine.labels if found.machine else None
     if labels is None:
-        return _factor_of_map(found, own, told)
+        return _factor_of_map(found, own, definition)
     ball, bound = balls.inscribed_ball(labels, found.grid, found.axes, own, found.region, seed=found.seed)
     limits = list(found.limits)
     if not ball.settled:
         return Measure(
-            "integrity_factor", told, found.unit, own, limits=(*limits, "foreign starts went on turning up")
+            "integrity_factor",
+            definition,
+            found.unit,
+            own,
+            limits=(*limits, "foreign starts went on turning up"),
         )
     if math.isinf(ball.outer):
         limits.append("the ball ends at the edge of the window")
@@ -179,7 +195,7 @@ def integrity_factor(found: Slice, own: int) -> Measure:
     details = {"centre": ball.centre * found.scale, "samples": ball.samples}
     return Measure(
         "integrity_factor",
-        told,
+        definition,
         found.unit,
         own,
         ball.inner,
@@ -192,7 +208,7 @@ def integrity_factor(found: Slice, own: int) -> Measure:
     )
 
 
-def _factor_of_map(found: Slice, own: int, told: str) -> Measure:
+def _factor_of_map(found: Slice, own: int, definition: str) -> Measure:
     """Of the points of the map alone: no ball can be larger than their distances allow."""
     spacing = np.array([axis[1] - axis[0] for axis in found.axes])
     away = balls.map_distances(found.grid == own, spacing, found.region, found.axes)
@@ -200,7 +216,7 @@ def _factor_of_map(found: Slice, own: int, told: str) -> Measure:
     best = float(away.max())
     return Measure(
         "integrity_factor",
-        told,
+        definition,
         found.unit,
         own,
         best,
@@ -214,15 +230,15 @@ def _factor_of_map(found: Slice, own: int, told: str) -> Measure:
 
 def basin_stability(found: Slice, own: int, deviation: np.ndarray | None = None) -> Measure:
     """Share of the starts of a density that end in the basin."""
-    told = "basin stability: the probability that a start drawn from the density ends in the basin"
+    definition = "basin stability: the probability that a start drawn from the density ends in the basin"
     if found.machine is None:
-        return Measure("basin_stability", told, "1", own, limits=(*found.limits, "needs new starts"))
+        return Measure("basin_stability", definition, "1", own, limits=(*found.limits, "needs new starts"))
     if deviation is None:
         draw, density = areas.uniform(found.region), "uniform over the window"
     else:
         points = found.machine.section(own)
         if points is None:
-            return Measure("basin_stability", told, "1", own, limits=(*found.limits, _no_points(found)))
+            return Measure("basin_stability", definition, "1", own, limits=(*found.limits, _no_points(found)))
         sizes = np.asarray(deviation, float) / found.scale
         draw = _about(points, sizes)
         density = "normal about the section points, deviations " + ", ".join(
@@ -236,7 +252,7 @@ def basin_stability(found: Slice, own: int, deviation: np.ndarray | None = None)
         limits.append(f"{100 * share.not_known:.3g} % of the draws have no known label")
     return Measure(
         "basin_stability",
-        told,
+        definition,
         "1",
         own,
         share.value,
@@ -259,7 +275,7 @@ def _about(points: np.ndarray, sizes: np.ndarray) -> object:
 
 def convergence_time(found: Slice, own: int) -> Measure:
     """Mean time from a start of the basin to capture."""
-    told = (
+    definition = (
         "time from a start to capture by the attractor, mean over the starts of its basin in the "
         "window; median "
         "and quantiles in the details"
@@ -271,10 +287,12 @@ def convergence_time(found: Slice, own: int) -> Measure:
         drawn = found.machine.found(found.region.draw(found.starts, generator(found.seed, 8)))
         times, source = drawn["settle_time"][drawn["attractor"] == own], "new starts, uniform over the window"
     else:
-        return Measure("convergence_time", told, "s", own, limits=(*limits, "a refined map has no times"))
+        return Measure(
+            "convergence_time", definition, "s", own, limits=(*limits, "a refined map has no times")
+        )
     times = times[np.isfinite(times)]
     if not len(times):
-        return Measure("convergence_time", told, "s", own, limits=(*limits, "no start"))
+        return Measure("convergence_time", definition, "s", own, limits=(*limits, "no start"))
     found_times = convergence_times(times)
     entry = found.entries.get(own, {})
     radius, multiplier = entry.get("capture_radius", math.nan), abs(entry.get("multiplier", math.nan))
@@ -285,7 +303,7 @@ def convergence_time(found: Slice, own: int) -> Measure:
     )
     return Measure(
         "convergence_time",
-        told,
+        definition,
         "s",
         own,
         *found_times.mean,

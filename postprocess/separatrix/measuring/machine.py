@@ -68,13 +68,13 @@ class Machine:
             self.numbers[int(found.numbers["attractor"])] = int(entry["attractor"])
 
     def _like(self, entry: dict[str, float]) -> Attractor | None:
-        """The attractor that is an entry of a map: the same motion, at the same place on the section."""
+        """The attractor that is an entry of a map: the same motion, at the same point of the section."""
         for one in self.catalogue.attractors:
             mine = one.numbers
             if any(mine[name] != entry[name] for name in ("period", "regime", "event_word")):
                 continue
             if mine["period"] == 0:
-                # a family of cycles is no other motion without a period; older files do not tell
+                # a family of cycles differs from other motions without a period; older files have no kinds
                 if "kind" in entry and (mine["kind"] == _FAMILY) != (entry["kind"] == _FAMILY):
                     continue
                 return one
@@ -84,10 +84,10 @@ class Machine:
         return None
 
     def columns(self, points: np.ndarray, angle: float | None = None) -> np.ndarray:
-        """Return starts x, v, crank angle of scaled points; `angle` in the place of that of the case."""
+        """Return starts x, v, crank angle of scaled points; `angle` instead of that of the case."""
         starts = np.tile(self.start, (len(points), 1))
-        for place, name in enumerate(self.names):
-            starts[:, _COLUMNS[name]] = points[:, place] * self.scale[place]
+        for axis, name in enumerate(self.names):
+            starts[:, _COLUMNS[name]] = points[:, axis] * self.scale[axis]
         if angle is not None:
             starts[:, 2] = angle
         return starts
@@ -109,7 +109,7 @@ class Machine:
         numbered = np.zeros_like(own)
         for mine, theirs in self.numbers.items():
             numbered[own == mine] = theirs
-        # the library says reason 0 where it has not flown
+        # the reason of the library is 0 where it has not flown
         found["attractor"] = np.where(found["reason"] == 0, NO_START, numbered)
         return found
 

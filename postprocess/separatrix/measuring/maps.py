@@ -72,8 +72,8 @@ def slice_of(
     """
     _require_map(result)
     case = result.separatrix.case
-    place = place_of(result, dict(wanted or {}))
-    chosen = result.isel(place)
+    indices = indices_of(result, dict(wanted or {}))
+    chosen = result.isel(indices)
     names = tuple(str(name) for name in chosen["attractor"].dims)
     if not names:
         raise SeparatrixError("measures: the map has no axis of starts but the crank angle", USAGE)
@@ -83,7 +83,7 @@ def slice_of(
                 f"measures: axis {name} of the map has one value, allowed are 2 or more: a line has no area",
                 USAGE,
             )
-    frequency, source = _frequency(case, _values(result, place, case), frequency)
+    frequency, source = _frequency(case, _values(result, indices, case), frequency)
     scale = np.array([frequency if name.endswith("v0") or "_v0" in name else 1.0 for name in names])
     axes = [np.asarray(chosen[name].values, float) / one for name, one in zip(names, scale, strict=True)]
     grid = chosen["attractor"].values.astype(int)
@@ -94,10 +94,10 @@ def slice_of(
     grid, settle, axes = _closed(grid, settle, axes, turns)
     region = Region(np.array([axis.min() for axis in axes]), np.array([axis.max() for axis in axes]), turns)
     units = ("rad" if _is_angle(case) else "m",) * len(names)
-    entries = _entries(result, place)
+    entries = _entries(result, indices)
     title = str(result.attrs.get("title", ""))
     about = {"map": title} if title else {}
-    about |= {name: float(result[name].values[at]) for name, at in place.items()}
+    about |= {name: float(result[name].values[at]) for name, at in indices.items()}
     about["window"] = "; ".join(
         f"{name} {low:.6g} to {high:.6g} {'rad/s' if unit == 'rad' and 'v0' in name else unit}"
         f"{'/s' if unit == 'm' and 'v0' in name else ''}"
@@ -110,7 +110,7 @@ def slice_of(
         names, units, scale, region, axes, grid, settle, None, about, _label_limits(grid, result), entries
     )
     if new_starts:
-        _attach(found, case, _values(result, place, case), place, result, threads)
+        _attach(found, case, _values(result, indices, case), indices, result, threads)
     return found
 
 
@@ -125,9 +125,9 @@ def _require_map(result: xr.Dataset) -> None:
         raise SeparatrixError("measures: this map has no catalogue: none of its axes is a start", USAGE)
 
 
-def place_of(result: xr.Dataset, wanted: dict[str, float]) -> dict[str, int]:
-    """Where on the axes that are not position or velocity."""
-    place = {}
+def indices_of(result: xr.Dataset, wanted: dict[str, float]) -> dict[str, int]:
+    """Return the indices on the axes that are not position or velocity."""
+    indices = {}
     for name in map(str, result["attractor"].dims):
         given = next(
             (
@@ -147,23 +147,23 @@ def place_of(result: xr.Dataset, wanted: dict[str, float]) -> dict[str, int]:
                 "or go along them (measures_along, --along)",
                 USAGE,
             )
-        place[name] = 0 if given is None else int(np.abs(values - wanted.pop(given)).argmin())
+        indices[name] = 0 if given is None else int(np.abs(values - wanted.pop(given)).argmin())
     if wanted:
         raise SeparatrixError(
             f"slice: found {', '.join(wanted)}, allowed {', '.join(map(str, result['attractor'].dims))}",
             USAGE,
         )
-    return place
+    return indices
 
 
-def _values(result: xr.Dataset, place: Mapping[str, int], case: Case) -> dict[str, float]:
+def _values(result: xr.Dataset, indices: Mapping[str, int], case: Case) -> dict[str, float]:
     paths = {path.replace(".", "_").replace("[", "_").replace("]", ""): path for path in case.parameters}
     paths |= {
         str(axis["name"]).replace(".", "_"): str(axis["name"]) for axis in case.resolved.get("axis", [])
     }
     return {
         paths.get(name, name): float(result[name].values[at])
-        for name, at in place.items()
+        for name, at in indices.items()
         if name != "crank_angle"
     }
 
@@ -214,13 +214,13 @@ def _closed(
     return grid, settle, axes
 
 
-def _entries(result: xr.Dataset, place: Mapping[str, int]) -> dict[int, dict[str, float]]:
+def _entries(result: xr.Dataset, indices: Mapping[str, int]) -> dict[int, dict[str, float]]:
     """The catalogue of the slice by number."""
     catalogue = table(result, "catalogue")
     axes = [name for name in map(str, result["attractor"].dims) if not is_start(name)]
     number = 0
     for name in axes:
-        number = number * result.sizes[name] + place[name]
+        number = number * result.sizes[name] + indices[name]
     rows = np.flatnonzero(catalogue["slice"].values == number)
     columns = [name for name, column in catalogue.items() if column.dims == ("entry",)]
     return {
@@ -245,7 +245,7 @@ def _attach(
     found: Slice,
     case: Case,
     values: Mapping[str, float],
-    place: Mapping[str, int],
+    indices: Mapping[str, int],
     result: xr.Dataset,
     threads: int | None,
 ) -> None:
@@ -255,8 +255,8 @@ def _attach(
         return
     try:
         machine = Machine(case, values, found.names, found.scale, threads)
-        if "crank_angle" in place:
-            machine.start[2] = float(result["crank_angle"].values[place["crank_angle"]])
+        if "crank_angle" in indices:
+            machine.start[2] = float(result["crank_angle"].values[indices["crank_angle"]])
         if found.entries:
             machine.take_numbers(list(found.entries.values()))
     except SeparatrixError as error:

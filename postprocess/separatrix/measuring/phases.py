@@ -22,23 +22,23 @@ def angles(count: int) -> np.ndarray:
 
 def local_integrity_over_phases(found: Slice, own: int) -> Measure:
     """Least radius of the ball round the motion over the crank angles."""
-    told = (
+    definition = (
         "LIM of the orbit: the largest distance within which every start belongs to the basin, "
         "round the motion at "
         "each crank angle; the least of them"
     )
     name = "local_integrity_over_phases"
     if found.machine is None:
-        return Measure(name, told, found.unit, own, limits=(*found.limits, "needs new starts"))
+        return Measure(name, definition, found.unit, own, limits=(*found.limits, "needs new starts"))
     turns = angles(found.phases)
     balls_found = []
     for angle in turns:
         points = found.machine.section(own, float(angle))
         if points is None:
             return Measure(
-                name, told, found.unit, own, limits=(*found.limits, "needs a cycle over x0 and v0")
+                name, definition, found.unit, own, limits=(*found.limits, "needs a cycle over x0 and v0")
             )
-        balls_found.append(ball_at(found, own, points, float(angle), told))
+        balls_found.append(ball_at(found, own, points, float(angle), definition))
     lowers = np.array([one.lower for one in balls_found])
     values = np.array([one.value for one in balls_found])
     limits = {limit: None for one in balls_found for limit in one.limits}
@@ -49,13 +49,13 @@ def local_integrity_over_phases(found: Slice, own: int) -> Measure:
         "upper": [one.upper for one in balls_found],
     }
     if np.isnan(lowers).any():
-        return Measure(name, told, found.unit, own, limits=(*found.limits, *limits), details=curve)
+        return Measure(name, definition, found.unit, own, limits=(*found.limits, *limits), details=curve)
     least = int(np.argmin(lowers))
     limits = list(balls_found[least].limits)
     limits.append(f"{found.phases} crank angles: between them the radius may be less")
     return Measure(
         name,
-        told,
+        definition,
         found.unit,
         own,
         balls_found[least].value,
@@ -70,14 +70,18 @@ def local_integrity_over_phases(found: Slice, own: int) -> Measure:
 
 def critical_impulse(found: Slice, own: int) -> Measure:
     """Least change of velocity that takes the machine out of the basin, over the crank angles."""
-    told = (
+    definition = (
         "critical impulse: the least sudden change of velocity at a point of the motion that leaves "
         "the basin; the "
         "least over the crank angles and both directions"
     )
     if found.machine is None or found.names != ("x0", "v0"):
         return Measure(
-            "critical_impulse", told, "m/s", own, limits=(*found.limits, "needs new starts over x0 and v0")
+            "critical_impulse",
+            definition,
+            "m/s",
+            own,
+            limits=(*found.limits, "needs new starts over x0 and v0"),
         )
     turns = angles(found.phases)
     reach = float(found.region.size[1])
@@ -86,7 +90,9 @@ def critical_impulse(found: Slice, own: int) -> Measure:
     for angle in turns:
         points = found.machine.section(own, float(angle))
         if points is None:
-            return Measure("critical_impulse", told, "m/s", own, limits=(*found.limits, "needs a cycle"))
+            return Measure(
+                "critical_impulse", definition, "m/s", own, limits=(*found.limits, "needs a cycle")
+            )
 
         def labels(starts: np.ndarray, angle: float = float(angle)) -> np.ndarray:
             return found.machine.labels(starts, angle)
@@ -122,7 +128,7 @@ def critical_impulse(found: Slice, own: int) -> Measure:
         parameters["impulse"] = f"{upper * float(mass):.9g} N s"
     return Measure(
         "critical_impulse",
-        told,
+        definition,
         "m/s",
         own,
         value,
@@ -137,7 +143,7 @@ def critical_impulse(found: Slice, own: int) -> Measure:
 
 def safe_basin(found: Slice, own: int) -> list[Measure]:
     """Share of the window, and largest ball, of the starts that are safe at every crank angle."""
-    told = (
+    definition = (
         "phase-robust safe basin: the share of the window whose starts end in the basin at every crank angle"
     )
     names = ("safe_basin", "safe_basin_integrity_factor")
@@ -147,7 +153,7 @@ def safe_basin(found: Slice, own: int) -> list[Measure]:
     if found.machine is None:
         return [
             Measure(name, text, "1", own, limits=(*found.limits, "needs new starts"))
-            for name, text in zip(names, (told, second), strict=True)
+            for name, text in zip(names, (definition, second), strict=True)
         ]
     grid, shares, worst, last = _intersection(found, own)
     labels = robust(found, own)
@@ -163,7 +169,7 @@ def safe_basin(found: Slice, own: int) -> list[Measure]:
     parameters = {"phases": found.phases, "crank_angle_that_takes_most": worst, "new_starts": share.starts}
     first = Measure(
         names[0],
-        told,
+        definition,
         "1",
         own,
         share.value,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a measure says of itself: value, interval, definition, and what limits it."""
+"""The report of a measure: value, interval, definition, and what limits it."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 class Measure:
     """One number of one basin, or of a whole map.
 
-    `value` is nan where it is not known; `lower` and `upper` enclose it as `interval` says (-inf or inf where
-    one side is open). `limits` are the reasons why it is not better known, `details` what it was made from.
+    `value` is nan where it is not known; `lower` and `upper` enclose it as `interval` states (-inf or inf
+    where one side is open). `limits` are the reasons why it is not better known, `details` what it was made
+    from.
     """
 
     name: str
@@ -43,7 +44,7 @@ class Measure:
         return {name: _plain(value) for name, value in asdict(self).items()}
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return it in one line."""
         return f"{self.heading}: {self.number}"
 
     @property
@@ -84,7 +85,7 @@ class Measures:
         return len(self._found)
 
     def __getitem__(self, key: int | str | tuple[str, int]) -> Measure:
-        """Return one by its place, its name, or its name and attractor."""
+        """Return one by its index, its name, or its name and attractor."""
         if isinstance(key, int):
             return self._found[key]
         name, of = key if isinstance(key, tuple) else (key, None)
@@ -107,14 +108,14 @@ class Measures:
         return {"about": _plain(self.about), "measures": [one.as_dict() for one in self._found]}
 
     def __str__(self) -> str:
-        """Say it as the command does: a table, and under it the definitions, once each."""
+        """Return the report of the command: a table, and under it the definitions, once each."""
         lines = [f"{key}: {value}" for key, value in self.about.items()]
         width = max((len(one.heading) for one in self._found), default=0)
         lines += [f"{one.heading:{width}}  {one.number}" for one in self._found]
-        told: dict[str, Measure] = {}
+        defined: dict[str, Measure] = {}
         for one in self._found:
-            told.setdefault(one.name, one)
-        for one in told.values():
+            defined.setdefault(one.name, one)
+        for one in defined.values():
             given = ", ".join(
                 f"{key.replace('_', ' ')} {_short(value)}" for key, value in one.parameters.items()
             )

@@ -19,7 +19,7 @@ __all__ = ["survival"]
 
 _TIMES = 60
 # More impulses than anybody waits for: the horizon ends a motion.
-_MOST_BLOWS = 100_000
+_MOST_IMPULSES = 100_000
 
 
 def survival(
@@ -39,9 +39,9 @@ def survival(
 
     A motion has left when the state right after an impulse lies in another basin, or its label is not known
     (`not_known` counts these). `survival` is the share that has not left, with its 95 % interval;
-    `law` is exp(-rate p t) of rare impulses, which find the machine settled again: `p` is the probability that
-    one impulse at a random crank angle leaves the basin, from `motions` impulses of its own. Where the two differ,
-    impulses meet motions that have not settled.
+    `law` is exp(-rate p t) of rare impulses, which find the machine settled again: `p` is the probability
+    that one impulse at a random crank angle leaves the basin, from `motions` impulses of its own. Where the
+    two differ, impulses meet motions that have not settled.
 
     Parameters
     ----------
@@ -77,12 +77,12 @@ def survival(
     random = generator(seed, 12)
     state, clock = states[motions:].copy(), np.zeros(motions)
     staying = np.arange(motions)
-    with Progress(progress) as told:
-        for _ in range(_MOST_BLOWS):
+    with Progress(progress) as report:
+        for _ in range(_MOST_IMPULSES):
             # drawn for all, so that a motion's impulses do not depend on the others
             waits = random.exponential(1 / rate, motions)[staying]
             going = clock[staying] + waits <= length
-            told("motions", motions - int(going.sum()), motions)
+            report("motions", motions - int(going.sum()), motions)
             kicks = generator(seed, 13, int(random.integers(1 << 62)))
             staying, waits = staying[going], waits[going]
             if not len(staying):
@@ -167,9 +167,9 @@ def _dataset(
     law = {"law": p, "law_lower": high, "law_upper": low}
     data = {"survival": alive / count, "survival_lower": ends[:, 0], "survival_upper": ends[:, 1]}
     data |= {name: np.exp(-rate * value * times) for name, value in law.items()}
-    told = {"units": "1", "long_name": "share of the motions that have not left"}
+    attributes = {"units": "1", "long_name": "share of the motions that have not left"}
     return xr.Dataset(
-        {name: ("time", values, told) for name, values in data.items()},
+        {name: ("time", values, attributes) for name, values in data.items()},
         {"time": ("time", times, {"units": "s", "long_name": "time"})},
         {
             "kind": "survival", "title": str(result.attrs.get("title", "")), "attractor": attractor,

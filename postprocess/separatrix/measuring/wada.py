@@ -102,8 +102,8 @@ def grid_method(
             continue
         middle = (low + high) / 2
         found = label_all(labels, middle)
-        for place, label in enumerate(basins):
-            seen[owner[found == label], place] = True
+        for column, label in enumerate(basins):
+            seen[owner[found == label], column] = True
         known = found > 0
         halves = [
             (owner, low, middle, low_label, found),
@@ -124,11 +124,11 @@ def _first_segments(
     """Between the corners of each cell that have different labels, one for each pair of labels."""
     d = grid.ndim
     corners = np.array(np.meshgrid(*[[0, 1]] * d, indexing="ij")).reshape(d, -1).T
-    places = cells[:, None, :] + corners[None]
-    found = grid[tuple(np.moveaxis(places, -1, 0))]
-    points = np.stack([axes[k][places[..., k]] for k in range(d)], axis=-1)
-    for place, label in enumerate(basins):
-        seen[:, place] = (found == label).any(axis=1)
+    indices = cells[:, None, :] + corners[None]
+    found = grid[tuple(np.moveaxis(indices, -1, 0))]
+    points = np.stack([axes[k][indices[..., k]] for k in range(d)], axis=-1)
+    for column, label in enumerate(basins):
+        seen[:, column] = (found == label).any(axis=1)
     parts = []
     for a in range(len(corners)):
         for b in range(a + 1, len(corners)):

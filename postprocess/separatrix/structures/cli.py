@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run(options: argparse.Namespace) -> list[str]:
-    """Read, reduce, write; return what is to be said."""
+    """Read, reduce, write; return the lines of the report."""
     try:
         return _run(options)
     except SeparatrixError as error:
@@ -141,7 +141,7 @@ def _report(full: Matrices | Modes, reduced: Matrices | Modes, options: argparse
     if isinstance(full, Matrices):
         without = np.flatnonzero(abs(full.mass).sum(axis=1) == 0)
         if without.size:
-            names = ", ".join(full.labels[place] for place in without[:_MOST_NAMES])
+            names = ", ".join(full.labels[row] for row in without[:_MOST_NAMES])
             more = ", ..." if without.size > _MOST_NAMES else ""
             lines.append(f"note: {without.size} of {full.size} coordinates without mass: {names}{more}")
         for check in checks(full, reduced):
@@ -190,18 +190,18 @@ def _parser() -> Parser:
         type=_named,
         action="append",
         default=[],
-        metavar="NAME=PLACE",
-        help="a place that joints act at",
+        metavar="NAME=COORDINATE",
+        help="a point that joints act at: a coordinate, or a weighted sum of coordinates",
     )
     parser.add_argument(
-        "--hold", action="append", default=[], metavar="PLACE", help="a coordinate that is held at zero"
+        "--hold", action="append", default=[], metavar="COORDINATE", help="a coordinate that is held at zero"
     )
     parser.add_argument(
         "--reduce", choices=("none", "modal", "craig-bampton"), default="none", help="default: none"
     )
     parser.add_argument("--modes", type=whole_number(0), metavar="COUNT", help="modes that are kept")
     parser.add_argument(
-        "--damping-ratio", type=positive, metavar="RATIO", help="of every mode, in the place of other damping"
+        "--damping-ratio", type=positive, metavar="RATIO", help="of every mode, instead of other damping"
     )
     parser.add_argument("--title", default="", help="a title for the file")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.h5")

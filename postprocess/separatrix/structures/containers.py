@@ -130,7 +130,7 @@ def _real(name: str, value: object) -> sparse.coo_array | None:
     if np.dtype(value.dtype).kind not in "fiubc":
         return None
     if hasattr(value, "check_format"):
-        # Places outside the matrix would be read later.
+        # Indices outside the matrix would be read later.
         value.check_format(full_check=True)
     matrix = sparse.coo_array(value)
     if np.iscomplexobj(matrix.data):

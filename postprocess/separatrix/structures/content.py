@@ -77,14 +77,14 @@ class Matrices:
             {name: row[free] for name, row in self.points.items()},
         )
 
-    def row_of(self, place: str) -> Row:
-        """Return the row of a place: a coordinate, or a weighted sum "0.5*12:y+0.5*13:y"."""
-        return _row(place, self.labels, lambda number: _unit(number, self.size), self.size)
+    def row_of(self, point: str) -> Row:
+        """Return the row of a point: a coordinate, or a weighted sum "0.5*12:y+0.5*13:y"."""
+        return _row(point, self.labels, lambda number: _unit(number, self.size), self.size)
 
 
 @dataclass
 class Modes:
-    """Mass-normalised modes: frequencies [Hz], damping ratios, displacements of places in each mode."""
+    """Mass-normalised modes: frequencies [Hz], damping ratios, displacements of points in each mode."""
 
     frequency: np.ndarray
     damping_ratio: np.ndarray | None = None
@@ -97,21 +97,21 @@ class Modes:
         """Number of modes."""
         return len(self.frequency)
 
-    def row_of(self, place: str) -> Row:
-        """Return the displacement of a place in each mode."""
+    def row_of(self, point: str) -> Row:
+        """Return the displacement of a point in each mode."""
         names = list(self.shapes)
-        return _row(place, names, lambda number: self.shapes[names[number]], self.size)
+        return _row(point, names, lambda number: self.shapes[names[number]], self.size)
 
 
-def add_points(structure: Matrices | Modes, places: Mapping[str, str]) -> None:
-    """Name places: `{"tip": "12:y"}`."""
-    for name, place in places.items():
+def add_points(structure: Matrices | Modes, points: Mapping[str, str]) -> None:
+    """Name points: `{"tip": "12:y"}`."""
+    for name, point in points.items():
         if not _NAME.fullmatch(name):
             raise SeparatrixError(
-                f"--point {name}={place}: found the name '{name}', allowed letters, digits, _ and -,"
+                f"--point {name}={point}: found the name '{name}', allowed letters, digits, _ and -,"
                 " with a letter"
             )
-        structure.points[name] = structure.row_of(place)
+        structure.points[name] = structure.row_of(point)
 
 
 def _unit(number: int, size: int) -> Row:
@@ -120,13 +120,13 @@ def _unit(number: int, size: int) -> Row:
     return row
 
 
-def _row(place: str, labels: Sequence[str], row_of: Callable[[int], Row], size: int) -> Row:
-    """Sum the terms of a place."""
+def _row(point: str, labels: Sequence[str], row_of: Callable[[int], Row], size: int) -> Row:
+    """Sum the terms of a point."""
     total = np.zeros(size)
-    words = place.replace(" ", "")
+    words = point.replace(" ", "")
     terms = re.findall(r"[+-]?[^+-]+(?:[eE][+-]\d+[^+-]*)?", words)
     if "".join(terms) != words:
-        raise SeparatrixError(f"'{place}': found a sign without a term, allowed a sum like 0.5*12:y-0.5*13:y")
+        raise SeparatrixError(f"'{point}': found a sign without a term, allowed a sum like 0.5*12:y-0.5*13:y")
     for term in terms:
         factor, star, label = term.rpartition("*")
         sign = -1.0 if not star and label.startswith("-") else 1.0
@@ -134,20 +134,20 @@ def _row(place: str, labels: Sequence[str], row_of: Callable[[int], Row], size: 
         weight = number(factor) if star else sign
         if weight is None:
             raise SeparatrixError(
-                f"'{place}': found '{factor}', allowed a finite number with a decimal point"
+                f"'{point}': found '{factor}', allowed a finite number with a decimal point"
             )
         times = labels.count(label)
         if times == 0:
             near = ", ".join(labels[:6]) + (", ..." if len(labels) > 6 else "")
-            raise SeparatrixError(f"'{place}': there is no coordinate '{label}', allowed {near}")
+            raise SeparatrixError(f"'{point}': there is no coordinate '{label}', allowed {near}")
         if times > 1:
             raise SeparatrixError(
-                f"'{place}': found {times} coordinates with the label '{label}', allowed a label of one: the "
+                f"'{point}': found {times} coordinates with the label '{label}', allowed a label of one: the "
                 "inner motions of an element, or a beam as a solid"
             )
         total += weight * row_of(labels.index(label))
     if not np.any(total):
-        raise SeparatrixError(f"'{place}': a place that no coordinate moves")
+        raise SeparatrixError(f"'{point}': found a point that no coordinate moves, allowed one that moves")
     return total
 
 

@@ -63,8 +63,8 @@ def read_harwell_boeing(path: Path) -> sparse.csr_array:
     columns = np.repeat(np.arange(size[0]), np.diff(starts))
 
     def refuse(entry: int, why: str) -> None:
-        place = f"row {int(rows[entry])} of column {int(columns[entry]) + 1}"
-        raise SeparatrixError(f"{path}: found {place}, {why}")
+        found = f"row {int(rows[entry])} of column {int(columns[entry]) + 1}"
+        raise SeparatrixError(f"{path}: found {found}, {why}")
 
     return matrix_of((size[0], size[0]), (rows - 1, columns, values), _SYMMETRY[kind[1]], refuse)
 
@@ -100,8 +100,8 @@ def _take(
             f"{path}: found the end of the file after line {len(lines)}, allowed {at + needed} lines"
         )
     values = []
-    for place in range(at, at + needed):
-        line = lines[place].decode(errors="replace")
+    for index in range(at, at + needed):
+        line = lines[index].decode(errors="replace")
         here = min(form.count, count - len(values))
         # SciPy writes narrower columns than it announces; others leave no blank between columns.
         fields = line.split()
@@ -112,7 +112,7 @@ def _take(
         if None in found or len(found) > here:
             wrong = fields[found.index(None)] if None in found else line
             raise SeparatrixError(
-                f"{path}:{place + 1}: found '{wrong.strip()[:40]}', "
+                f"{path}:{index + 1}: found '{wrong.strip()[:40]}', "
                 f"allowed {here} numbers in the format {form.text}"
             )
         values += found
@@ -126,18 +126,18 @@ def _take(
 def _check_last(path: Path, lines: list[str], number: int, form: _Format) -> None:
     """Refuse a last field that is shorter than all others: its number is cut off."""
     ends = [
-        (place, field.end()) for line in lines for place, field in enumerate(re.finditer(r"\S+", line), 1)
+        (column, field.end()) for line in lines for column, field in enumerate(re.finditer(r"\S+", line), 1)
     ]
-    *others, (place, end) = ends
-    widths = {end / place for place, end in others} or {end}
+    *others, (column, end) = ends
+    widths = {end / column for column, end in others} or {end}
     if len(lines) > 1 and all(len(line) == form.count * form.width for line in lines[:-1]):
         # there may be no blanks between the columns
         widths, end = {form.width}, len(lines[-1])
-        place = -(-end // form.width)
-    if len(widths) == 1 and end < place * min(widths):
+        column = -(-end // form.width)
+    if len(widths) == 1 and end < column * min(widths):
         raise SeparatrixError(
             f"{path}:{number}: found the last number in {end} characters of the line, allowed "
-            f"{place * min(widths):g} as of the others: cut off"
+            f"{column * min(widths):g} as of the others: cut off"
         )
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Structure files for the library, which reads no HDF5: what they hold takes their place in the case."""
+"""Structure files for the library, which reads no HDF5: their content replaces them in the case."""
 
 import json
 import tomllib
@@ -21,8 +21,8 @@ _NUMBERS = ("mass", "stiffness", "damping", "frequency", "damping_ratios")
 def inlined(text: str, name: str | Path, settings: Iterable[str] = ()) -> list[str]:
     """Return the settings for a case whose [structure.NAME] may name HDF5 files, with their numbers in front.
 
-    `name` stands for the case in messages; files are looked for in its folder. What is not understood comes
-    back as it is: the library says what is wrong with it.
+    `name` stands for the case in messages; files are looked for in its folder. What is not understood is
+    returned as it is: the library reports what is wrong with it.
     """
     settings = list(settings)
     if "structure" not in text and not any("structure" in setting for setting in settings):
@@ -62,7 +62,7 @@ def _of_element(path: list[str]) -> bool:
 
 
 def _changed(tables: object, path: list[str], value: object) -> object:
-    """Return the tables with a value put in its place, as the program does it; TypeError in a list."""
+    """Return the tables with a value at its path, as the program does it; TypeError in a list."""
     if not path:
         return value
     if isinstance(tables, list):
@@ -82,17 +82,17 @@ def _without_file(table: Mapping, path: Path, name: str | Path, key: str) -> dic
     if not isinstance(named, Mapping):
         raise CaseError(f"{at}.point': found {named!r}, allowed a table of points", BAD_DATA)
     rows = dict(points)
-    for point, place in named.items():
+    for point, row in named.items():
         if point in points:
             raise CaseError(
                 f"{at}.point.{point}': found a point of the file again, allowed another name", BAD_DATA
             )
-        if isinstance(place, str) and place not in points:
+        if isinstance(row, str) and row not in points:
             raise CaseError(
-                f'{at}.point.{point}\': found "{place}", allowed a point of the file: {", ".join(points)}',
+                f'{at}.point.{point}\': found "{row}", allowed a point of the file: {", ".join(points)}',
                 BAD_DATA,
             )
-        rows[point] = points[place] if isinstance(place, str) else place
+        rows[point] = points[row] if isinstance(row, str) else row
     kept = {entry: value for entry, value in table.items() if entry not in ("file", "point")}
     return {**kept, **content, "point": rows}
 

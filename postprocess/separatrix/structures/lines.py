@@ -46,9 +46,9 @@ def _check_last(path: Path, text: bytes) -> None:
     fixed = len(others) == _ALIKE and len({len(word) for word in others}) == 1
     fixed = fixed and all(re.fullmatch(rb"\d*\.\d*[eEdD][+-]?\d+", word) for word in others)
     if fixed and last and len(last) < len(others[0]):
-        place = text.count(b"\n") + 1
+        line = text.count(b"\n") + 1
         raise SeparatrixError(
-            f"{path}:{place}: found {shown(lines[-1])} without an end of the line, its last "
+            f"{path}:{line}: found {shown(lines[-1])} without an end of the line, its last "
             "number shorter than those before: cut off? Where it is whole, end the line"
         )
 
@@ -87,7 +87,7 @@ class Rows:
     ) -> None:
         """Read `text`, whose first line has the number `first` in its file.
 
-        `forms` are those of the columns, WHOLE or NUMBER; `allowed` says so to the user.
+        `forms` are those of the columns, WHOLE or NUMBER; `allowed` states this to the user.
         """
         self.path, self._text, self._first, self._style = path, text, first, style
         comment = re.escape(style.comment) + rb"[^\n]*+"

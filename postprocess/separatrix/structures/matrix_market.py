@@ -51,8 +51,8 @@ def read_matrix_market(path: Path) -> sparse.csr_array:
         rule = f"row, column and number ({how})"
         entries = Rows(path, text[end:], line + 1, (WHOLE, WHOLE, form), rule)
         _check_count(f"{path}:{line}", len(entries.values), numbers[2])
-        places = entries.values[:, :2] - 1
-        return matrix_of((size, size), (*places.T, entries.values[:, 2]), symmetry, entries.refuse)
+        indices = entries.values[:, :2] - 1
+        return matrix_of((size, size), (*indices.T, entries.values[:, 2]), symmetry, entries.refuse)
     entries = Rows(path, text[end:], line + 1, (form,), f"one number a line ({how})")
     lowest = {"general": 0, "symmetric": 1, "skew-symmetric": 2}[symmetry]
     count = size * size if lowest == 0 else size * (size + 3 - 2 * lowest) // 2

@@ -35,7 +35,7 @@ def read_matrices(
 ) -> Matrices:
     """Read `files` = {"mass": ..., "stiffness": ..., "damping": ...}, or all of them out of one file `both`.
 
-    `names` says how a matrix is called in a file with several.
+    `names` are the names of the matrices in a file with several.
     """
     found, labels = {}, []
     read = cache(read_containers)
@@ -88,11 +88,11 @@ def _all_labels(path: Path, one: list[str], other: list[str]) -> list[str]:
 
 def _placed(matrix: sparse.csr_array, labels: list[str], wanted: list[str]) -> sparse.csr_array:
     """Put a matrix among more coordinates."""
-    where = {label: place for place, label in enumerate(wanted)}
-    places = np.array([where[label] for label in labels])
+    where = {label: row for row, label in enumerate(wanted)}
+    rows = np.array([where[label] for label in labels])
     entries = sparse.coo_array(matrix)
     return sparse.csr_array(
-        (entries.data, (places[entries.row], places[entries.col])), shape=(len(wanted), len(wanted))
+        (entries.data, (rows[entries.row], rows[entries.col])), shape=(len(wanted), len(wanted))
     )
 
 

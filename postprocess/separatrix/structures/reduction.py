@@ -31,11 +31,11 @@ class Check:
     full: float
 
 
-def hold(structure: Matrices, places: list[str]) -> Matrices:
+def hold(structure: Matrices, coordinates: list[str]) -> Matrices:
     """Hold coordinates at zero."""
     held = set()
-    for place in places:
-        held |= set(np.flatnonzero(structure.row_of(place)))
+    for coordinate in coordinates:
+        held |= set(np.flatnonzero(structure.row_of(coordinate)))
     if len(held) == structure.size:
         raise SeparatrixError("--hold: nothing is left that moves")
     return structure.without(np.array(sorted(held), dtype=int))
@@ -171,7 +171,7 @@ def craig_bampton(structure: Matrices, count: int) -> Matrices:
     structure = condense(structure)
     boundary = sorted({int(number) for row in structure.points.values() for number in np.flatnonzero(row)})
     if not boundary:
-        raise SeparatrixError("--reduce craig-bampton: give the points of joints: --point NAME=PLACE")
+        raise SeparatrixError("--reduce craig-bampton: give the points of joints: --point NAME=COORDINATE")
     inner = np.array([number for number in range(structure.size) if number not in set(boundary)], dtype=int)
     change = np.zeros((structure.size, len(boundary)))
     change[boundary, np.arange(len(boundary))] = 1

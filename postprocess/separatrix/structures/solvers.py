@@ -36,8 +36,8 @@ def read_abaqus(path: Path) -> tuple[sparse.csr_array, list[str]]:
     if not len(rows.values):
         raise SeparatrixError(f"{path}: found no entry of a matrix, allowed {rule}")
     nodes = rows.values[:, :4].astype(np.int64).reshape(-1, 2)
-    keys, places = np.unique(nodes, axis=0, return_inverse=True)
-    ones, others = places.reshape(-1, 2).T
+    keys, indices = np.unique(nodes, axis=0, return_inverse=True)
+    ones, others = indices.reshape(-1, 2).T
     shape = (len(keys), len(keys))
     values = rows.values[:, 4]
     matrix = matrix_of(shape, (ones, others, values), "general", rows.refuse)
@@ -57,9 +57,9 @@ def read_calculix(path: Path) -> tuple[sparse.csr_array, list[str]]:
     rows = Rows(path, text_of(path), 1, (WHOLE, WHOLE, NUMBER), rule)
     if not len(rows.values):
         raise SeparatrixError(f"{path}: found no entry of a matrix, allowed lines of {rule}")
-    places = rows.values[:, :2].astype(np.int64) - 1
+    indices = rows.values[:, :2].astype(np.int64) - 1
     names = path.with_suffix(".dof")
-    size = int(places.max()) + 1
+    size = int(indices.max()) + 1
     labels = []
     if names.is_file():
         labels = _labels(names)
@@ -70,7 +70,7 @@ def read_calculix(path: Path) -> tuple[sparse.csr_array, list[str]]:
             )
         size = len(labels)
     check_size(str(path), size, size)
-    return matrix_of((size, size), (*places.T, rows.values[:, 2]), "symmetric", rows.refuse), labels
+    return matrix_of((size, size), (*indices.T, rows.values[:, 2]), "symmetric", rows.refuse), labels
 
 
 def _labels(path: Path) -> list[str]:

@@ -62,9 +62,9 @@ def _modes(sets: Sequence[Mapping], factors: tuple[float, float]) -> Modes:
         raise SeparatrixError("found a frequency or a damping ratio below 0 or not finite, allowed from 0 on")
     order = np.argsort(numbers[:, 0], kind="stable")
     shapes: dict[str, list[float]] = {}
-    for place, number in enumerate(order):
+    for position, number in enumerate(order):
         one, mass = sets[number], numbers[number, 1]
-        mode = f"mode {place + 1}"
+        mode = f"mode {position + 1}"
         if not mass > 0:
             raise SeparatrixError(f"{mode}: found the modal mass {mass}, allowed above 0")
         if one.get("spec_data_type", 0) not in _DISPLACEMENT:
@@ -74,8 +74,8 @@ def _modes(sets: Sequence[Mapping], factors: tuple[float, float]) -> Modes:
             )
         for key, value in _shape(one, mass, factors, mode).items():
             column = shapes.setdefault(key, [])
-            # A place that a mode lacks is left out of all.
-            if len(column) == place:
+            # A point that a mode lacks is left out of all.
+            if len(column) == position:
                 column.append(value)
     rows = {key: np.array(values) for key, values in shapes.items() if len(values) == len(sets)}
     return Modes(numbers[order, 0], numbers[order, 2] + numbers[order, 3] / 2, shapes=rows)

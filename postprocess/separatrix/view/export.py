@@ -108,21 +108,21 @@ def _planes(source: ResultFile) -> tuple[tuple[int, int], list[tuple[int, ...]]]
         raise SeparatrixError(
             f"{source.path}: has {int(np.prod(others))} slices, a page holds {_SLICES}; divide the map"
         )
-    places = []
+    slices = []
     for index in np.ndindex(*others):
         rest = iter(index)
-        places.append(tuple(0 if i in (across, up) else next(rest) for i in range(len(axes))))
-    return (across, up), places
+        slices.append(tuple(0 if i in (across, up) else next(rest) for i in range(len(axes))))
+    return (across, up), slices
 
 
 def _store_map(stored: dict, desk: Desk, source: ResultFile) -> None:
-    (across, up), places = _planes(source)
+    (across, up), slices = _planes(source)
     names = [one["name"] for one in source.variables]
     chosen = [names.index(name) for name in _VARIABLES if name in names]
     finest = 0
     while max(source.shape[across], source.shape[up]) >> finest > _FINEST:
         finest += 1
-    for at in places:
+    for at in slices:
         plane = {"file": source.number, "across": across, "up": up, "at": ",".join(map(str, at))}
         asked = {"file": source.number, "at": plane["at"]}
         with contextlib.suppress(CaseError):
@@ -164,7 +164,7 @@ def _tile(desk: Desk, parameters: dict) -> bytes | None:
 
 def _store_motions(stored: dict, desk: Desk, source: ResultFile, count: int, first: int) -> list[dict]:
     """Store motions from a lattice of starts over each slice; return where they start."""
-    (across, up), places = _planes(source)
+    (across, up), slices = _planes(source)
     axes = source.axes
     if not (axes[across]["start"] and axes[up]["start"]) or not count:
         return []
@@ -172,11 +172,11 @@ def _store_motions(stored: dict, desk: Desk, source: ResultFile, count: int, fir
         desk.machine(source)
     except CaseError:
         return []
-    side = max(1, int(np.sqrt(count / len(places))))
+    side = max(1, int(np.sqrt(count / len(slices))))
     given = source.case["start"]
     names = {"x0": "x", "v0": "v", "crank_angle": "angle"}
     starts = []
-    for at in places:
+    for at in slices:
         text = ",".join(map(str, at))
         for i, j in np.ndindex(side, side):
             index = list(at)

@@ -152,7 +152,7 @@ class ResultFile:
         return of_attractors(points, max(points, default=0))
 
     def machine(self) -> dict:
-        """Return the tables of the case that say what to draw."""
+        """Return the tables of the case that the drawing needs."""
         tables = ("body", "restoring", "friction", "contact", "drive", "effect", "start", "run", "trajectory")
         return {key: self.case[key] for key in tables if key in self.case}
 

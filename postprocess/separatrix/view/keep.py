@@ -178,7 +178,7 @@ def _case_of_view(
     source: object,
     at: tuple,
 ) -> str:
-    """Return the resolved case with the axes of the view in the place of its own."""
+    """Return the resolved case with the axes of the view instead of its own."""
     fixed = {
         axis["path"]: float(axis["array"][i])
         for axis, i in zip(source.axes, at, strict=True)

@@ -150,12 +150,12 @@ def compute(
         fixed_values | {paths[across]: a, paths[up]: b}
         for a, b in zip(values[across].tolist(), values[up].tolist(), strict=True)
     ]
-    return machine.lone_labels(tuple(starts[0]), points, flag)
+    return machine.single_labels(tuple(starts[0]), points, flag)
 
 
 def _positions(catalogue: object, found: np.ndarray) -> np.ndarray:
     """Return labels of the catalogue as positions in the list of labels of the file (0: none)."""
     numbers = np.array([0, *(one.numbers["attractor"] for one in catalogue.attractors)])
-    places = np.zeros(numbers.max() + 1, int)
-    places[numbers] = np.arange(len(numbers))
-    return places[found]
+    positions = np.zeros(numbers.max() + 1, int)
+    positions[numbers] = np.arange(len(numbers))
+    return positions[found]

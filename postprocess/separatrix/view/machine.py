@@ -117,7 +117,7 @@ class Machine:
             labels.append(label)
         return np.array(labels, np.int32)
 
-    def lone_labels(
+    def single_labels(
         self, start: tuple[float, float, float], values: list[Mapping[str, float]], stop: StopFlag
     ) -> dict[str, np.ndarray]:
         """Return variables of points of a map over parameters: each finds its own attractor, unlabelled."""

@@ -98,7 +98,7 @@ class Desk:
             raise RefusedError(f"file: holds {found.kind}, allowed {kind}")
         return found
 
-    def place(self, source: ResultFile, parameters: Parameters) -> tuple[int, int, tuple[int, ...]]:
+    def slice_of(self, source: ResultFile, parameters: Parameters) -> tuple[int, int, tuple[int, ...]]:
         """Return the axes of a plane and the index on every axis (0 along the plane)."""
         across = parameters.whole("across", 0, len(source.axes) - 1)
         up = parameters.whole("up", 0, len(source.axes) - 1)
@@ -122,7 +122,7 @@ class Desk:
         """Return a plane, kept or new."""
         source = self.file(parameters, "basin")
         variable = parameters.whole("variable", 0, len(source.variables) - 1)
-        across, up, at = self.place(source, parameters)
+        across, up, at = self.slice_of(source, parameters)
         key = (source.number, variable, across, up, at)
         with self._lock:
             if key not in self._planes:
@@ -316,7 +316,7 @@ def _view(parameters: Parameters) -> tuple[int, int]:
 
 def _lattice(desk: Desk, parameters: Parameters, most: int) -> tuple:
     source = desk.file(parameters, "basin")
-    across, up, at = desk.place(source, parameters)
+    across, up, at = desk.slice_of(source, parameters)
     counts = [parameters.whole(name, 1, 8192) for name in ("columns", "rows")]
     if counts[0] * counts[1] > most:
         raise RefusedError(f"columns, rows: found {counts[0] * counts[1]} points, allowed are {most}")

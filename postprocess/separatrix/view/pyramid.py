@@ -26,7 +26,7 @@ _MOST_CELLS = 16_000_000  # of the finest level in memory
 _FIRST_BLOCKS = 150  # of the first pass
 _SMALL = 4_000_000  # points of a plane that is made before its first tile
 _MOST_CLASSES = 65534
-_COUNTED = 24  # classes told apart in a block
+_COUNTED = 24  # classes distinguished in a block
 
 
 class Plane:
@@ -106,14 +106,14 @@ class Plane:
 
     def _chunk(self, rows: slice, columns: slice) -> np.ndarray | None:
         """Return values that are one chunk of the file, unpacked so that several threads can; else None."""
-        data, place = self.data, (rows.start, columns.start)
+        data, origin = self.data, (rows.start, columns.start)
         if self.across < self.up:
-            place = place[::-1]
+            origin = origin[::-1]
         whole = rows.stop - rows.start == columns.stop - columns.start == TILE
         whole = whole and rows.start % TILE == columns.start % TILE == 0 and data.chunks == (TILE, TILE)
         if not whole or data.compression != "gzip" or data.fletcher32:
             return None
-        mask, packed = data.id.read_direct_chunk(place)
+        mask, packed = data.id.read_direct_chunk(origin)
         try:
             if mask:
                 return None
@@ -162,13 +162,13 @@ class Plane:
         try:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
                 while stride and not self._ended:
-                    places = [
+                    blocks = [
                         (i, j, stride)
                         for i in range(0, counts[0], stride)
                         for j in range(0, counts[1], stride)
                         if not (before and i % before == 0 and j % before == 0)
                     ]
-                    for _ in pool.map(self._fill, places):
+                    for _ in pool.map(self._fill, blocks):
                         self.done_blocks += 1
                     self._seen.set()
                     before, stride = stride, stride // 2
@@ -177,11 +177,11 @@ class Plane:
         finally:
             self._seen.set()
 
-    def _fill(self, place: tuple[int, int, int]) -> None:
+    def _fill(self, block: tuple[int, int, int]) -> None:
         """Fill the cells of a block, and until they are known those of its neighbours up to a stride."""
         if self._ended:
             return
-        i, j, stride = place
+        i, j, stride = block
         rows = slice(i * TILE, min((i + 1) * TILE, self.shape[0]))
         columns = slice(j * TILE, min((j + 1) * TILE, self.shape[1]))
         made = self._reduce(self.read(rows, columns), _BLOCK_LEVEL)

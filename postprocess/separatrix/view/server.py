@@ -166,7 +166,7 @@ class Handler(BaseHTTPRequestHandler):
             self._send(status, kind, body)
 
     def log_message(self, *_: object) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 class LocalHandler(Handler):
@@ -215,7 +215,7 @@ class _Serving(socketserver.ThreadingMixIn):
             self._connections.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Say nothing: who is gone is gone."""
+        """Ignore errors of clients that have gone."""
 
     def watch_idle(self, minutes: float) -> None:
         """Shut down after so long without a request."""

@@ -5,7 +5,7 @@
 
 const QUIET = 400;
 
-/** What the address says about the view. */
+/** The view that the address describes. */
 export function restored() {
   const known = new URLSearchParams(location.hash.slice(1));
   return { file: Number(known.get("file")) || 0, variable: known.get("variable"), at: known.get("at"), view: known.get("view") };

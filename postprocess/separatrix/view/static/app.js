@@ -81,9 +81,9 @@ class Viewer {
     if (!this.maps.length) this.left.hidden = this.right.firstChild.hidden = true;
     this.root.replaceChildren(this.header, this.problem, this.left, this.right);
     this.map = new MapView(this.canvas, {
-      hover: (place, keyed) => this.inspector.hover(place, keyed), pick: (place) => this.starter.pick(place), moved: () => this.moved(),
+      hover: (point, keyed) => this.inspector.hover(point, keyed), pick: (point) => this.starter.pick(point), moved: () => this.moved(),
     });
-    this.live = new LiveLayer(this.transport, () => this.place(), () => this.map.draw(), (text) => { fill(this.status, text); this.inspector.again(); });
+    this.live = new LiveLayer(this.transport, () => this.planeRequest(), () => this.map.draw(), (text) => { fill(this.status, text); this.inspector.again(); });
     this.map.live = this.live;
   }
 
@@ -201,7 +201,7 @@ class Viewer {
 
   get withText() { return Object.entries(this.with).map(([path, value]) => `${path}:${value}`).join(";"); }
 
-  place() {
+  planeRequest() {
     const { index } = this.file;
     const plane = { file: index, across: this.across, up: this.up, at: this.fixedAt().join(",") };
     return this.withText ? { ...plane, with: this.withText } : plane;
@@ -213,7 +213,7 @@ class Viewer {
 
   /** Shows the plane and the variable that are chosen. */
   async show(keepView) {
-    const { axes, variables } = this.file, plane = this.place();
+    const { axes, variables } = this.file, plane = this.planeRequest();
     delete plane.with;
     const points = [axes[this.across].count, axes[this.up].count];
     const make = (variable) => {
@@ -251,7 +251,7 @@ class Viewer {
   }
 
   async renameWords() {
-    const { file, across, up, at } = this.place();
+    const { file, across, up, at } = this.planeRequest();
     const answer = await this.transport.ask("classes", { file, across, up, at, variable: this.file.variables.indexOf(this.variable) }).catch(() => null);
     if (!answer || this.variable.name !== "event_word") return;
     this.names = answer.names;
@@ -375,7 +375,7 @@ class Viewer {
     const lattice = one && one.stride === 1 ? { a: one.a, da: one.da, b: one.b, db: one.db, columns: one.columns, rows: one.rows } : { a: v.a0 + da / 2, da, b: v.b0 + db / 2, db, columns, rows };
     fill(this.status, "computing and writing …");
     try {
-      const answer = await this.transport.ask("keep", { ...this.place(), page: this.live.page, view: this.live.number, ...lattice }, { act: true });
+      const answer = await this.transport.ask("keep", { ...this.planeRequest(), page: this.live.page, view: this.live.number, ...lattice }, { act: true });
       fill(this.status, `wrote ${answer.written}`);
     } catch (error) {
       fill(this.status, "nothing was written");

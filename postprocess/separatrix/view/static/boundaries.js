@@ -18,11 +18,11 @@ export class BoundaryPanel {
   constructor(file, answer, viewer) {
     Object.assign(this, { file, answer, viewer, axes: file.attributes.axes.split(" ") });
     this.check = h("input", { type: "checkbox", checked: true, onchange: () => viewer.mark() });
-    this.said = h("p", { class: "note" });
+    this.status = h("p", { class: "note" });
     const { arrays } = answer, curves = arrays.first.length, found = arrays.across.reduce((sum, one) => sum + (one >= 0), 0);
     this.element = h("section", { "aria-label": "Boundaries" }, h("h2", {}, `Boundaries: ${file.title || file.name}`),
       h("div", { class: "bar" }, h("label", {}, this.check, "draw them over the map"), h("span", { class: "note" }, `${found} points, ${curves} pieces`)),
-      this.said, this.legend(), this.table());
+      this.status, this.legend(), this.table());
   }
 
   /** The name of a piece. */
@@ -70,7 +70,7 @@ export class BoundaryPanel {
   /** The curves of the picture in index coordinates. */
   curves() {
     const reason = this.reason();
-    fill(this.said, reason);
+    fill(this.status, reason);
     if (reason || !this.check.checked) return [];
     const { file, across, up } = this.viewer, { arrays } = this.answer, found = [];
     const [a, b] = [file.axes[across], file.axes[up]].map((axis) => ({ axis, values: arrays[axis.key] }));

@@ -6,14 +6,14 @@ import { fill, h, words } from "./dom.js";
 import { line } from "./plot.js";
 
 export class Diagram {
-  /** `names`: what can be shown; `links` tells the map which value of the parameter was picked. */
+  /** `names`: what can be shown; `links` passes the picked value of the parameter to the map. */
   constructor({ file, answer, key, kind, names, note, links }) {
     Object.assign(this, { file, answer, key, kind, links, marked: null });
     this.select = h("select", { onchange: () => this.draw() }, ...names.map((name) => h("option", { value: name }, this.text(name))));
     this.canvas = h("canvas", { class: "sweep", tabindex: "0", role: "application", "aria-roledescription": "diagram" });
-    this.told = h("p", { class: "note", "aria-live": "polite" });
+    this.status = h("p", { class: "note", "aria-live": "polite" });
     this.element = h("section", { "aria-label": kind }, h("h2", {}, `${kind}: ${file.title || file.name}`),
-      h("div", { class: "bar" }, h("label", {}, "Show", this.select), h("span", { class: "note" }, note)), this.canvas, this.told);
+      h("div", { class: "bar" }, h("label", {}, "Show", this.select), h("span", { class: "note" }, note)), this.canvas, this.status);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     const pick = (event) => event.buttons && this.pick(event.offsetX, event.offsetY);
     this.canvas.addEventListener("pointerdown", pick);
@@ -63,11 +63,11 @@ export class Diagram {
   choose(value) {
     if (value === this.marked) return;
     this.mark(value);
-    fill(this.told, this.links.choose(this.key, value));
+    fill(this.status, this.links.choose(this.key, value));
   }
 }
 
-/** The place of the value that is nearest. */
+/** The index of the value that is nearest. */
 export function nearest(values, value) {
   let best = 0;
   for (let i = 1; i < values.length; i++) if (Math.abs(values[i] - value) < Math.abs(values[best] - value)) best = i;

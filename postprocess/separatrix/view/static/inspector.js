@@ -16,14 +16,14 @@ export class Inspector {
     if (this.last) this.hover(this.viewer.map.index(...this.last), true);
   }
 
-  hover(place, keyed) {
-    if (!keyed) this.last = place ? [this.viewer.map.px(place[0]), this.viewer.map.py(place[1])] : null;
-    if (!place || !this.viewer.file) return fill(this.viewer.hovered);
+  hover(point, keyed) {
+    if (!keyed) this.last = point ? [this.viewer.map.px(point[0]), this.viewer.map.py(point[1])] : null;
+    if (!point || !this.viewer.file) return fill(this.viewer.hovered);
     const { axes } = this.viewer.file, across = axes[this.viewer.across], up = axes[this.viewer.up];
-    const live = this.viewer.live.look(...place);
+    const live = this.viewer.live.look(...point);
     const inFile = !Object.keys(this.viewer.with).length;
-    const found = live || !inFile ? null : this.viewer.map.tiles.look(this.viewer.map.level, ...place);
-    const at = live ? [live.a, live.b] : found ? place.map(Math.round) : place;
+    const found = live || !inFile ? null : this.viewer.map.tiles.look(this.viewer.map.level, ...point);
+    const at = live ? [live.a, live.b] : found ? point.map(Math.round) : point;
     const head = `${words(across.key)} = ${quantity(valueAt(across, at[0]), across.unit, 10)}, ${words(up.key)} = ${quantity(valueAt(up, at[1]), up.unit, 10)}`;
     let body = "";
     if (live) body = this.valuesText(this.namedValues(live.values), true);
@@ -32,7 +32,7 @@ export class Inspector {
     fill(this.viewer.hovered, h("b", {}, head), h("div", {}, body));
     clearTimeout(this.asked);
     if (found) this.asked = setTimeout(() => this.askValues(at, head), 130);
-    if (this.viewer.checks.follow && this.viewer.checks.follow.checked && !keyed) this.viewer.starter.followMouse(place);
+    if (this.viewer.checks.follow && this.viewer.checks.follow.checked && !keyed) this.viewer.starter.followMouse(point);
     return undefined;
   }
 

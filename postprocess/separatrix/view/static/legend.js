@@ -22,7 +22,7 @@ export function attractorTable({ entries, total, unlabelled, own, hidden, regime
   const chaotic = entries.some((one) => one.period === 0);
   return [
     h("table", {}, h("thead", {}, head), h("tbody", {}, ...rows)),
-    chaotic ? h("p", { class: "note" }, "“Not periodic” is what the search saw over 512 periods after the transient that the case allows; a long transient looks the same. A larger run.extension tells.") : null,
+    chaotic ? h("p", { class: "note" }, "“Not periodic” is what the search saw over 512 periods after the transient that the case allows; a long transient looks the same. A larger run.extension decides between the two.") : null,
     fromFile ? null : h("p", { class: "note" }, "Found now, not in the file; shares are not known."),
   ];
 }

@@ -74,10 +74,10 @@ function difference(one, other, path, changed) {
 
 function flatten(value, path, into) {
   for (const [key, item] of Object.entries(value)) {
-    const place = path ? `${path}.${key}` : key;
+    const full = path ? `${path}.${key}` : key;
     if (!path && !MACHINE.includes(key)) continue;
-    if (item && typeof item === "object" && !Array.isArray(item)) flatten(item, place, into);
-    else into[place] = Array.isArray(item) ? JSON.stringify(item) : item;
+    if (item && typeof item === "object" && !Array.isArray(item)) flatten(item, full, into);
+    else into[full] = Array.isArray(item) ? JSON.stringify(item) : item;
   }
   return into;
 }

@@ -6,9 +6,9 @@
 const STRIDES = [16, 8, 4, 2, 1], POINTS = 6000, AT_ONCE = 3, QUIET = 180;
 
 export class LiveLayer {
-  /** `state()` says what to compute: parameters of the plane and of the machine; `changed`, `told` call back. */
-  constructor(transport, state, changed, told) {
-    Object.assign(this, { transport, state, changed, told });
+  /** `state()` returns what to compute: parameters of the plane and of the machine; `changed`, `report` call back. */
+  constructor(transport, state, changed, report) {
+    Object.assign(this, { transport, state, changed, report });
     this.page = Math.floor(Math.random() * 1e9);
     this.number = 0;
     this.picture = null;
@@ -21,7 +21,7 @@ export class LiveLayer {
     this.halt();
     if (!wanted) {
       this.picture = null;
-      this.told("");
+      this.report("");
       return;
     }
     this.timer = setTimeout(() => this.begin(map), QUIET);
@@ -47,13 +47,13 @@ export class LiveLayer {
         await this.pass(next, stride, stride < STRIDES[0], () => number === this.number && this.running);
         if (number !== this.number || !this.running) return;
         next.stride = stride;
-        this.told(stride > 1 ? `computing now, ${Math.round(100 / stride ** 2)} % of the points` : `computed now, not in the file: ${columns} × ${rows} points in ${((performance.now() - began) / 1000).toFixed(1)} s`);
+        this.report(stride > 1 ? `computing now, ${Math.round(100 / stride ** 2)} % of the points` : `computed now, not in the file: ${columns} × ${rows} points in ${((performance.now() - began) / 1000).toFixed(1)} s`);
       }
       this.running = false;
     } catch (error) {
       if (number === this.number) {
         this.running = false;
-        if (error.status !== 409) this.told(error.message);
+        if (error.status !== 409) this.report(error.message);
       }
     }
   }

@@ -13,16 +13,16 @@ export function drawMachine(context, width, height, machine, summary, range, sta
   if (law === "pendulum") return drawPendulum(context, width, height, summary, state);
   const size = Math.min(34, height * 0.3), left = size * (summary.two_bodies ? 2 : 3.2), right = width - 1.4 * size, ground = height - 22;
   const scale = (right - left) / (range[1] - range[0]);
-  const place = (x) => left + (x - range[0]) * scale;
+  const pixel = (x) => left + (x - range[0]) * scale;
   context.strokeStyle = INK;
   context.lineWidth = 1;
   line(context, 8, ground + 0.5, width - 8, ground + 0.5);
   for (let x = 12; x < width - 8; x += 9) line(context, x, ground + 6, x + 6, ground);
-  if (summary.two_bodies) return drawPair(context, { place, size, ground, machine, summary, state });
-  const x = place(state.x);
+  if (summary.two_bodies) return drawPair(context, { pixel, size, ground, machine, summary, state });
+  const x = pixel(state.x);
   for (const [barrier, side] of [[summary.barrier_upper, 1], [summary.barrier_lower, -1]]) {
     if (barrier === null || !Number.isFinite(barrier)) continue;
-    const wall = place(barrier) + (side * size) / 2;
+    const wall = pixel(barrier) + (side * size) / 2;
     if (state.hit > 0 && state.side === side) {
       context.fillStyle = PALETTE.impact;
       context.globalAlpha = 0.75 * state.hit;
@@ -32,7 +32,7 @@ export function drawMachine(context, width, height, machine, summary, range, sta
     hatch(context, wall, ground - 2.1 * size, 2.1 * size, side);
   }
   if (law !== "none") {
-    const foot = place(state.driver) - 2.1 * size;
+    const foot = pixel(state.driver) - 2.1 * size;
     const middle = ground - size / 2;
     context.fillStyle = DRIVER;
     context.fillRect(foot - 5, ground - size * 0.95, 6, size * 0.9);
@@ -64,17 +64,17 @@ function spring(context, from, to, y) {
 }
 
 /** The driven body lies on the driving one; stops stand on the ground or on the driving body. */
-function drawPair(context, { place, size, ground, machine, summary, state }) {
+function drawPair(context, { pixel, size, ground, machine, summary, state }) {
   const carried = String((machine.body || {}).law).includes("backlash");
   const top = ground - size * 0.55;
-  const x1 = place(state.driver), x2 = place(state.x), long = size * 3.4;
+  const x1 = pixel(state.driver), x2 = pixel(state.x), long = size * 3.4;
   context.fillStyle = DRIVER;
   context.fillRect(x1 - long / 2, top, long, size * 0.5);
   context.strokeStyle = INK;
   context.strokeRect(x1 - long / 2, top, long, size * 0.5);
   for (const [barrier, side] of [[summary.barrier_upper, 1], [summary.barrier_lower, -1]]) {
     if (barrier === null || !Number.isFinite(barrier)) continue;
-    const wall = place((carried ? state.driver : 0) + barrier) + (side * size) / 2;
+    const wall = pixel((carried ? state.driver : 0) + barrier) + (side * size) / 2;
     hatch(context, wall, top - size * 1.1, size * 1.1, side);
   }
   box(context, x2, top, size, state);

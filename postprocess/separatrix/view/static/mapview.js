@@ -10,7 +10,7 @@ const MARGINS = [84, 10, 14, 48];
 const DEEPEST = 1e-12;
 
 export class MapView {
-  /** Calls back: hover(place), pick(place), moved(), failed(error). */
+  /** Calls back: hover(point), pick(point), moved(), failed(error). */
   constructor(canvas, callbacks) {
     this.canvas = canvas;
     this.callbacks = callbacks;
@@ -109,8 +109,8 @@ export class MapView {
   }
 
   /** An axis of the frame: values at its ends, and pixels of values. */
-  scale(axis, from, to, place) {
-    return { low: valueAt(axis, from), high: valueAt(axis, to), label: axisLabel(axis), place: (value) => place(indexOf(axis, value)) };
+  scale(axis, from, to, pixel) {
+    return { low: valueAt(axis, from), high: valueAt(axis, to), label: axisLabel(axis), pixel: (value) => pixel(indexOf(axis, value)) };
   }
 
   drawTiles(context) {
@@ -143,7 +143,7 @@ export class MapView {
     const other = this.slow && (up === level ? slow : this.slow.has(up, r, c));
     const matching = other && other.cells && other.rows === tile.rows ? other : null;
     const picture = this.tiles.paint(tile, this.painter, matching);
-    // The part of the tile that this place shows.
+    // The part of the tile that is shown here.
     const size = 2 ** up, [points, lines] = this.tiles.points, edge = 2 ** level * TILE;
     const a = [column * edge, Math.min((column + 1) * edge, points)], b = [row * edge, Math.min((row + 1) * edge, lines)];
     const sx = (a[0] - c * TILE * size) / size, sw = (a[1] - a[0]) / size, sh = (b[1] - b[0]) / size;

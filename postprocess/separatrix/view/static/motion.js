@@ -77,7 +77,7 @@ export class MotionPanel {
   /** The line through samples and events, in which the velocity jumps at impacts: times, x, v; not numbers at a jump. */
   merge({ time, x, v, event_time: at, event_x, event_v_before: before, event_v_after: after }) {
     const line = { time: [], x: [], v: [] };
-    const add = (t, place, speed) => { line.time.push(t); line.x.push(place); line.v.push(speed); };
+    const add = (t, position, speed) => { line.time.push(t); line.x.push(position); line.v.push(speed); };
     let k = 0;
     for (let i = 0; i < time.length; i++) {
       for (; k < at.length && at[k] <= time[i]; k++) {

@@ -5,7 +5,7 @@
 
 /** classes, nothing, regimes (by code), boundaries (by name), up, down, many, motion, impact. */
 export const PALETTE = {};
-// Up to so many classes of their own have the colours of their places.
+// Up to so many classes of their own take the colours of the palette in order.
 const FEW = 8;
 const HIDDEN = [250, 250, 250];
 // cividis (Nuñez, Anderton, Renslow 2018) at equal steps
@@ -22,9 +22,9 @@ const SCALE_RGB = CIVIDIS.map(rgb);
 export function classColour(value, first = 1, own = {}) {
   if (own[value]) return rgb(own[value]);
   if (value < first) return rgb(PALETTE.nothing);
-  const place = value - first;
-  if (place < PALETTE.classes.length && Object.keys(own).length <= FEW) return rgb(PALETTE.classes[place]);
-  const hue = (place * 137.508) % 360, light = 0.35 + 0.3 * ((place * 0.618) % 1);
+  const rank = value - first;
+  if (rank < PALETTE.classes.length && Object.keys(own).length <= FEW) return rgb(PALETTE.classes[rank]);
+  const hue = (rank * 137.508) % 360, light = 0.35 + 0.3 * ((rank * 0.618) % 1);
   return fromHue(hue, 0.55, light);
 }
 
@@ -39,8 +39,8 @@ function fromHue(hue, saturation, light) {
 
 /** Colour of a number from 0 to 1. */
 export function scaleColour(t) {
-  const place = Math.min(Math.max(t, 0), 1) * (SCALE_RGB.length - 1);
-  const i = Math.min(Math.floor(place), SCALE_RGB.length - 2), f = place - i;
+  const position = Math.min(Math.max(t, 0), 1) * (SCALE_RGB.length - 1);
+  const i = Math.min(Math.floor(position), SCALE_RGB.length - 2), f = position - i;
   return SCALE_RGB[i].map((value, k) => Math.round(value + f * (SCALE_RGB[i + 1][k] - value)));
 }
 

@@ -27,7 +27,7 @@ export function tickTexts({ values, step }) {
   return { texts: values.map((v) => number((Math.round((v - base) / step) * step) / 10 ** power, 3)), offset: base, power };
 }
 
-/** A frame with ticks. `box` = [left, top, width, height]; axes have low, high, label, and place(value) in pixels. */
+/** A frame with ticks. `box` = [left, top, width, height]; axes have low, high, label, and pixel(value) in pixels. */
 export function frame(context, box, across, up) {
   const [left, top, width, height] = box;
   context.save();
@@ -40,7 +40,7 @@ export function frame(context, box, across, up) {
   context.textAlign = "center";
   context.textBaseline = "top";
   a.values.forEach((value, i) => {
-    const x = Math.round(across.place(value)) + 0.5;
+    const x = Math.round(across.pixel(value)) + 0.5;
     if (x < left - 1 || x > left + width + 1) return;
     line(context, x, top + height, x, top + height + 5);
     context.fillText(aText.texts[i], Math.min(x, left + width - 8), top + height + 7);
@@ -49,7 +49,7 @@ export function frame(context, box, across, up) {
   context.textAlign = "right";
   context.textBaseline = "middle";
   b.values.forEach((value, i) => {
-    const y = Math.round(up.place(value)) + 0.5;
+    const y = Math.round(up.pixel(value)) + 0.5;
     if (y < top - 1 || y > top + height + 1) return;
     line(context, left - 5, y, left, y);
     context.fillText(bText.texts[i], left - 7, y);
@@ -90,8 +90,8 @@ export class Plot {
   y(value) { return this.box[1] + this.box[3] - ((value - this.ys[0]) / (this.ys[1] - this.ys[0])) * this.box[3]; }
 
   frame() {
-    frame(this.context, this.box, { low: this.xs[0], high: this.xs[1], label: this.labels[0], place: (v) => this.x(v) },
-      { low: this.ys[0], high: this.ys[1], label: this.labels[1], place: (v) => this.y(v) });
+    frame(this.context, this.box, { low: this.xs[0], high: this.xs[1], label: this.labels[0], pixel: (v) => this.x(v) },
+      { low: this.ys[0], high: this.ys[1], label: this.labels[1], pixel: (v) => this.y(v) });
   }
 
   clip(draw) {

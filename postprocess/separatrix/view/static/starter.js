@@ -22,23 +22,23 @@ export class Starter {
   startAt([a, b]) {
     const { axes } = this.viewer.file, coarse = this.viewer.live.picture ? null : this.viewer.map.perPixel.every((one) => one < 0.34);
     const snap = (i, axis) => (coarse ? Math.min(Math.max(Math.round(i), 0), axis.count - 1) : i);
-    const place = { [this.viewer.across]: snap(a, axes[this.viewer.across]), [this.viewer.up]: snap(b, axes[this.viewer.up]) };
+    const indices = { [this.viewer.across]: snap(a, axes[this.viewer.across]), [this.viewer.up]: snap(b, axes[this.viewer.up]) };
     const start = { x: (this.viewer.file.machine.start || {}).x0 || 0, v: (this.viewer.file.machine.start || {}).v0 || 0, angle: (this.viewer.file.machine.start || {}).crank_angle || 0 };
     const parameters = { ...this.viewer.with }, names = { x0: "x", v0: "v", crank_angle: "angle" };
     axes.forEach((axis, i) => {
-      const value = valueAt(axis, i in place ? place[i] : this.viewer.at[i]);
+      const value = valueAt(axis, i in indices ? indices[i] : this.viewer.at[i]);
       if (axis.start) start[names[axis.path]] = value;
-      else if (i in place) parameters[axis.path] = value;
+      else if (i in indices) parameters[axis.path] = value;
     });
     const text = Object.entries(parameters).map(([path, value]) => `${path}:${value}`).join(";");
     const found = { file: this.viewer.file.index, ...start, at: this.viewer.fixedAt().join(",") };
-    const mark = { x: valueAt(axes[this.viewer.across], place[this.viewer.across]), y: valueAt(axes[this.viewer.up], place[this.viewer.up]) };
+    const mark = { x: valueAt(axes[this.viewer.across], indices[this.viewer.across]), y: valueAt(axes[this.viewer.up], indices[this.viewer.up]) };
     return { request: text ? { ...found, with: text } : found, mark };
   }
 
-  async pick(place) {
+  async pick(point) {
     if (this.viewer.file.no_motions) return fill(this.viewer.status, `No motions: ${this.viewer.file.no_motions}`);
-    const { request, mark } = this.startAt(place);
+    const { request, mark } = this.startAt(point);
     const token = (this.picking = {});
     try {
       const answer = await this.viewer.transport.ask("motion", request);
@@ -79,9 +79,9 @@ export class Starter {
     }
   }
 
-  /** The motion under the mouse: the newest place as soon as the last answer is drawn. */
-  async followMouse(place) {
-    this.next = place;
+  /** The motion under the mouse: the newest point as soon as the last answer is drawn. */
+  async followMouse(point) {
+    this.next = point;
     if (this.following) return;
     this.following = true;
     while (this.next) {

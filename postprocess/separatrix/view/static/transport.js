@@ -73,8 +73,8 @@ export class StoredTransport {
 
   async ask(name, parameters = {}) {
     if (name === "stop") return { arrays: {} };
-    const { page, view, ...place } = parameters;
-    let key = `${name}?${new URLSearchParams(place)}`;
+    const { page, view, ...selection } = parameters;
+    let key = `${name}?${new URLSearchParams(selection)}`;
     if (name === "motion") {
       const nearest = this.nearestMotion(parameters);
       if (nearest === null) throw new RequestError("This page has no stored motions.", 404);
