@@ -4,6 +4,7 @@
 #
 # format.sh           formats Fortran, C, C++ and Python and repairs what the linters can
 # format.sh --check   changes nothing; fails if something would change or a linter objects
+# Both list words that are not used here (scripts/words.txt) and sentences that are too long (scripts/prose.py).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -95,6 +96,10 @@ else
   "$tools/ruff" format tests postprocess scripts docs/conf.py docs/_ext docs/gallery
   "$tools/ruff" check --fix tests postprocess scripts docs/conf.py docs/_ext docs/gallery || failed=1
 fi
+
+echo "format: words and documents"
+"$tools/python" scripts/words.py || failed=1
+"$tools/python" scripts/prose.py || failed=1
 
 if ((failed)); then
   if $check; then

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import xarray as xr
-from markdown import table
+from evidence.markdown import table
 
 MADE = "<!-- made by scripts/docs -->\n\n"
 

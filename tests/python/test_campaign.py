@@ -82,7 +82,7 @@ def test_the_command_line(source_dir, option, code):
     assert (option in result.stderr) == (code != 0)
 
 
-def test_a_seed_is_asked_for_and_the_page_says_whether_it_was_developed_on(campaign, monkeypatch, capsys):
+def test_a_seed_is_asked_for_and_the_page_states_whether_it_was_developed_on(campaign, monkeypatch, capsys):
     import campaign as program
     import seeds
 
@@ -96,7 +96,7 @@ def test_a_seed_is_asked_for_and_the_page_says_whether_it_was_developed_on(campa
     assert set(seeds.BLIND_UP_TO) <= set(seeds.DEVELOPED_ON)
 
 
-def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_path, monkeypatch):
+def test_the_page_states_which_source_and_library_gave_the_verdicts(campaign, tmp_path, monkeypatch):
     import campaign as program
     import report
 
@@ -117,9 +117,9 @@ def test_the_page_says_which_source_and_library_gave_the_verdicts(campaign, tmp_
     folders = program.Folders(tmp_path)
     folders.make()
     folders.result(3).write_text(json.dumps({"commit": program.commit(), "library": program.library()}))
-    said = report.versions(folders, [SimpleNamespace(number=3)])
+    found = report.versions(folders, [SimpleNamespace(number=3)])
     digest = hashlib.sha256(b"a library").hexdigest()
-    assert said == f"{clean}-dirty with library {digest[:12]} (1)"
+    assert found == f"{clean}-dirty with library {digest[:12]} (1)"
     program.commit.cache_clear()
     program.library.cache_clear()
 
@@ -181,7 +181,7 @@ def test_a_killed_campaign_goes_on_and_gives_the_same_page(source_dir, tmp_path)
         assert all(json.loads(path.read_text())["verdict"]["effects"] == ["cubic_spring"] for path in found)
         assert [json.loads(path.read_text())["number"] for path in found] == list(range(CASES))
         assert (folder / "figures" / "discovery_confusion.png").is_file()
-    # one sentence tells a measured time
+    # one sentence states a measured time
     measured = re.compile(r"median [0-9]+ s(?= of\s+processor time)")
     assert all(len(measured.findall(page)) == 1 for page in results.values())
     untimed = {name: measured.sub("", page) for name, page in results.items()}
@@ -195,8 +195,8 @@ def test_the_archive_and_the_page_name_no_folder_of_the_machine(campaign, tmp_pa
 
     folders = Folders(tmp_path / "seed")
     folders.make()
-    said = f"{folders.cases}/0000/base.toml:3: key 'body.mass': missing"
-    folders.result(0).write_text(json.dumps({"number": 0, "verdict": {"reasons": [said]}}))
+    found = f"{folders.cases}/0000/base.toml:3: key 'body.mass': missing"
+    folders.result(0).write_text(json.dumps({"number": 0, "verdict": {"reasons": [found]}}))
     kept = tmp_path / "archive.jsonl.xz"
     assert archive.pack(kept, folders, [0, 1]) == 1
     text = lzma.open(kept, "rt").read()

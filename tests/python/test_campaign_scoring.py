@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the discovery campaign counts: its intervals, how verdicts are judged, the confusion matrix."""
+"""How the discovery campaign counts: its intervals, how verdicts are scored, the confusion matrix."""
 
 import math
 
@@ -32,7 +32,7 @@ def test_intervals_of_differences_as_published(campaign, one, other, low, high):
 
 
 @pytest.mark.parametrize(
-    ("hits", "cases", "lowest", "highest", "said"),
+    ("hits", "cases", "lowest", "highest", "given"),
     [
         (0, 0, 0.9, 1, "undecided"),
         (96, 100, 0.95, 1, "undecided"),
@@ -45,8 +45,8 @@ def test_intervals_of_differences_as_published(campaign, one, other, low, high):
         (999, 1000, 0.9, 0.98, "**no**"),
     ],
 )
-def test_a_bar_is_met_where_the_whole_interval_is(campaign, hits, cases, lowest, highest, said):
-    assert campaign.bars.met(campaign.rates.Rate(hits, cases), lowest, highest) == said
+def test_a_bar_is_met_where_the_whole_interval_is(campaign, hits, cases, lowest, highest, given):
+    assert campaign.bars.met(campaign.rates.Rate(hits, cases), lowest, highest) == given
 
 
 def truth(names: list[str], kind: str = "single", number: int = 0, **more) -> dict:
@@ -69,12 +69,12 @@ def truth(names: list[str], kind: str = "single", number: int = 0, **more) -> di
 
 def verdict(outcome: str, effects: list[str] = (), alternatives: list[str] = (), **more) -> dict:
     """A verdict as the workflow gives it, with its time."""
-    said = {"outcome": outcome, "effects": list(effects), "alternatives": list(alternatives)}
-    return {"verdict": said | more, "seconds": 1.0}
+    given = {"outcome": outcome, "effects": list(effects), "alternatives": list(alternatives)}
+    return {"verdict": given | more, "seconds": 1.0}
 
 
 # truth, verdict, (decided, right, contains, wrong name), column
-JUDGED = [
+SCORED = [
     (truth(["viscous"]), verdict("named", ["viscous"]), (True, True, True, False), "right name"),
     (truth(["viscous"]), verdict("named", ["stribeck"]), (True, False, False, True), "stribeck"),
     (
@@ -233,24 +233,24 @@ JUDGED = [
 ]
 
 
-@pytest.mark.parametrize(("hidden", "said", "flags", "column"), JUDGED)
-def test_verdicts_are_judged(campaign, hidden, said, flags, column):
-    found = campaign.scoring.score(hidden, said)
+@pytest.mark.parametrize(("hidden", "given", "flags", "column"), SCORED)
+def test_verdicts_are_scored(campaign, hidden, given, flags, column):
+    found = campaign.scoring.score(hidden, given)
     assert (found.decided, found.right, found.contains, found.wrong_name) == flags
     assert found.column == column
     assert found.by_family == (
         found.right
-        and said["verdict"]["effects"] in (["friction_curve"], ["viscous"])
+        and given["verdict"]["effects"] in (["friction_curve"], ["viscous"])
         and hidden["names"] != ["viscous"]
     )
 
 
-def test_parameters_are_judged_by_their_intervals(campaign):
+def test_parameters_are_scored_by_their_intervals(campaign):
     hidden = truth(["viscous"], parameters={"effect.viscous.damping": 2.0})
     for value, inside in ((2.1, True), (2.5, False)):
         found = {"value": value, "standard_error": 0.1, "interval_95": [value - 0.2, value + 0.2]}
-        said = verdict("named", ["viscous"], parameters={"effect.viscous.damping": found})
-        one = campaign.scoring.score(hidden, said)
+        given = verdict("named", ["viscous"], parameters={"effect.viscous.damping": found})
+        one = campaign.scoring.score(hidden, given)
         assert one.errors == pytest.approx((value / 2 - 1,))
         assert one.covered == (inside,)
 
@@ -266,7 +266,7 @@ def test_a_parameter_at_its_bound_is_not_covered(campaign):
     assert one.errors == pytest.approx((0, 1))
 
 
-def test_the_clearest_region_is_judged(campaign):
+def test_the_clearest_region_is_scored(campaign):
     where = [
         {"map": "drive phase", "force": 0.5, "error": 0.2},
         {"map": "time since the last impact", "force": -3.0, "error": 0.1},
@@ -278,9 +278,9 @@ def test_the_clearest_region_is_judged(campaign):
     assert region(["restitution_slope"], []) is None
 
 
-def test_a_decoy_that_could_be_named_counts(campaign):
-    said = verdict("none", negative_controls={"tested": 9, "accepted": True})
-    assert campaign.scoring.score(truth([], "none"), said).negative_control
+def test_a_negative_control_that_could_be_named_counts(campaign):
+    given = verdict("none", negative_controls={"tested": 9, "accepted": True})
+    assert campaign.scoring.score(truth([], "none"), given).negative_control
     assert not campaign.scoring.score(truth([], "none"), verdict("none")).negative_control
 
 
@@ -292,12 +292,13 @@ def test_removed_excess(campaign):
 
 def test_the_confusion_matrix_has_every_case_once(campaign):
     found = [
-        campaign.scoring.score({**hidden, "number": i}, said) for i, (hidden, said, _, _) in enumerate(JUDGED)
+        campaign.scoring.score({**hidden, "number": i}, given)
+        for i, (hidden, given, _, _) in enumerate(SCORED)
     ]
     rows = sorted({one.truth for one in found})
     counts, columns = campaign.figure.confusion_counts(found, rows)
-    assert counts.sum() == len(JUDGED)
-    assert counts[:, columns.index("right")].sum() == sum(flags[1] for _, _, flags, _ in JUDGED)
+    assert counts.sum() == len(SCORED)
+    assert counts[:, columns.index("right")].sum() == sum(flags[1] for _, _, flags, _ in SCORED)
     assert sum(one.alarm for one in found if one.kind == "none") == 3
     wrong = {row[0]: row[2] for row in campaign.bars.bars(found, [])}["wrong name, all cases"]
-    assert f"({sum(flags[3] for _, _, flags, _ in JUDGED)} of {len(JUDGED)};" in wrong
+    assert f"({sum(flags[3] for _, _, flags, _ in SCORED)} of {len(SCORED)};" in wrong

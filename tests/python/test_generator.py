@@ -45,9 +45,11 @@ def test_nothing_is_lost_without_friction_and_drive(generator):
     *_, simulator = generator
     machine = machine_of(generator, coulomb=0.0, scale=0.0, restitution=1.0, upper=0.8, cubic=-20.0)
     states, impacts = fly(generator, machine, 0.75, 2.0)
-    stretch = machine.free_length + machine.mean - states[:, simulator.X]
+    extension = machine.free_length + machine.mean - states[:, simulator.X]
     energy = (
-        states[:, simulator.V] ** 2 / 2 + machine.stiffness * stretch**2 / 2 + machine.cubic * stretch**4 / 4
+        states[:, simulator.V] ** 2 / 2
+        + machine.stiffness * extension**2 / 2
+        + machine.cubic * extension**4 / 4
     )
     assert impacts > 5
     assert energy == pytest.approx(energy[0], rel=1e-9)
@@ -57,8 +59,8 @@ def test_coulomb_friction_takes_force_times_path(generator):
     *_, simulator = generator
     machine = machine_of(generator, scale=0.0, upper=simulator.NOWHERE)
     states, _ = fly(generator, machine, 1.0, 0.0, periods=2, samples=4000)
-    stretch = machine.free_length + machine.mean - states[:, simulator.X]
-    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * stretch**2 / 2
+    extension = machine.free_length + machine.mean - states[:, simulator.X]
+    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * extension**2 / 2
     path = np.sum(np.abs(np.diff(states[:, simulator.X])))
     assert energy[0] - energy[-1] == pytest.approx(machine.coulomb * path, rel=1e-5)
     assert (np.diff(energy) <= 1e-12).all()
@@ -93,7 +95,7 @@ def test_half_the_step_changes_little(generator, substeps):
     ],
     ids=["line", "power", "saturating", "step"],
 )
-def test_restitution_falls_with_the_speed_as_its_shape_says(generator, shape, constant, loss):
+def test_restitution_falls_with_the_speed_as_its_shape_states(generator, shape, constant, loss):
     *_, simulator = generator
     more = {"restitution_slope": 0.15, "restitution_shape": shape, "restitution_constant": constant}
     machine = machine_of(generator, coulomb=0.0, stiffness=0.0, upper=0.8, restitution=0.8, **more)
@@ -103,20 +105,20 @@ def test_restitution_falls_with_the_speed_as_its_shape_says(generator, shape, co
         assert -states[-1, simulator.V] == pytest.approx(speed * (0.8 - 0.15 * loss(speed)), rel=1e-12)
 
 
-def test_laws_of_another_shape_are_what_they_say(generator):
-    """Work of the forces along a motion: of a spring from its potential, of friction over place."""
+def test_laws_of_another_shape_have_their_shape(generator):
+    """Work of the forces along a motion: of a spring from its potential, of friction over position."""
     *_, simulator = generator
     more = {"cubic": 30.0, "cubic_exponent": 2.0, "quadratic": 0.0}
     machine = machine_of(generator, coulomb=0.0, scale=0.0, upper=simulator.NOWHERE, **more)
     states, _ = fly(generator, machine, 0.9, 0.0, periods=2, samples=4000)
-    stretch = np.abs(machine.free_length + machine.mean - states[:, simulator.X])
-    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * stretch**2 / 2 + 30 * stretch**3 / 3
+    extension = np.abs(machine.free_length + machine.mean - states[:, simulator.X])
+    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * extension**2 / 2 + 30 * extension**3 / 3
     assert energy == pytest.approx(energy[0], rel=1e-9)
     machine = machine_of(generator, scale=0.0, upper=simulator.NOWHERE, friction_slope=0.5, friction_wave=9.0)
     states, _ = fly(generator, machine, 1.1, 0.0, periods=1, samples=8000)
     x = states[:, simulator.X]
-    stretch = machine.free_length + machine.mean - x
-    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * stretch**2 / 2
+    extension = machine.free_length + machine.mean - x
+    energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * extension**2 / 2
     middle = (x[1:] + x[:-1]) / 2
     work = np.sum(machine.coulomb * (1 + 0.5 * np.sin(9 * middle) / 9) * np.abs(np.diff(x)))
     assert energy[0] - energy[-1] == pytest.approx(work, rel=1e-5)
@@ -215,7 +217,7 @@ def nothing_hidden(design) -> int:
 
 
 @pytest.mark.parametrize("number", [None, 1])
-def test_a_case_is_what_its_number_says(generator, tmp_path, number):
+def test_a_case_follows_from_its_number(generator, tmp_path, number):
     design, _, records, _ = generator
     seals = []
     for folder in ("one", "two"):
@@ -234,7 +236,7 @@ def test_the_seal_notices_another_truth(generator, tmp_path):
     assert records.seal(path) != found
 
 
-def test_records_do_not_tell_the_truth(generator, tmp_path):
+def test_records_do_not_contain_the_truth(generator, tmp_path):
     design, experiment, records, _ = generator
     case = design.draw(SEED, 1)
     records.write_case(tmp_path / "case", tmp_path / "truth.json", case)
