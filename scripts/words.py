@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = Path(__file__).with_name("words.txt")
-# Files that name old words: this list, the licence, names in older cases, verdicts of an earlier version, data.
+# Files that name old words: this list, the licence, older cases, verdicts of an earlier version; data.
 EXEMPT = re.compile(
     r"scripts/words\.(txt|py)$|LICENSE|NAMING\.md$|CHANGELOG\.md$|docs/discovery\.md$"
     r"|src/config/old_keys\.f90$|tests/config/test_old_keys\.pf$|tests/python/(\w+/)?test_words\.py$"

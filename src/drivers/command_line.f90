@@ -300,7 +300,7 @@ contains
     !> An end of the range of a parameter.
     !> One end of a range; which units it may have is known with the case.
     subroutine take_end(text)
-      character(len=*), intent(out) :: text
+      character(len=32), intent(out) :: text
       text = value
       if (len_trim(value) == 0 .or. len(value) > len(text)) then
         call fail(error, exit_usage, name//": found '"//value//"', allowed a number, or one with a unit")

@@ -19,7 +19,8 @@
 #define LANE_LEAF inline __attribute__((always_inline))
 #endif
 
-// A build that counts what the kernel does defines this; see `scripts/evidence/bench_peers/counted_lanes.cpp`.
+// A build that counts what the kernel does defines this; see
+// `scripts/evidence/bench_peers/counted_lanes.cpp`.
 #ifndef LANE_COUNT
 #define LANE_COUNT(what, number)
 #endif

@@ -8,14 +8,14 @@
 #if defined(LANES_AVX512)
 #define CHOOSE_AVX512(name, ...)                                                                             \
   if (width >= 8)                                                                                            \
-    return name##_avx512(__VA_ARGS__)
+  return name##_avx512(__VA_ARGS__)
 #else
 #define CHOOSE_AVX512(name, ...) (void)width
 #endif
 #if defined(LANES_AVX2)
 #define CHOOSE_AVX2(name, ...)                                                                               \
   if (width >= 4)                                                                                            \
-    return name##_avx2(__VA_ARGS__)
+  return name##_avx2(__VA_ARGS__)
 #else
 #define CHOOSE_AVX2(name, ...) (void)width
 #endif
