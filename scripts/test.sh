@@ -5,7 +5,7 @@
 # test.sh             builds Separatrix with and without MPI and runs the tests; the last line counts them
 # test.sh --all       also the long ones, which repeat a law for a further machine, size or page
 # test.sh NAME...     builds and runs single suites in build/: friction_law, tests/laws/test_friction_law.pf, figures,
-#                     tests/python/test_figures.py; a minute for a suite of Fortran of a build that is there
+#                     tests/python/figures/test_figures.py; a minute for a suite of Fortran of a build that is there
 #
 # The exit code is 0 only if no test failed.
 set -euo pipefail
@@ -38,7 +38,7 @@ run_suites() {
     stem=test_${stem#test_}
     found=0
     # without an ending it may be a suite of both
-    for path in $(compgen -G "tests/*/$stem.p[fy]" || true); do
+    for path in $(compgen -G "tests/*/$stem.p[fy]" || true; compgen -G "tests/python/*/$stem.py" || true); do
       case "$name" in
         *.pf | *.py) [[ "${path##*.}" == "${name##*.}" ]] || continue ;;
       esac
@@ -49,7 +49,7 @@ run_suites() {
       esac
     done
     if ((!found)); then
-      echo "test: found '$name', allowed the name of a file tests/*/test_NAME.pf or tests/*/test_NAME.py" >&2
+      echo "test: found '$name', allowed the name of a file tests/*/test_NAME.pf or tests/python/*/test_NAME.py" >&2
       exit 64
     fi
   done

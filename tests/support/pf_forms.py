@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Forms of a .pf file: those that pFUnit takes and those that it refuses, each in a suite `test_it`.
 
-tests/python/test_pf_translator.py tries the translator with them, scripts/evidence/pfunit_check pFUnit.
+tests/python/project/test_pf_translator.py tries the translator with them, `pfunit_check` pFUnit.
 """
 
 HEAD = "module test_it\n  use {uses}\n  implicit none\n{declarations}contains\n"

@@ -5,7 +5,7 @@ remain.
 
 The normal equations of a Levenberg-Marquardt step have the form of an arrow: one small block per segment (2 x
 2 of one body, 2 n x 2 n of n coordinates), coupled only through the parameters. Their Schur complement has
-the size of the parameters (tests/python/test_discovery_fit.py compares it with the dense step).
+the size of the parameters (tests/python/discovery/test_discovery_fit.py compares it with the dense step).
 """
 
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from program import differences, run, succeed
 
-SOURCE = Path(__file__).resolve().parents[2]
+SOURCE = Path(__file__).resolve().parents[3]
 sys.path.append(str(SOURCE / "scripts/evidence/bench_peers"))
 import rows  # noqa: E402
 

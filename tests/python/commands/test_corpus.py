@@ -14,7 +14,7 @@ from separatrix import SeparatrixError, open_result
 from separatrix.discovery.measured.records import read_record
 from separatrix.open import reading
 
-CORPUS = Path(__file__).resolve().parents[1] / "faults" / "corpus"
+CORPUS = Path(__file__).resolve().parents[2] / "faults" / "corpus"
 CODES = {65, 66, 74, 76}
 
 

@@ -14,7 +14,7 @@ import pytest
 from documents import LANGUAGES, blocks, matches, run_page
 from separatrix import SeparatrixWarning
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 TEACHING = [
     DOCS / "start.md",
     *sorted((DOCS / "machines").glob("*.md")),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from separatrix.discovery.cli import main
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 FOLDER = os.environ.get("SEPARATRIX_MEASURED")
 
 pytestmark = pytest.mark.skipif(

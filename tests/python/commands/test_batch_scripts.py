@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from program import differences, succeed, write_case
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts/slurm"
+SCRIPTS = Path(__file__).resolve().parents[3] / "scripts/slurm"
 SMALL = ["--set", "grid.tile=[5, 5]"]
 # Jobs are run at once, in the order of their submission, each element of an array by itself; a job whose
 # dependency failed is not run.

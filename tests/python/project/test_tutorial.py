@@ -10,7 +10,7 @@ import pytest
 from documents import LANGUAGES, blocks, run_page
 from PIL import Image
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGE = DOCS / "tutorial.md"
 QUICK = "\n## 3. "
 """The sections before this one take some seconds, the whole page up to a minute."""

@@ -11,7 +11,7 @@ import pytest
 import separatrix as sx
 from program import succeed
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts" / "evidence"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "scripts" / "evidence"))
 
 import readers_check  # noqa: E402
 

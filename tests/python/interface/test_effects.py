@@ -131,7 +131,7 @@ def test_laws_list_the_effects(separatrix, tmp_path):
     effects = {
         row["law"]: {p["name"]: p for p in row["parameters"]} for row in rows if row["family"] == "effect"
     }
-    guide = (Path(__file__).parents[2] / "docs" / "case-file.md").read_text()
+    guide = (Path(__file__).parents[3] / "docs" / "case-file.md").read_text()
     table = guide.split("#### Effects: [effect.NAME]")[1].split("\n#### ")[0].split("|---|---|---|")[1]
     described = [
         name for line in table.splitlines() if line.startswith("|") for name in names_in(line.split("|")[1])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "support"))
 from pf_forms import REFUSED, TAKEN, case, mpi_case, suite  # noqa: E402
 
 SERIAL = [

@@ -57,7 +57,7 @@ def test_examples_have_the_same_bits(separatrix, source_dir, tmp_path, example, 
 
 def machines_of_one_body() -> list[str]:
     """Keys of the machines of the benchmark that a GPU flies; read as text, as its modules are no package."""
-    text = (Path(__file__).resolve().parents[2] / "scripts/evidence/bench_peers/rows.py").read_text()
+    text = (Path(__file__).resolve().parents[3] / "scripts/evidence/bench_peers/rows.py").read_text()
     keys = [part.split('"')[1] for part in text.split("ROWS = (")[1].split("\n    Row(")[1:]]
     return [key for key in keys if not key.startswith("chain_") and key != "pair"]
 

@@ -13,7 +13,7 @@ import pytest
 from program import succeed
 from scipy.special import mathieu_a
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "referee"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "referee"))
 import random_structures
 from structures import Friction, Rigid, Soft, Structure
 

@@ -3,7 +3,7 @@
 """The batch scripts on a one-node SLURM that this test starts; as root, asked for by SEPARATRIX_SLURM=1.
 
 apt-get install slurmctld slurmd slurm-client munge
-SEPARATRIX_SLURM=1 pytest tests/python/test_slurm.py
+SEPARATRIX_SLURM=1 pytest tests/python/commands/test_slurm.py
 """
 
 import json
@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from program import differences, succeed, write_case
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 pytestmark = pytest.mark.skipif(
     os.environ.get("SEPARATRIX_SLURM") != "1" or os.geteuid() != 0 or shutil.which("slurmctld") is None,

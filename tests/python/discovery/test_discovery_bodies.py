@@ -379,7 +379,7 @@ def test_a_speed_alone_determines_the_machine(tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_speeds_alone_are_refused_where_they_determine_too_little(case, name, why, tmp_path: Path) -> None:
     base = tmp_path / "base.toml"
-    base.write_text(case or (Path(__file__).parents[2] / "examples/measured_pendulum.toml").read_text())
+    base.write_text(case or (Path(__file__).parents[3] / "examples/measured_pendulum.toml").read_text())
     t = np.linspace(0, 20, 1001)
     rows = np.column_stack([t, 0.1 * np.sin(7 * t)])
     path = tmp_path / "record.csv"
