@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`basin`, `sweep`, `points`, `run`: what the program computes, as Datasets."""
+"""`basin`, `sweep` and `points`: computations of the program, with their results as Datasets."""
 
 import re
 import tempfile
@@ -40,19 +40,19 @@ Values = (
     | None
 )
 
-# Below so many points a second process takes longer to start than it saves.
+# Below this number of points, starting a second process takes longer than it saves.
 _FEW_POINTS = 50_000
-# What is computed without a file of its own is kept in memory.
+# The largest number of points of a result that is kept in memory, without a file.
 _MOST_IN_MEMORY = 50_000_000
 _STARTS = ("x0", "v0", "crank_angle")
-# columns of a table of starts, and other names of the ratio
+# Columns of a table of initial conditions, and other names of the drive ratio.
 _COLUMNS = ("x0", "v0", "ratio")
 _RATIO = {"drive.ratio": "ratio", "drive_ratio": "ratio", "drive__ratio": "ratio"}
 
 
 @dataclass
 class _Work:
-    """One call: the command, its processes, its output, and who gets the progress."""
+    """One call: the command, its processes, its output, and the receiver of its progress."""
 
     command: str
     case: Case
@@ -66,7 +66,7 @@ class _Work:
     extra: Callable[[Path], list[str]]
 
     def __call__(self, folder: tempfile.TemporaryDirectory | None = None) -> xr.Dataset:
-        """Run it; `folder` holds what an earlier, stopped run of it has done."""
+        """Run the command; `folder` holds the work of an earlier run that was stopped."""
         own = folder or tempfile.TemporaryDirectory(prefix="separatrix-")
         work_folder = Path(own.name)
         target = (self.output or work_folder / f"{self.command}.h5").absolute()
@@ -107,7 +107,7 @@ class _Work:
     def _in_shares(
         self, base: list[str], target: Path, report: Progress, rename: dict[str, str], resume: bool
     ) -> None:
-        """Serial processes, each with a share of the tiles; joined they have the bits of one run."""
+        """Run serial processes, each with a share of the tiles; merged, they equal one run bitwise."""
         count = self.workers
         shares = [Path(f"{target}.shard-{i}-of-{count}.part") for i in range(1, count + 1)]
         if not resume:
@@ -155,7 +155,7 @@ def basin(
     time_limit: float | None = None,
     **more: Values,
 ) -> xr.Dataset:
-    """Return where every point of a grid ends up, and the attractors.
+    """Return the attractors and, for every point of a grid, the one that its trajectory reaches.
 
     Parameters
     ----------
@@ -165,26 +165,26 @@ def basin(
         Axes by name: `x0`, `v0`, `crank_angle`, or the path of a parameter (`{"drive.ratio": ...}`, as a
         keyword `drive__ratio=...`). Values are `sx.linspace(first, last, count)`, the same as a tuple
         `(first, last, count)`, an ascending list or array, or a whole number: that many values over the range
-        of the case. Numbers are in SI units; texts have a unit ("-3 mm"). None takes an axis away. Axes of
+        of the case. Numbers are in SI units; texts have a unit ("-3 mm"). None removes an axis. Axes of
         the case that are not named stay; new ones come first, as the slowest.
     output
         The result file. Without one the result is kept in memory and computed in this process.
     threads, workers, ranks
         Choose one: threads of this process (the default without `output`); serial processes on this machine,
         each with a share of the tiles (the default with `output`); ranks of MPI, where the program has been
-        built with it. How many: by default one for each core, or one for small maps. The result does not
-        depend on it, to the bit.
+        built with it. The default is one per core, or a single one for small maps. The results are bitwise
+        identical for any number.
     progress
         True, False, None (a bar in a terminal or a notebook), or a function of (things, done, total).
     resume
-        Go on with a run into `output` that was stopped, with the same number of workers.
+        Continue a run into `output` that was stopped, with the same number of workers.
     overwrite
-        Replace an `output` that exists.
+        Replace an existing `output`.
     time_limit
         Seconds after which the run is stopped, to be resumed.
 
-    Ctrl-C raises `Interrupted`, a KeyboardInterrupt whose `resume()` goes on. What is wrong in the case is a
-    `CaseError` with the message of the program.
+    Ctrl-C raises `Interrupted`, a KeyboardInterrupt whose `resume()` continues the run. An error in the case
+    raises a `CaseError` with the message of the program.
 
     Examples
     --------
@@ -234,26 +234,26 @@ def sweep(
     overwrite: bool = False,
     time_limit: float | None = None,
 ) -> xr.Dataset:
-    """Return how the motion changes with a parameter: run up, run down, from many starts, and the limits.
+    """Return how the motion changes with a parameter: up, down, from many starts, and its limits.
 
     Parameters
     ----------
     case
-        The machine, as a Case or the file of one. What is not given is that of its table [sweep].
+        The machine, as a Case or the file of one. Omitted arguments are those of its table [sweep].
     parameter, values
-        The path of what is swept and its values, evenly spaced: `sx.linspace(first, last, count)`, a tuple
-        of the same, or an array.
+        The path of the swept parameter and its values, evenly spaced: `sx.linspace(first, last, count)`, the
+        same as a tuple, or an array.
     directions
         "both", "up" or "down".
     starts, x0, v0
-        How many brute-force starts over x0 and v0, and their ranges; (0, 0) for none.
+        The grid of initial conditions over x0 and v0, and their ranges; (0, 0) for none.
     samples
-        Stroboscopic samples kept per value.
+        Section points stored per value.
     limit_tolerance
         Width to which the limits of a region are bracketed.
     output, ranks, progress, resume, overwrite, time_limit
-        As for `basin`. A sweep runs on one core, or on `ranks` of MPI: each value begins where the one
-        before ended.
+        As for `basin`. A sweep runs on one core, or on `ranks` of MPI. Each value continues from the final
+        state of the previous one.
 
     Examples
     --------
@@ -296,7 +296,7 @@ def points(
     time_limit: float | None = None,
     **columns: Iterable[float] | float,
 ) -> xr.Dataset:
-    """Return the state at the end of the duration of many starts.
+    """Return the final states, at the end of the duration, of many initial conditions.
 
     `starts` has the columns x0 [m], v0 [m/s] and optionally the drive ratio: a mapping, a DataFrame, a
     Dataset, or an array with two or three columns; or each as a keyword, `points(case, x0=[...], v0=0.0)`.
@@ -326,7 +326,7 @@ def points(
 
 
 def kept_in_memory(result: xr.Dataset) -> xr.Dataset:
-    """Return a result that needs its file no more."""
+    """Return a copy of a result that no longer needs its file."""
     kept = result.load().copy()
     kept.encoding = {}
     for variable in kept.variables.values():
@@ -340,7 +340,7 @@ def with_axes(case: Case, asked: Mapping[str, Values]) -> Case:
         return case
     old = {str(axis["name"]): dict(axis) for axis in case.resolved.get("axis", [])}
     asked = {"drive.ratio" if name == "ratio" else name: values for name, values in asked.items()}
-    # The fastest axes are the starts; what is new and no start comes first.
+    # Initial conditions are the fastest axes; new axes over parameters come first.
     names = [name for name in asked if name not in old and name not in _STARTS]
     names += [*old, *(name for name in asked if name not in old and name in _STARTS)]
     axes = []
@@ -383,7 +383,7 @@ def _axis_values(name: str, values: Values, old: Mapping[str, object] | None) ->
 
 
 def _even(case: Case, parameter: str, axis: dict[str, object]) -> dict[str, object]:
-    """Return first, last and count of values that have to be evenly spaced."""
+    """Return the first, the last and the number of values that must be evenly spaced."""
     if "values" not in axis:
         return axis
     values = np.array([case.in_si(parameter, value) for value in axis["values"]])
