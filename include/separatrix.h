@@ -123,9 +123,12 @@ int separatrix_contact(const separatrix_model *model, int index, char *name, siz
  *
  * In:
  *   start [segment_count][2*coordinate_count + 1]
- *     positions [m], then velocities [m/s] of all coordinates, crank angle [rad]; elastic friction has slid
- * so far that its spring is stretched by all of the friction Out: motion [m][2*coordinate_count] positions,
- * then velocities at the samples jacobian [m][2*coordinate_count][direction_count + 2*coordinate_count + 1]
+ *     positions [m], then velocities [m/s] of all coordinates, crank angle [rad]; the spring of
+ *     elastic friction carries all of the friction
+ * Out:
+ *   motion [m][2*coordinate_count]
+ *     positions, then velocities at the samples
+ *   jacobian [m][2*coordinate_count][direction_count + 2*coordinate_count + 1]
  *     their derivatives along the directions, then by positions, velocities and crank angle of the start
  *   impact [impact_capacity][5]
  *     time since the start of the segment [s], number of the contact from 0, speed of its ends against each

@@ -60,7 +60,7 @@ run_suites() {
   fi
   # shellcheck source=scripts/environment.sh
   source scripts/environment.sh
-  cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release
+  cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_LANES=all
   local jobs status=0
   jobs=$(env -u OMP_NUM_THREADS nproc)
   if ((${#suites[@]} > 0)); then
@@ -99,7 +99,7 @@ ctest --test-dir build -E '^(python|faults)$' -j "$jobs" --output-on-failure --n
 
 echo "test: building without MPI in build-serial/"
 cmake -S . -B build-serial -G Ninja -DCMAKE_BUILD_TYPE=Release -DSEPARATRIX_MPI=OFF -DSEPARATRIX_STATIC=ON \
-  -DSEPARATRIX_TESTS=ON
+  -DSEPARATRIX_LANES=all -DSEPARATRIX_TESTS=ON
 cmake --build build-serial -j "$jobs" --target separatrix separatrix_library separatrix_reference "${serial_layers[@]/#/suites-}"
 ctest --test-dir build-serial -L "^($(IFS='|' && echo "${serial_layers[*]}"))\$" -j "$jobs" --output-on-failure --no-tests=error \
   --output-junit ctest.xml || status=1

@@ -350,10 +350,12 @@ class Model:
         return self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
 
     def _find(self, path: str) -> int:
-        if path not in self._index:
-            # The library knows the one that was meant.
-            _call("separatrix_find_parameter", self._handle, path.encode(), ctypes.byref(ctypes.c_int()))
-        return self._index[path]
+        if path in self._index:
+            return self._index[path]
+        # The library knows older names, and for a message the one that was meant.
+        found = ctypes.c_int()
+        _call("separatrix_find_parameter", self._handle, path.encode(), ctypes.byref(found))
+        return found.value
 
 
 @functools.cache

@@ -13,7 +13,7 @@ import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.trial import CASE_GIVEN, try_first
-from separatrix.variables import FORMAT_VERSION, RENAMED
+from separatrix.variables import FORMAT_VERSION, RENAMED, RENAMED_EVENTS
 from separatrix.version import __version__
 from separatrix.words import decode_word
 
@@ -49,8 +49,7 @@ def open_result(path: str | Path) -> xr.Dataset:
             parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
             parts += [_open_table(path, name) for name in groups]
             result = xr.merge(parts, join="exact", compat="no_conflicts")
-            if attributes["format_version"] == 1:
-                result = result.rename({old: new for old, new in RENAMED.items() if old in result})
+            result = result.rename({old: new for old, new in RENAMED.items() if old in result})
         except Exception:
             _close(parts)
             raise
@@ -100,7 +99,9 @@ def flag_names(variable: xr.DataArray) -> dict[int, str]:
     'impact'
     """
     values = np.atleast_1d(variable.attrs.get("flag_values", []))
-    names = _text(variable.attrs.get("flag_meanings", "")).split()
+    names = [
+        RENAMED_EVENTS.get(name, name) for name in _text(variable.attrs.get("flag_meanings", "")).split()
+    ]
     try:
         return dict(zip((int(value) for value in values), names, strict=True))
     except (TypeError, ValueError, OverflowError) as error:

@@ -11,8 +11,12 @@ import numpy as np
 
 #: The version of the files that are written; older ones are read too (docs/file-format.md).
 FORMAT_VERSION = 2
-# names in files of version 1
-RENAMED = {"strobe_x": "section_x", "strobe_v": "section_v"}
+# names in older files
+RENAMED = {"strobe_x": "section_x", "strobe_v": "section_v"} | {
+    f"critical_blow{end}": f"critical_impulse{end}" for end in ("", "_lower", "_upper")
+}
+# events in older files
+RENAMED_EVENTS = {"blow": "impulse"}
 
 _REGIMES = "unresolved non_impact impact sticking mixed chattering at_rest stuck"
 _REASONS = "not_run settled time_over left_domain not_finite event_budget step_failed step_budget mode_cycle"

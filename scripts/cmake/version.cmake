@@ -5,6 +5,10 @@
 # asked for at every build; the module is rewritten, and compiled again, only when something changed.
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 string(STRIP "${CMAKE_Fortran_FLAGS} ${CMAKE_Fortran_FLAGS_${build_type}} -ffp-contract=off" build_flags)
+if(build_type STREQUAL "RELEASE")
+  string(APPEND build_flags ", -O3 or -O0 by layer")
+endif()
+string(APPEND build_flags ", lanes ${SEPARATRIX_LANES}")
 string(STRIP "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_${build_type}} -ffp-contract=off" build_c_flags)
 string(STRIP "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type}} -ffp-contract=off" build_cxx_flags)
 set(build_mpi "none")

@@ -6,7 +6,7 @@ module case_overrides
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use status, only: exit_bad_case
-  use toml_bindings, only: read_toml, toml_array, toml_entry_t
+  use toml_bindings, only: read_toml, toml_array, toml_entry_t, toml_table
   implicit none
   private
 
@@ -30,7 +30,7 @@ contains
     character(len=:), allocatable :: key, problem
     integer :: mark
     mark = index(override, '=')
-    key = current_key(placed(entries, trim(adjustl(override(1:max(mark - 1, 0))))))
+    key = placed(entries, trim(adjustl(override(1:max(mark - 1, 0)))))
     problem = key_problem(entries, key)
     if (mark == 0) problem = 'found no ''='', allowed KEY=VALUE'
     if (len(problem) == 0) then
@@ -46,7 +46,7 @@ contains
       call fail(error, exit_bad_case, '--set '//override//': '//problem)
       return
     end if
-    call put(entries, key, added, override)
+    call put(entries, current_key(key, of_table=added(1)%kind == toml_table), added, override)
   end subroutine apply_override
 
   !> The key with the index of an element instead of its name.

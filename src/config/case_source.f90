@@ -66,23 +66,36 @@ contains
       if (allocated(error)) return
       call rename_old_keys(source)
     end do
+    call report_old_keys(source)
   end subroutine open_source
 
-  !> Gives keys of older case files their current names. A key that is there under both is an error.
+  !> Gives keys of older case files their current names, where those are not there as well.
   subroutine rename_old_keys(source)
     type(case_source_t), intent(inout) :: source
     character(len=:), allocatable :: current
     integer :: i
     do i = 1, size(source%entries)
-      current = current_key(source%entries(i)%entry%path)
-      if (current == source%entries(i)%entry%path) cycle
-      if (find(source, current) > 0) then
-        call report(source, source%entries(i)%entry%path, 'found beside '''//current//''', its current name; allowed one of them')
-      else
-        source%entries(i)%entry%path = current
-      end if
+      associate (entry => source%entries(i)%entry)
+        current = current_key(entry%path, of_table=entry%kind == toml_table)
+        if (find(source, current) == 0) entry%path = current
+      end associate
     end do
   end subroutine rename_old_keys
+
+  !> A key that is there under both names is an error.
+  subroutine report_old_keys(source)
+    type(case_source_t), intent(inout) :: source
+    character(len=:), allocatable :: current, path
+    integer :: i
+    do i = 1, size(source%entries)
+      path = source%entries(i)%entry%path
+      current = current_key(path, of_table=source%entries(i)%entry%kind == toml_table)
+      if (current == path .or. path(len(path):) == ']') cycle
+      call report(source, path, 'found beside '''//current//''', its current name; allowed one of them')
+      call know(source, path)
+      call know_all_below(source, path)
+    end do
+  end subroutine report_old_keys
 
   !> Position of a path in the entries, 0 if it is absent; the search may begin at `from`.
   pure integer function find(source, path, from)

@@ -297,7 +297,6 @@ contains
 
   contains
 
-    !> An end of the range of a parameter.
     !> One end of a range; which units it may have is known with the case.
     subroutine take_end(text)
       character(len=32), intent(out) :: text

@@ -3,6 +3,7 @@
 """Compares a verdict with the truth."""
 
 import math
+import re
 from dataclasses import dataclass
 
 EQUIVALENT = frozenset({"offset_force", "asymmetric_friction", "sensor_bias", "sensor_gain"})
@@ -199,7 +200,7 @@ def one_family(sets: set[frozenset[str]]) -> bool:
 
 def score(truth: dict, result: dict) -> Score:
     """Score one case."""
-    verdict, names = result["verdict"], frozenset(truth["names"])
+    verdict, names = in_todays_words(result["verdict"]), frozenset(truth["names"])
     sets = {as_hidden(one, truth) for one in reported(verdict)}
     answer = verdict["outcome"] if verdict["outcome"] in ANSWERS else "failed"
     in_family = answer == "ambiguous" and bool(verdict.get("in_families")) and one_family(reported(verdict))
@@ -238,8 +239,7 @@ def score(truth: dict, result: dict) -> Score:
         errors=errors,
         covered=covered,
         removed=removed(held_out) if one_answer else math.nan,
-        # verdicts before version 2 have the second key
-        negative_control=bool(verdict.get("negative_controls", verdict.get("decoys", {})).get("accepted")),
+        negative_control=bool(verdict.get("negative_controls", {}).get("accepted")),
         region=region(truth["names"], verdict.get("where", [])) if one_answer and right else None,
         depends_rightly=depends_rightly(truth, verdict),
         character_closes=verdict["character"][0]["closed"]["held_out"]
@@ -259,6 +259,33 @@ def score(truth: dict, result: dict) -> Score:
             for method, named in result.get("baselines", {}).items()
         },
     )
+
+
+# Words of verdicts before version 2.
+_RENAMED = {
+    "decoys": "negative_controls",
+    "faults": "imperfections",
+    "places": "locations",
+    "foretold": "predicted",
+    "place": "position",
+    "stretch": "extension",
+    "friction_place_curve": "friction_position_curve",
+    "friction over place": "friction over position",
+    "spring over stretch": "spring over extension",
+    "force over place": "force over position",
+    "contact over place": "contact over position",
+}
+
+
+def in_todays_words(part: object) -> object:
+    """Return a verdict with the keys, effects and dependences of an older one under their names of today."""
+    if isinstance(part, dict):
+        return {in_todays_words(key): in_todays_words(value) for key, value in part.items()}
+    if isinstance(part, list):
+        return [in_todays_words(one) for one in part]
+    if isinstance(part, str) and part.startswith("effect."):
+        return re.sub(r"\w+", lambda word: _RENAMED.get(word[0], word[0]), part)
+    return _RENAMED.get(part, part) if isinstance(part, str) else part
 
 
 def depends_rightly(truth: dict, verdict: dict) -> bool | None:

@@ -30,7 +30,7 @@ BAR_MEMORY = 1.1
 """Largest over smallest peak that counts as constant."""
 MIB = 2**20
 MOST_TILES = 2**20
-"""Of src/drivers/case_setup.f90."""
+"""Of src/config/case_setup.f90."""
 
 
 def number(value: float) -> str:

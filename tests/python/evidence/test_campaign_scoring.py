@@ -302,3 +302,17 @@ def test_the_confusion_matrix_has_every_case_once(campaign):
     assert sum(one.alarm for one in found if one.kind == "none") == 3
     wrong = {row[0]: row[2] for row in campaign.bars.bars(found, [])}["wrong name, all cases"]
     assert f"({sum(flags[3] for _, _, flags, _ in SCORED)} of {len(SCORED)};" in wrong
+
+
+def test_verdicts_of_an_older_version_are_scored_alike(campaign):
+    """The archive of the campaign keeps the words that it was written with."""
+    old = verdict(
+        "named", ["friction_place_curve"], decoys={"accepted": True}, character=[{"depends_on": ["place"]}],
+        parameters={"effect.friction_place_curve.place[2]": {}},
+    )  # fmt: skip
+    assert campaign.scoring.in_todays_words(old["verdict"]) == {
+        **verdict("named", ["friction_position_curve"])["verdict"],
+        "negative_controls": {"accepted": True},
+        "character": [{"depends_on": ["position"]}],
+        "parameters": {"effect.friction_position_curve.position[2]": {}},
+    }

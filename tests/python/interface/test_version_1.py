@@ -51,6 +51,8 @@ def test_python_opens_and_draws_it(old, kind):
             margins = result.separatrix.attractors["grazing_margin"]
             assert margins.isna().sum() == 1
             assert (margins.dropna() < 1).all()
+        if kind == "trajectory":
+            assert sx.flag_names(result["event_kind"])[12] == "impulse"
         if kind == "sweep":
             assert result["section_x"].dims[-1] == "sample"
             assert list(sx.table(result, "limits")["settled"].values) == [*["bracketed"] * 3, "not_known"]
