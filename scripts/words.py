@@ -18,7 +18,7 @@ LIST = Path(__file__).with_name("words.txt")
 EXEMPT = re.compile(
     r"scripts/words\.(txt|py)$|LICENSE$|LICENSES/|NAMING\.md$|CHANGELOG\.md$|docs/discovery\.md$"
     r"|src/config/old_keys\.f90$|scripts/evidence/campaign/scoring\.py$|tests/python/evidence/test_campaign_scoring\.py$"
-    r"|tests/config/test_old_keys\.pf$|tests/python/(\w+/)?test_words\.py$"
+    r"|tests/(config|python/interface)/test_old_keys\.(pf|py)$|tests/python/(\w+/)?test_words\.py$"
     r"|.*\.(json|svg|png|xz|h5|hdf|bin|csv|txt\.gz|lock|mtx)$|tests/faults/corpus/"
 )
 

@@ -109,8 +109,12 @@ class Case:
         if not isinstance(value, str):
             return number(path, value)
         # The axes of the case may not suit the value.
-        found: object = self.with_({"axis": [], path: value}).resolved
+        case = self.with_({"axis": [], path: value})
+        found: object = case.resolved
         for key in path.split("."):
+            if key not in found:
+                # an older name of a parameter
+                return case.parameters[list(case.parameters)[case.model.index_of(path)]].value
             found = found[key]
         return float(found)
 

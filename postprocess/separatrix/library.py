@@ -125,9 +125,8 @@ class Model:
         """Take over a handle of the library; use `read` or `from_text`."""
         self._handle = handle
         self._free = weakref.finalize(self, _library().separatrix_model_free, handle)
-        paths = [self._parameter(i) for i in range(_library().separatrix_parameter_count(handle))]
-        self.parameters: dict[str, Parameter] = dict(paths)
-        self._index = {path: i for i, (path, _) in enumerate(paths)}
+        count = _library().separatrix_parameter_count(handle)
+        self.parameters: dict[str, Parameter] = dict(self._parameter(i) for i in range(count))
 
     @classmethod
     def read(cls, path: str | Path) -> "Model":
@@ -339,7 +338,7 @@ class Model:
 
     def _chosen(self, values: Mapping[str, float]) -> tuple[int, ctypes.Array, ctypes.Array]:
         """Return number, indices and values of parameters by path."""
-        index = (ctypes.c_int * len(values))(*(self._find(path) for path in values))
+        index = (ctypes.c_int * len(values))(*(self.index_of(path) for path in values))
         return len(values), index, (ctypes.c_double * len(values))(*values.values())
 
     def _along(self, active: Sequence[str], values: np.ndarray) -> tuple[int, ctypes.Array, ctypes.Array]:
@@ -349,10 +348,8 @@ class Model:
                 raise CaseError(f"active: found '{path}' twice")
         return self._chosen(dict(zip(active, _array(values, (len(active),), "values"), strict=True)))
 
-    def _find(self, path: str) -> int:
-        if path in self._index:
-            return self._index[path]
-        # The library knows older names, and for a message the one that was meant.
+    def index_of(self, path: str) -> int:
+        """Return the index of a parameter in `parameters`, also by a name that it had in older cases."""
         found = ctypes.c_int()
         _call("separatrix_find_parameter", self._handle, path.encode(), ctypes.byref(found))
         return found.value

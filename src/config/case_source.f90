@@ -77,6 +77,7 @@ contains
     do i = 1, size(source%entries)
       associate (entry => source%entries(i)%entry)
         current = current_key(entry%path, of_table=entry%kind == toml_table)
+        if (current == entry%path) cycle
         if (find(source, current) == 0) entry%path = current
       end associate
     end do

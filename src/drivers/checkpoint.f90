@@ -53,8 +53,8 @@ contains
     self%doing = doing
     self%path = working_path(path)
     if (session%team%is_root()) then
-      self%reading = file_exists(self%path)
-      self%reading = self%reading .and. session%command%resume
+      self%reading = session%command%resume
+      if (self%reading) self%reading = file_exists(self%path)
       if (.not. self%reading) call make_empty(self%path, error)
       if (.not. allocated(error)) call self%file%open(self%path, .true., error)
       if (self%reading .and. .not. allocated(error)) then

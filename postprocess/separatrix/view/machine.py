@@ -48,7 +48,7 @@ class Machine:
         """Refuse parameters that the case does not have. CaseError."""
         for path in values:
             if path not in self.model.parameters:
-                self.model._find(path)
+                self.model.index_of(path)
 
     def motion(
         self, start: tuple[float, float, float], values: Mapping[str, float], duration: float, samples: int

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every public name of the Python interface has an example that runs and prints what it shows."""
+"""Public functions of the Python interface have an example that runs and prints what it shows."""
 
 import doctest
 import inspect
