@@ -9,12 +9,11 @@ module edge_state
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use machine_family, only: fly_sections, fly_to_section, nearest_copy, section_of_section
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
     event_touch_lower, event_touch_upper, tally_t
   use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance, sides_of_saddle
   use start_label, only: label_from, label_not_known, label_of
-  use section, only: section_state_t
   use single_trajectory, only: outcome_t, run_trajectory, span_t
   use variations, only: neighbourhood_t
   implicit none
@@ -52,7 +51,7 @@ module edge_state
 
   !> What labels a motion: the machine, its trajectories, and the attractors that they may come to.
   type, public :: labeller_t
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(attractor_t), allocatable :: catalogue(:)
     type(span_t) :: span
   end type labeller_t

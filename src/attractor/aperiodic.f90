@@ -12,12 +12,10 @@ module aperiodic
   use elementary, only: exponential, logarithm
   use exact_return, only: returns_t, watch_anew, watch_returns
   use kinds, only: int64, wp
+  use machine_type, only: machine_t, section_state_t
   use matrices, only: eigenvalues
-  use motion, only: motion_t
   use motion_features, only: features_over
   use motion_state, only: tally_t
-  use section, only: advance_section_period, begin_tally, coordinates_of, scales_of, section_point, section_state, section_at, &
-    section_state_t
   implicit none
   private
 
@@ -43,7 +41,7 @@ contains
   !> Watches a motion of the given `amplitude` [m] over many drive periods. `known` if it converged to an attractor of the
   !> catalogue meanwhile, `ok` unless it had to be given up; else `found` describes it, and `returns` its returns.
   pure subroutine watch_long(moving, catalogue, amplitude, section, found, returns, known, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: amplitude
     type(section_state_t), intent(inout) :: section
@@ -56,21 +54,21 @@ contains
     integer :: i, reason
     known = .false.
     tally%needs_v_max = .true.
-    call begin_tally(moving, section, tally)
+    call moving%begin_tally(section, tally)
     call watch_anew(returns)
-    found%coordinates = coordinates_of(moving)
-    found%turn = moving%machine%turn
+    found%coordinates = moving%coordinates()
+    found%turn = moving%turn
     call make_points(found, 2)
-    before = section_point(moving, section)
+    before = moving%point_of(section)
     found%points = spread(before, 2, 2)
-    scale = max(scales_of(moving, amplitude), tiny(amplitude))
+    scale = max(moving%scales(amplitude), tiny(amplitude))
     direction = 0
     do i = 1, box_periods
       slips = tally%slips
-      call advance_section_period(moving, section, tally, reason)
+      call moving%advance_to_section(section, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      associate (now => section_point(moving, section))
+      associate (now => moving%point_of(section))
         known = attractor_reached(moving, catalogue, section, tally%slips > slips) > 0
         if (known) return
         call widen(found, spread(now, 2, 2))
@@ -88,7 +86,7 @@ contains
   !> of at most `max_period` drive periods: it comes back to rounding, and has a multiplier +1. Beside a fold of cycles it does not
   !> come back so well.
   pure subroutine find_family(moving, section, amplitude, max_period, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     real(wp), intent(in) :: amplitude
     integer, intent(in) :: max_period
@@ -100,13 +98,13 @@ contains
     logical :: ok
     if (found%kind /= kind_not_known) return
     n = found%coordinates
-    scale = max(scales_of(moving, amplitude), tiny(amplitude))
-    here = section_point(moving, section)
+    scale = max(moving%scales(amplitude), tiny(amplitude))
+    here = moving%point_of(section)
     point = here(:n)
     do period = 1, max_period
       call map_point(moving, point, period, image, unused, ok)
       if (.not. ok) return
-      if (norm2((point_near(image, point, moving%machine%turn) - point)/scale(:n)) <= comes_back) exit
+      if (norm2((point_near(image, point, moving%turn) - point)/scale(:n)) <= comes_back) exit
     end do
     if (period > max_period) return
     call derivative(moving, point, period, scale(:n), jacobian, ok)
@@ -114,7 +112,7 @@ contains
     if (.not. minval(abs(eigenvalues(jacobian) - 1)) <= neutral) return
     found%kind = kind_family
     found%multiplier = 1
-    found%duration = period*moving%machine%period
+    found%duration = period*moving%period
   end subroutine find_family
 
   !> Goes on for many drive periods: neighbours drift apart on chaotic transients too, which end. `known` if the motion converges
@@ -122,7 +120,7 @@ contains
   !> records. `forgets` if it came to a completed chatter, after which there is one motion whatever came before: then nothing
   !> drifts apart for good.
   pure subroutine outlast(moving, catalogue, section, returns, known, forgets, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(section_state_t), intent(inout) :: section
     type(returns_t), intent(inout) :: returns
@@ -133,16 +131,16 @@ contains
     known = .false.
     forgets = .false.
     ok = .true.
-    call begin_tally(moving, section, tally)
+    call moving%begin_tally(section, tally)
     call watch_anew(returns)
     do i = 1, merge(lasting_exact, lasting, moving%exact)
       slips = tally%slips
-      call advance_section_period(moving, section, tally, reason)
+      call moving%advance_to_section(section, tally, reason)
       ok = reason == 0
       if (.not. ok) return
       known = attractor_reached(moving, catalogue, section, tally%slips > slips) > 0
       if (known) return
-      forgets = tally%chatters > 0 .and. coordinates_of(moving) == 2
+      forgets = tally%chatters > 0 .and. moving%coordinates() == 2
       call watch_returns(moving, section, tally%chatters, returns)
       if (returns%period > 0) return
     end do
@@ -162,7 +160,7 @@ contains
   !> Logarithm of the factor by which the distance to a neighbour in `direction` (0: any) grows from the section point `before` to
   !> the next, `now`; the direction becomes that of the neighbour there.
   pure subroutine follow_neighbour(moving, n, scale, before, now, direction, drift)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     integer, intent(in) :: n
     real(wp), intent(in) :: scale(:), before(:), now(:)
     real(wp), intent(inout) :: direction(:)
@@ -173,14 +171,14 @@ contains
     integer :: reason
     if (.not. norm2(direction(:n)) > 0) direction(:n) = sqrt(1/real(n, wp))
     start = before(:n) + neighbour*scale(:n)*direction(:n)
-    if (start(1) > moving%machine%contact%upper .or. start(1) < moving%machine%contact%lower) then
+    if (start(1) > moving%upper .or. start(1) < moving%lower) then
       start = before(:n) - neighbour*scale(:n)*direction(:n)
     end if
-    twin = section_at(moving, start)
-    call advance_section_period(moving, twin, unused, reason)
-    reached = section_point(moving, twin)
+    twin = moving%state_at(start)
+    call moving%advance_to_section(twin, unused, reason)
+    reached = moving%point_of(twin)
     direction = 0
-    reached = point_near(reached, now, moving%machine%turn)
+    reached = point_near(reached, now, moving%turn)
     direction(:n) = (reached(:n) - now(:n))/scale(:n)
     distance = norm2(direction(:n))
     ! A neighbour that had to be given up gives no information.
@@ -214,7 +212,7 @@ contains
   !> Adds what `watch_long` found to a catalogue. One of the same regime whose box meets it is widened instead; cycles of a family
   !> are one entry.
   pure subroutine add_aperiodic(moving, found, catalogue)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: found
     type(attractor_t), allocatable, intent(inout) :: catalogue(:)
     integer :: k
@@ -230,13 +228,13 @@ contains
         end if
         call widen(catalogue(k), found%points)
         if (found%kind == kind_family) call widen_features(found%features, catalogue(k)%features)
-        catalogue(k)%section = section_state(moving, catalogue(k)%points(:, 1))
+        catalogue(k)%section = moving%watched_at(catalogue(k)%points(:, 1))
         return
       end if
     end do
     catalogue = [catalogue, found]
     k = size(catalogue)
-    catalogue(k)%section = section_state(moving, found%points(:, 1))
+    catalogue(k)%section = moving%watched_at(found%points(:, 1))
   end subroutine add_aperiodic
 
   !> Whether two motions without a period of one regime are one entry.

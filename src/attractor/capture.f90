@@ -5,11 +5,9 @@
 module capture
   use attractors, only: attractor_t, find_capture, most_coordinates, squared_distance
   use kinds, only: wp
-  use machine_facts, only: rest_lasts
-  use motion, only: motion_t
+  use machine_type, only: copy_of, machine_t, section_state_t
   use motion_state, only: tally_t
   use rest_sets, only: rest_set_of
-  use section, only: advance_to_section, copy_of, section_point, speed_number, stays_clear, section_state_t, turn_point
   implicit none
   private
 
@@ -20,7 +18,7 @@ contains
   !> Index of the attractor to which the motion has converged at the end of a drive period, 0 if none. `slipped`: whether the body
   !> moved during the last whole period. For the cycles of a machine without a clock a copy goes on to the section.
   pure integer function attractor_reached(moving, catalogue, section, slipped) result(found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     class(section_state_t), intent(in) :: section
     logical, intent(in) :: slipped
@@ -29,16 +27,16 @@ contains
     integer :: reason
     found = 0
     if (size(catalogue) == 0) return
-    found = attractor_reached_at(moving, catalogue, section_point(moving, section), slipped .or. .not. rest_lasts(moving))
+    found = attractor_reached_at(moving, catalogue, moving%point_of(section), slipped .or. .not. moving%rest_lasts)
     if (found > 0 .or. .not. any(catalogue%by_event)) return
     later = copy_of(section)
-    call advance_to_section(moving, later, unused, reason)
-    if (reason == 0) found = find_capture(catalogue, turn_point(moving, later), .true., by_event=.true.)
+    call moving%advance_to_turn(later, unused, reason)
+    if (reason == 0) found = find_capture(catalogue, moving%turn_point(later), .true., by_event=.true.)
   end function attractor_reached
 
   !> The same of a section point; of one at rest the positions of rest to which it belongs come first.
   pure integer function attractor_reached_at(moving, catalogue, point, slipped) result(found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
     logical, intent(in) :: slipped
@@ -53,7 +51,7 @@ contains
   !> left of its drift, |d| p T/(1 - |multiplier|) with the multiplier of p periods, is less than half of the distance at which it
   !> misses the stops.
   pure logical function stays_in_family(moving, catalogue, section, tally)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     class(section_state_t), intent(in) :: section
     type(tally_t), intent(in) :: tally
@@ -61,17 +59,17 @@ contains
     integer :: k, i, n
     stays_in_family = .false.
     if (tally%impacts > 0 .or. .not. any(catalogue%any_position)) return
-    point = section_point(moving, section)
+    point = moving%point_of(section)
     do k = 1, size(catalogue)
       associate (attractor => catalogue(k), after => catalogue(k)%positions + 1)
         if (.not. attractor%any_position .or. attractor%multiplier >= 1) cycle
         n = attractor%coordinates
         do i = 1, attractor%period
           if (squared_distance(attractor, i, point(after:)) > attractor%capture_radius**2) cycle
-          drift = attractor%scale(speed_number(moving) - attractor%positions) &
-                  *attractor%period*moving%machine%period/(1 - attractor%multiplier) &
+          drift = attractor%scale(moving%speed_number - attractor%positions) &
+                  *attractor%period*moving%period/(1 - attractor%multiplier) &
                   *sum(abs(point(after:after + n - 1) - attractor%points(:n, i))/attractor%scale(:n))
-          stays_in_family = stays_clear(moving, section, tally, attractor%period, 2*drift)
+          stays_in_family = moving%stays_clear(section, tally, attractor%period, 2*drift)
           if (stays_in_family) return
         end do
       end associate

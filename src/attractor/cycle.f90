@@ -8,16 +8,12 @@ module cycle
   use circle, only: point_near
   use constants, only: two_pi
   use elementary, only: sine_cosine
-  use free_motion, only: free_multipliers, is_linear
   use kinds, only: wp
-  use machine_facts, only: smallest_motion
+  use machine_type, only: machine_t, section_state_t
   use matrices, only: cholesky, eigenvalues, solve, spectral_radius
-  use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
   use section_slopes, only: slopes_of
-  use section, only: advance_section_period, begin_tally, scales_of, section_point, section_at, section_state_t, turn_of
-  use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
 
@@ -40,7 +36,7 @@ contains
   !> Image of a section point (its coordinates, SI) after `periods` drive periods and what happened on the
   !> way; `ok` is false if the trajectory had to be given up. `duration` [s] is the time that it took.
   pure subroutine map_point(moving, point, periods, image, tally, ok, needs_v_max, duration)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: periods
     real(wp), intent(out) :: image(:)
@@ -51,17 +47,17 @@ contains
     type(section_state_t) :: section
     real(wp) :: reached(most_coordinates)
     integer :: i, reason
-    section = section_at(moving, point)
+    section = moving%state_at(point)
     if (present(needs_v_max)) tally%needs_v_max = needs_v_max
-    call begin_tally(moving, section, tally)
+    call moving%begin_tally(section, tally)
     reason = 0
     if (present(duration)) duration = 0
     do i = 1, periods
-      call advance_section_period(moving, section, tally, reason)
+      call moving%advance_to_section(section, tally, reason)
       if (present(duration)) duration = duration + section%lasted
       if (reason /= 0) exit
     end do
-    reached = section_point(moving, section)
+    reached = moving%point_of(section)
     image = reached(:size(image))
     ok = reason == 0
   end subroutine map_point
@@ -69,7 +65,7 @@ contains
   !> Turns a section point near a cycle of `period` into an attractor. `found` is false if Newton's
   !> method does not converge nearby, the cycle is not stable, or no neighbourhood contracts.
   pure subroutine refine_cycle(moving, guess, period, attractor, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: guess(:)
     integer, intent(in) :: period
     type(attractor_t), intent(out) :: attractor
@@ -82,7 +78,7 @@ contains
     if (.not. found) return
     attractor%coordinates = n
     attractor%by_event = moving%by_event
-    attractor%turn = turn_of(moving)
+    attractor%turn = moving%turn_on_section()
     attractor%period = period
     attractor%scale = scale_of(moving, tally)
     point = guess
@@ -103,14 +99,14 @@ contains
     ! Rounding may put the point and its image on different sides of the matching point.
     if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
     if (moving%by_event) then
-      attractor%features = features_over(moving, tally, attractor%duration/moving%machine%period)
+      attractor%features = features_over(moving, tally, attractor%duration/moving%period)
     else
       attractor%features = features_over(moving, tally, real(attractor%period, wp))
     end if
     if (attractor%period > 1) attractor%features%word = &
-      cycle_word(moving, section_at(moving, attractor%points(:n, 1)), attractor%period)
-    if (is_linear(moving) .and. tally%impacts == 0) then
-      attractor%multipliers(:2) = free_multipliers(moving, attractor%period)
+      cycle_word(moving, moving%state_at(attractor%points(:n, 1)), attractor%period)
+    if (moving%linear .and. tally%impacts == 0) then
+      attractor%multipliers(:2) = moving%free_multipliers(attractor%period)
       attractor%multiplier = abs(attractor%multipliers(1))
     end if
     call verify_neighbourhood(moving, attractor, found)
@@ -118,16 +114,16 @@ contains
 
   !> Scales of the coordinates, from half the range of the position.
   pure function scale_of(moving, tally) result(scale)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(tally_t), intent(in) :: tally
     real(wp) :: scale(most_coordinates)
-    scale = max(scales_of(moving, max((tally%x_max - tally%x_min)/2, smallest_motion(moving))), tiny(1.0_wp))
+    scale = max(moving%scales(max((tally%x_max - tally%x_min)/2, moving%smallest_motion)), tiny(1.0_wp))
   end function scale_of
 
   !> Newton's method on P^period(z) - z, derivatives by variations, or by central differences where those are not known, steps no
   !> longer than a fifth of the motion's size; ends at rounding.
   pure subroutine newton(moving, period, scale, point, converged)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     integer, intent(in) :: period
     real(wp), intent(in) :: scale(:)
     real(wp), intent(inout) :: point(:)
@@ -141,7 +137,7 @@ contains
     do i = 1, most_newton
       call map_point(moving, point, period, image, tally, converged)
       if (.not. converged) return
-      miss = (point_near(image, point, turn_of(moving)) - point)/scale
+      miss = (point_near(image, point, moving%turn_on_section()) - point)/scale
       if (norm2(miss) <= 64*epsilon(1.0_wp)) return
       if (i > 4 .and. norm2(miss) < 1e-11_wp .and. norm2(miss) >= best) return
       best = min(best, norm2(miss))
@@ -155,7 +151,7 @@ contains
       if (.not. converged) return
       if (norm2(step) > 0.2_wp) step = 0.2_wp*step/norm2(step)
       point = point + scale*step
-      point(1) = min(max(point(1), moving%machine%contact%lower), moving%machine%contact%upper)
+      point(1) = min(max(point(1), moving%lower), moving%upper)
       converged = norm2((point - start)/scale) < 1
       if (.not. converged) return
     end do
@@ -167,7 +163,7 @@ contains
   !> shrinks like the square of the impact speed: where a quarter of their step gives another result, it is divided on until the
   !> results agree best.
   pure subroutine derivative(moving, point, period, scale, jacobian, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:), scale(:)
     integer, intent(in) :: period
     real(wp), intent(out) :: jacobian(:, :)
@@ -196,7 +192,7 @@ contains
 
   !> Scaled derivative of P^period by central differences over `share` of the usual step; one-sided at a barrier.
   pure subroutine differentiate(moving, point, period, scale, jacobian, ok, share)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:), scale(:)
     integer, intent(in) :: period
     real(wp), intent(out) :: jacobian(:, :)
@@ -213,13 +209,13 @@ contains
       behind = point
       ahead(k) = ahead(k) + h*scale(k)
       behind(k) = behind(k) - h*scale(k)
-      ahead(1) = min(ahead(1), moving%machine%contact%upper)
-      behind(1) = max(behind(1), moving%machine%contact%lower)
+      ahead(1) = min(ahead(1), moving%upper)
+      behind(1) = max(behind(1), moving%lower)
       call map_point(moving, ahead, period, image_ahead, tally, ok)
       if (.not. ok) return
       call map_point(moving, behind, period, image_behind, tally, ok)
       if (.not. ok) return
-      image_ahead = point_near(image_ahead, image_behind, turn_of(moving))
+      image_ahead = point_near(image_ahead, image_behind, moving%turn_on_section())
       jacobian(:, k) = (image_ahead - image_behind)/scale/((ahead(k) - behind(k))/scale(k))
     end do
   end subroutine differentiate
@@ -227,7 +223,7 @@ contains
   !> Section points of the cycle, the one with the smallest first coordinate first; the period is reduced to the
   !> smallest one.
   pure subroutine order_points(moving, attractor, point, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
     real(wp), intent(in) :: point(:)
     logical, intent(out) :: ok
@@ -278,7 +274,7 @@ contains
   !> Halves the capture radius until every sampled start on rings within it, around every point of the cycle,
   !> comes back after one period of the cycle nearer by what the linear part promises, with the events of the cycle.
   pure subroutine verify_neighbourhood(moving, attractor, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
     logical, intent(out) :: found
     type(tally_t) :: reference(longest_period)
@@ -288,10 +284,10 @@ contains
     do i = 1, attractor%period
       call map_point(moving, attractor%points(:attractor%coordinates, i), attractor%period, image, reference(i), ok)
       ! A neighbour of an equilibrium never comes to rest.
-      if (is_undriven(moving) .and. reference(i)%slips == 0) reference(i)%sticks = 0
+      if (moving%undriven .and. reference(i)%slips == 0) reference(i)%sticks = 0
     end do
     call halve_radius(moving, attractor, reference, found)
-    if (found .or. attractor%coordinates /= 2 .or. has_no_clock(moving)) return
+    if (found .or. attractor%coordinates /= 2 .or. .not. moving%has_clock) return
     ! Where more than sliding friction holds the body, any kick sets it sliding for good: near are those at rest alone.
     do i = 1, attractor%period
       if (rests_at(moving, attractor%points(:2, i))) attractor%metric(2:3, i) = [0.0_wp, at_rest_only]
@@ -300,7 +296,7 @@ contains
   end subroutine verify_neighbourhood
 
   pure subroutine halve_radius(moving, attractor, reference, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
     type(tally_t), intent(in) :: reference(:)
     logical, intent(out) :: found
@@ -321,10 +317,10 @@ contains
 
   !> Whether friction, or a stop, holds the body at a section point.
   pure logical function rests_at(moving, point)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(section_state_t) :: section
-    section = section_at(moving, point)
+    section = moving%state_at(point)
     rests_at = section%state%mode /= mode_slip_plus .and. section%state%mode /= mode_slip_minus
   end function rests_at
 
@@ -349,7 +345,7 @@ contains
   end function eigenvalue_bounds
 
   pure logical function contracts(moving, attractor, reference)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     type(tally_t), intent(in) :: reference(:)
     real(wp) :: radius, promised, bounds(2), lower(attractor%coordinates, attractor%coordinates)
@@ -371,7 +367,7 @@ contains
         do k = 1, max(directions, 4*n)
           point = centre + attractor%scale(:n)*back_substituted(lower, radius*direction(k, n))
           if (n == 2 .and. attractor%metric(min(3, size(attractor%metric, 1)), i) >= at_rest_only) point(2) = centre(2)
-          if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
+          if (point(1) > moving%upper .or. point(1) < moving%lower) cycle
           call map_point(moving, point, attractor%period, image, tally, ok)
           ! Around a section point at rest every start slips first; there the next round must have the events.
           if (ok .and. at_rest) call map_point(moving, image, attractor%period, second, tally, ok)

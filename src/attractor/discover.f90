@@ -9,20 +9,14 @@ module discover
     make_points, most_coordinates, regime_at_rest, regime_non_impact
   use capture, only: attractor_reached, attractor_reached_at
   use circle, only: point_near
-  use contact_law, only: contact_t
   use cycle, only: map_point, refine_cycle
   use exact_return, only: exact_cycle, returns_t, watch_returns
-  use free_motion, only: is_linear
   use kinds, only: int64, wp
-  use machine_facts, only: rest_lasts
+  use machine_type, only: machine_t, section_state_t
   use matrices, only: solve
-  use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use section, only: advance_section_period, begin_tally, coordinates_of, has_section, scales_of, section_point, section_state, &
-    start_section, section_at, section_state_t, turn_of, without_stops
   use single_trajectory, only: span_t
-  use turn_section, only: has_no_clock, is_undriven
   implicit none
   private
 
@@ -46,7 +40,7 @@ contains
   !> whatever their period. `within_span`: a motion that has converged to nothing by the end of the extension is left out; it is
   !> not watched over the thousands of periods that distinguish chaos from a long transient.
   pure subroutine discover_attractors(moving, span, starts, max_period, catalogue, within_span)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: starts(:, :)
     integer, intent(in) :: max_period
@@ -61,9 +55,9 @@ contains
     longer = .true.
     if (present(within_span)) longer = .not. within_span
     if (.not. allocated(catalogue)) allocate (catalogue(0))
-    if (.not. has_section(moving)) return
+    if (.not. moving%has_section) return
     do i = 1, size(starts, 2)
-      section = start_section(moving, starts(:, i))
+      section = moving%start(starts(:, i))
       patience = span%duration
       do
         call settle(moving, catalogue, patience, section, segment)
@@ -73,7 +67,7 @@ contains
           if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
           exit
         end if
-        if (find_box(catalogue, section_point(moving, section), segment%regime) > 0) exit
+        if (find_box(catalogue, moving%point_of(section), segment%regime) > 0) exit
         if (2*patience > span%extension*span%duration) then
           call look_longer(moving, max_period, longer, segment, section, catalogue)
           exit
@@ -86,7 +80,7 @@ contains
   !> The end of patience: the motion without impact of a linear oscillator is known without it; any other is watched for a fixed
   !> number of periods more if it may take `longer`, and if it has come to no cycle then, it is not periodic, or not known.
   pure subroutine look_longer(moving, max_period, longer, segment, section, catalogue)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     integer, intent(in) :: max_period
     logical, intent(in) :: longer
     type(segment_t), intent(in) :: segment
@@ -95,7 +89,7 @@ contains
     type(attractor_t) :: found, cycle_found
     type(returns_t) :: returns
     logical :: known, ok, lasts, forgets
-    if (is_linear(moving) .and. segment%regime == regime_non_impact) then
+    if (moving%linear .and. segment%regime == regime_non_impact) then
       call motion_without_impact(moving, found, ok)
       if (ok) then
         if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
@@ -113,7 +107,7 @@ contains
         if (.not. holds(moving, catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
         return
       end if
-      if (.not. has_no_clock(moving)) call find_family(moving, section, segment%amplitude, min(max_period, longest_period), found)
+      if (moving%has_clock) call find_family(moving, section, segment%amplitude, min(max_period, longest_period), found)
       if (lasts .or. found%kind /= kind_chaotic .or. meets_chaos(catalogue, found)) exit
       call outlast(moving, catalogue, section, returns, known, forgets, ok)
       if (known .or. .not. ok) return
@@ -126,16 +120,15 @@ contains
   !> The one motion without impact of a linear damped oscillator, if it stays clear of the barriers: its map is linear, so that
   !> the images of three points give it.
   pure subroutine motion_without_impact(moving, found, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
-    type(motion_t) :: free
+    class(machine_t), allocatable :: free
     type(tally_t) :: tally
     real(wp) :: origin(2), image(2), columns(2, 2), point(2), unit(2), scale(2)
     integer :: k
-    free = moving
-    free%machine%contact = contact_t()
-    scale = [1.0_wp, moving%machine%drive_frequency]
+    call moving%without_stops(free, k)
+    scale = [1.0_wp, moving%drive_frequency]
     call map_point(free, [0.0_wp, 0.0_wp], 1, origin, tally, ok)
     do k = 1, 2
       unit = 0
@@ -146,14 +139,14 @@ contains
     end do
     if (ok) call solve(columns, origin, point, ok)
     if (ok) call map_point(free, point, 1, image, tally, ok)
-    if (ok) ok = tally%x_max < moving%machine%contact%upper .and. tally%x_min > moving%machine%contact%lower
+    if (ok) ok = tally%x_max < moving%upper .and. tally%x_min > moving%lower
     if (ok) call refine_cycle(moving, point, 1, found, ok)
-    if (ok) found%section = section_state(moving, found%points(:, 1))
+    if (ok) found%section = moving%watched_at(found%points(:, 1))
   end subroutine motion_without_impact
 
   !> The attractor at which a settled state is, if it is at rest or periodic.
   pure subroutine identify(moving, section, returns, max_period, found, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     type(returns_t), intent(in) :: returns
     integer, intent(in) :: max_period
@@ -163,34 +156,36 @@ contains
     if (returns%period > 0 .and. returns%chattered) call exact_cycle(moving, section, returns%period, found, ok)
     if (.not. ok) call recognise(moving, section, min(max_period, longest_period), found, ok)
     if (.not. ok .and. returns%period > 0) call exact_cycle(moving, section, returns%period, found, ok)
-    if (.not. is_undriven(moving)) return
+    if (.not. moving%undriven) return
     if (ok) then
       call take_as_one_point(moving, found)
       call find_equilibrium(found)
     else
       call recognise_equilibrium(moving, section, found, ok)
-      if (.not. ok .and. has_no_clock(moving)) call recognise_by_event(moving, section, min(max_period, longest_period), found, ok)
+      if (.not. ok .and. .not. moving%has_clock) then
+        call recognise_by_event(moving, section, min(max_period, longest_period), found, ok)
+      end if
     end if
   end subroutine identify
 
   !> The equilibrium that a state approaches: what is left of its motion shrinks with the motion, and never looks like a return.
   pure subroutine recognise_equilibrium(moving, section, found, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
     real(wp) :: point(most_coordinates)
-    point = section_point(moving, section)
-    call refine_cycle(moving, point(:coordinates_of(moving)), 1, found, ok)
+    point = moving%point_of(section)
+    call refine_cycle(moving, point(:moving%coordinates()), 1, found, ok)
     if (.not. ok) return
-    found%section = section_state(moving, found%points(:, 1))
+    found%section = moving%watched_at(found%points(:, 1))
     call find_equilibrium(found)
     ok = found%kind == kind_rest .and. find_capture([found], point, .true.) > 0
   end subroutine recognise_equilibrium
 
   !> Rest that nothing but the springs decides is one point, which attracts from all around, not a set held by friction.
   pure subroutine take_as_one_point(moving, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: found
     type(attractor_t) :: point
     logical :: ok
@@ -218,19 +213,19 @@ contains
 
   !> The limit cycle of a machine without a clock at which a settled state is, by its returns to where it turns round.
   pure subroutine recognise_by_event(moving, section, max_period, found, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     integer, intent(in) :: max_period
     type(attractor_t), intent(out) :: found
     logical, intent(out) :: ok
-    type(motion_t) :: turning
+    class(machine_t), allocatable :: turning
     type(section_state_t) :: later
     type(tally_t) :: unused
     integer :: reason
-    turning = moving
+    allocate (turning, source=moving)
     turning%by_event = .true.
     later = section
-    call advance_section_period(turning, later, unused, reason)
+    call turning%advance_to_section(later, unused, reason)
     ok = reason == 0
     if (ok) call recognise(turning, later, max_period, found, ok)
     ! What turns round by rounding alone is on no cycle.
@@ -239,7 +234,7 @@ contains
 
   !> Whether a catalogue has an attractor already, found again from a start that did not converge in time.
   pure logical function holds(moving, catalogue, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:), found
     if (found%any_position) then
       holds = find_box(catalogue, [spread(0.0_wp, 1, found%positions), found%points(:, 1)], found%features%regime) > 0
@@ -252,7 +247,7 @@ contains
 
   !> Runs for `patience` [s] unless it converges before, or is back at a state from which a completed chatter has led to it again.
   pure subroutine settle(moving, catalogue, patience, section, segment)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: patience
     type(section_state_t), intent(inout) :: section
@@ -261,11 +256,11 @@ contains
     integer(int64) :: slips
     integer :: i, reason
     logical :: whole
-    call begin_tally(moving, section, tally)
-    do i = 1, max(1, ceiling(patience/moving%machine%period))
+    call moving%begin_tally(section, tally)
+    do i = 1, max(1, ceiling(patience/moving%period))
       slips = tally%slips
-      whole = .not. section%state%time > 0 .and. rest_lasts(moving)
-      call advance_section_period(moving, section, tally, reason)
+      whole = .not. section%state%time > 0 .and. moving%rest_lasts
+      call moving%advance_to_section(section, tally, reason)
       segment%ok = reason == 0
       if (.not. segment%ok) return
       segment%known = attractor_reached(moving, catalogue, section, .not. whole .or. tally%slips > slips) > 0
@@ -281,7 +276,7 @@ contains
 
   !> The attractor at which a settled state is, if it is at rest or periodic.
   pure subroutine recognise(moving, section, max_period, found, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     integer, intent(in) :: max_period
     type(attractor_t), intent(out) :: found
@@ -289,18 +284,18 @@ contains
     type(section_state_t) :: later
     type(tally_t) :: tally
     real(wp) :: points(most_coordinates, 0:2*longest_period)
-    type(motion_t) :: free
+    class(machine_t), allocatable :: free
     integer :: i, p, reason, n, first, positions
     later = section
-    call begin_tally(moving, later, tally)
-    points(:, 0) = section_point(moving, later)
+    call moving%begin_tally(later, tally)
+    points(:, 0) = moving%point_of(later)
     do i = 1, 2*max_period
-      call advance_section_period(moving, later, tally, reason)
+      call moving%advance_to_section(later, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      points(:, i) = section_point(moving, later)
+      points(:, i) = moving%point_of(later)
     end do
-    n = coordinates_of(moving)
+    n = moving%coordinates()
     if (tally%slips == 0) then
       found%rests = .true.
       found%kind = kind_rest
@@ -308,28 +303,28 @@ contains
       call make_points(found, 1)
       found%points(:, 1) = points(:, 0)
       found%coordinates = n
-      found%turn = moving%machine%turn
+      found%turn = moving%turn
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0
       found%features%word = cycle_word(moving, section, 1)
-      found%section = section_state(moving, points(:, 0))
+      found%section = moving%watched_at(points(:, 0))
       return
     end if
     positions = 0
-    if (tally%impacts == 0) call without_stops(moving, free, positions)
+    if (tally%impacts == 0) call moving%without_stops(free, positions)
     first = positions + 1
-    associate (sizes => scales_of(moving, (tally%x_max - tally%x_min)/2))
+    associate (sizes => moving%scales((tally%x_max - tally%x_min)/2))
       do p = 1, max_period
-        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), turn_of(moving))) cycle
+        if (.not. returns(points(first:n, :2*max_period), p, sizes(first:n), moving%turn_on_section())) cycle
         if (positions == 0) then
           call refine_cycle(moving, points(:n, 2*max_period), p, found, ok)
-          if (ok) found%section = section_state(moving, found%points(:, 1))
+          if (ok) found%section = moving%watched_at(found%points(:, 1))
         else
           call refine_cycle(free, points(first:n, 2*max_period), p, found, ok)
           found%any_position = .true.
           found%positions = positions
           if (ok) ok = comes_back(moving, free, found)
-          if (ok) found%section = section_state(moving, [points(:positions, 2*max_period), found%points(:, 1)])
+          if (ok) found%section = moving%watched_at([points(:positions, 2*max_period), found%points(:, 1)])
         end if
         if (ok) return
       end do
@@ -339,18 +334,18 @@ contains
 
   !> Whether a cycle of the machine without stops ends at the position where it began: else it drifts towards a stop.
   pure logical function comes_back(moving, free, cycle)
-    type(motion_t), intent(in) :: moving, free
+    class(machine_t), intent(in) :: moving, free
     type(attractor_t), intent(in) :: cycle
     type(section_state_t) :: section
     type(tally_t) :: unused
     real(wp) :: before(most_coordinates), after(most_coordinates)
     integer :: i, reason
-    section = section_at(free, cycle%points(:cycle%coordinates, 1))
-    before = section_point(moving, section)
+    section = free%state_at(cycle%points(:cycle%coordinates, 1))
+    before = moving%point_of(section)
     do i = 1, cycle%period
-      call advance_section_period(free, section, unused, reason)
+      call free%advance_to_section(section, unused, reason)
     end do
-    after = section_point(moving, section)
+    after = moving%point_of(section)
     comes_back = all(abs(after(:cycle%positions) - before(:cycle%positions)) <= 1e-9_wp*maxval(cycle%scale(:cycle%coordinates)))
   end function comes_back
 

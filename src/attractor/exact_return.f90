@@ -9,11 +9,10 @@ module exact_return
   use circle, only: point_near
   use cycle, only: derivative, direction, directions, rings, scale_of, unattractive
   use kinds, only: int64, wp
+  use machine_type, only: machine_t, section_state_t
   use matrices, only: eigenvalues
-  use motion, only: motion_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use section, only: advance_section_period, begin_tally, coordinates_of, section_point, section_state, section_at, section_state_t
   implicit none
   private
 
@@ -52,12 +51,12 @@ contains
 
   !> Notes the state on the next section; `chatters` is a running count.
   pure subroutine watch_returns(moving, section, chatters, returns)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     integer(int64), intent(in) :: chatters
     type(returns_t), intent(inout) :: returns
     real(wp) :: now(most_coordinates + 1)
-    now = [section_point(moving, section), section%state%z]
+    now = [moving%point_of(section), section%state%z]
     returns%since = returns%since + 1
     if (section%state%mode == returns%kept_mode .and. .not. any(abs(now - returns%kept) > 0)) then
       returns%period = returns%since
@@ -76,7 +75,7 @@ contains
   !> The attractor of a state on the section that comes back after `period` drive periods. `found` is false if it is not
   !> stable, one of a family, or its return owed to rounding. A cycle with a completed chatter has the multipliers 0.
   pure subroutine exact_cycle(moving, section, period, attractor, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     integer, intent(in) :: period
     type(attractor_t), intent(out) :: attractor
@@ -88,9 +87,9 @@ contains
     integer :: n, i, start, reason
     found = .false.
     if (period > longest_exact_period) return
-    n = coordinates_of(moving)
+    n = moving%coordinates()
     attractor%coordinates = n
-    attractor%turn = moving%machine%turn
+    attractor%turn = moving%turn
     allocate (points(most_coordinates, 0:period), jacobian(n, n), chattered(period))
     call collect(moving, section, period, points, chattered, tally, found)
     if (.not. found) return
@@ -99,17 +98,17 @@ contains
     start = minloc(points(1, :attractor%period - 1), 1) - 1
     first = section
     do i = 1, start
-      call advance_section_period(moving, first, tally, reason)
+      call moving%advance_to_section(first, tally, reason)
     end do
     call make_points(attractor, attractor%period)
     attractor%metric([(i*(i + 1)/2, i=1, n)], :) = 1
     tally%needs_v_max = .true.
     call collect(moving, first, attractor%period, points(:, :attractor%period), chattered(:attractor%period), tally, found)
     attractor%points = points(:, :attractor%period - 1)
-    attractor%duration = attractor%period*moving%machine%period
+    attractor%duration = attractor%period*moving%period
     attractor%features = features_over(moving, tally, real(attractor%period, wp))
     attractor%features%word = cycle_word(moving, first, attractor%period)
-    attractor%section = section_state(moving, attractor%points(:, 1))
+    attractor%section = moving%watched_at(attractor%points(:, 1))
     if (tally%chatters == 0) then
       call derivative(moving, attractor%points(:n, 1), attractor%period, attractor%scale(:n), jacobian, found)
       if (.not. found) return
@@ -124,7 +123,7 @@ contains
   !> The largest neighbourhood that stays with the cycle, by halving the exponent of its radius: first around the points behind a
   !> chatter, from which rounding grows longest, then around all of them. `found` is false if not even the smallest one does.
   pure subroutine verify(moving, attractor, chattered, found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
     logical, intent(in) :: chattered(:)
     logical, intent(out) :: found
@@ -159,7 +158,7 @@ contains
   !> Section points of `periods` drive periods from a state on, what happened meanwhile, and whether a chatter was completed in
   !> each.
   pure subroutine collect(moving, section, periods, points, chattered, tally, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     integer, intent(in) :: periods
     real(wp), intent(out) :: points(:, 0:)
@@ -170,15 +169,15 @@ contains
     integer(int64) :: before
     integer :: i, reason
     later = section
-    call begin_tally(moving, later, tally)
-    points(:, 0) = section_point(moving, later)
+    call moving%begin_tally(later, tally)
+    points(:, 0) = moving%point_of(later)
     chattered = .false.
     do i = 1, periods
       before = tally%chatters
-      call advance_section_period(moving, later, tally, reason)
+      call moving%advance_to_section(later, tally, reason)
       ok = reason == 0
       if (.not. ok) return
-      points(:, i) = section_point(moving, later)
+      points(:, i) = moving%point_of(later)
       chattered(i) = tally%chatters > before
     end do
   end subroutine collect
@@ -203,7 +202,7 @@ contains
   !> Whether every sampled start on rings around the `chosen` points of the cycle merges with it within one round, or is nearer by a
   !> quarter after it.
   pure logical function all_follow(moving, attractor, chosen, chatters)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     logical, intent(in) :: chosen(:), chatters
     real(wp) :: point(attractor%coordinates)
@@ -215,7 +214,7 @@ contains
       do ring = 1, size(rings)
         do k = 1, directions
           point = attractor%points(:n, i) + attractor%scale(:n)*rings(ring)*attractor%capture_radius*direction(k, n)
-          if (point(1) > moving%machine%contact%upper .or. point(1) < moving%machine%contact%lower) cycle
+          if (point(1) > moving%upper .or. point(1) < moving%lower) cycle
           if (.not. follows(moving, attractor, i, point, rings(ring)*attractor%capture_radius, chatters)) return
         end do
       end do
@@ -225,7 +224,7 @@ contains
 
   !> Whether a start `point` at a distance `radius` from the `i`-th point of the cycle does.
   pure logical function follows(moving, attractor, i, point, radius, chatters)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     integer, intent(in) :: i
     real(wp), intent(in) :: point(:), radius
@@ -236,13 +235,13 @@ contains
     integer :: k, n, reason
     follows = .false.
     n = attractor%coordinates
-    section = section_at(moving, point)
-    call begin_tally(moving, section, tally)
+    section = moving%state_at(point)
+    call moving%begin_tally(section, tally)
     do k = 1, attractor%period
-      call advance_section_period(moving, section, tally, reason)
+      call moving%advance_to_section(section, tally, reason)
       if (reason /= 0) return
       associate (wanted => attractor%points(:, 1 + modulo(i + k - 1, attractor%period)))
-        reached = point_near(section_point(moving, section), wanted, attractor%turn)
+        reached = point_near(moving%point_of(section), wanted, attractor%turn)
         distance = norm2((reached(:n) - wanted(:n))/attractor%scale(:n))
       end associate
       follows = distance <= max(merged*radius, rounding) .and. (tally%chatters > 0 .or. .not. chatters)

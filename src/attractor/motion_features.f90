@@ -6,10 +6,8 @@ module motion_features
   use attractors, only: features_t, regime_at_rest, regime_of, regime_stuck, wrap_range
   use event_words, only: canonical_word
   use kinds, only: int64, wp
-  use machine_facts, only: rides_along
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_state, only: tally_t
-  use section, only: advance_section_period, begin_tally, section_state_t
   implicit none
   private
 
@@ -19,19 +17,19 @@ contains
 
   !> Features of what was counted over `periods` drive periods. Bodies that do not slip may well move.
   pure function features_over(moving, tally, periods) result(features)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(tally_t), intent(in) :: tally
     real(wp), intent(in) :: periods
     type(features_t) :: features
     features = regime_of(tally, periods)
     features%rotation = real(tally%turns, wp)/periods
-    call wrap_range(features, moving%machine%turn)
-    if (rides_along(moving) .and. features%regime == regime_at_rest) features%regime = regime_stuck
+    call wrap_range(features, moving%turn)
+    if (moving%has_driver .and. features%regime == regime_at_rest) features%regime = regime_stuck
   end function features_over
 
   !> Event word of the cycle of `periods` drive periods that a state on the section has reached, wherever on it that is.
   pure integer(int64) function cycle_word(moving, section, periods) result(word)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: section
     integer, intent(in) :: periods
     integer(int64) :: words(periods)
@@ -41,8 +39,8 @@ contains
     later = section
     words = 0
     do i = 1, periods
-      call begin_tally(moving, later, tally)
-      call advance_section_period(moving, later, tally, reason)
+      call moving%begin_tally(later, tally)
+      call moving%advance_to_section(later, tally, reason)
       if (reason /= 0) exit
       words(i) = tally%word
     end do

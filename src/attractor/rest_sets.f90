@@ -7,10 +7,8 @@ module rest_sets
   use attractors, only: attractor_t
   use circle, only: point_near
   use kinds, only: wp
-  use machine_facts, only: has_driver, is_one_body
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_state, only: tally_t
-  use section, only: advance_section_period, begin_tally, coordinates_of, section_at, section_state_t, turn_of
   implicit none
   private
 
@@ -23,7 +21,7 @@ contains
 
   !> Index of the positions of rest in a catalogue to which a section point at rest belongs, 0 if none.
   pure integer function rest_set_of(moving, catalogue, point) result(found)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: point(:)
     integer :: k
@@ -38,14 +36,14 @@ contains
   !> Whether a body stays everywhere on the line from one position of rest to another. Forces that are linear, of springs that
   !> pull back, with friction and stops have equilibria that form a convex set. Two bodies rest by moving as one, at any position.
   pure logical function are_joined(moving, one, other) result(joined)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: one(:), other(:)
-    real(wp) :: from(coordinates_of(moving)), to(coordinates_of(moving))
+    real(wp) :: from(moving%coordinates()), to(moving%coordinates())
     integer :: i
-    joined = has_driver(moving) .or. (is_one_body(moving) .and. moving%exact)
+    joined = moving%one_rest_set
     if (joined) return
     to = other(:size(to))
-    from = point_near(one(:size(from)), to, turn_of(moving))
+    from = point_near(one(:size(from)), to, moving%turn_on_section())
     joined = .not. any(abs(to - from) > 0)
     ! What section points leave open, such as how far an elastic friction is stretched, may be what holds them.
     if (.not. joined) joined = .not. (stays(moving, from) .and. stays(moving, to))
@@ -58,14 +56,14 @@ contains
 
   !> Whether nothing moves for a period from a section point on.
   pure logical function stays(moving, point)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(section_state_t) :: section
     type(tally_t) :: tally
     integer :: reason
-    section = section_at(moving, point)
-    call begin_tally(moving, section, tally)
-    call advance_section_period(moving, section, tally, reason)
+    section = moving%state_at(point)
+    call moving%begin_tally(section, tally)
+    call moving%advance_to_section(section, tally, reason)
     stays = reason == 0 .and. tally%slips == 0
   end function stays
 

@@ -4,9 +4,8 @@
 !> Positions of a motion at given instants, as a sensor sees them.
 module sampling
   use kinds, only: wp
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_state, only: position_of, tally_t
-  use section, only: advance_section, advance_section_period, driver_now, start_section, section_state_t
   implicit none
   private
 
@@ -18,7 +17,7 @@ contains
   !> start it rests there. `driver` is that of the driving body of two. `reason` stays 0 unless the motion had to
   !> be given up.
   pure subroutine sample_positions(moving, start, times, x, driver, reason)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: start(3), times(:)
     real(wp), intent(out) :: x(:), driver(:)
     integer, intent(out) :: reason
@@ -28,16 +27,16 @@ contains
     integer :: i
     reason = 0
     driver = 0
-    section = start_section(moving, start)
+    section = moving%start(start)
     section_time = -section%state%time
     do i = 1, size(times)
-      do while (times(i) - section_time >= moving%machine%period .and. reason == 0)
-        call advance_section_period(moving, section, tally, reason)
-        section_time = section_time + moving%machine%period
+      do while (times(i) - section_time >= moving%period .and. reason == 0)
+        call moving%advance_to_section(section, tally, reason)
+        section_time = section_time + moving%period
       end do
-      if (reason == 0) call advance_section(moving, section, times(i) - section_time, tally, reason)
+      if (reason == 0) call moving%advance(section, times(i) - section_time, tally, reason)
       x(i) = position_of(section%state)
-      associate (now => driver_now(moving, section))
+      associate (now => moving%driver(section))
         driver(i) = now(1)
       end associate
     end do

@@ -4,10 +4,9 @@
 !> The cycle that one motion has come to by its end.
 module settled_cycle
   use attractors, only: attractor_t, kind_cycle, kind_rest
-  use build_motion, only: limit_budgets
   use discover, only: discover_attractors, sort_attractors
   use kinds, only: wp
-  use motion, only: motion_t
+  use machine_type, only: machine_t
   use status, only: reason_settled, reason_time_over
   use single_trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -25,21 +24,21 @@ contains
   !> the motion, does not count, so that chaos is not searched for long; nor is one sought with far more events or steps than those
   !> of the motion and its extension. `patience`: span of the case, with its extension; `start`: x [m], v [m/s], crank angle [rad].
   pure subroutine describe_cycle(moving, patience, span, max_period, start, outcome, cycle)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: patience, span
     integer, intent(in) :: max_period
     real(wp), intent(in) :: start(3)
     type(outcome_t), intent(inout) :: outcome
     type(attractor_t), intent(out) :: cycle
     type(attractor_t), allocatable :: own(:)
-    type(motion_t) :: searching
+    class(machine_t), allocatable :: searching
     type(outcome_t) :: again
     integer :: most_periods, times
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
-    most_periods = min(max_period, max(1, int(min(span%duration/moving%machine%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
-    searching = moving
+    most_periods = min(max_period, max(1, int(min(span%duration/moving%period*(1 + 8*epsilon(1.0_wp)), 1e6_wp))))
+    allocate (searching, source=moving)
     times = more_times + ceiling(patience%extension)
-    call limit_budgets(searching, times*outcome%events + more_events, times*outcome%steps + more_steps)
+    call searching%limit_budgets(times*outcome%events + more_events, times*outcome%steps + more_steps)
     call discover_attractors(searching, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
     if (size(own) == 0) return
     call sort_attractors(own)

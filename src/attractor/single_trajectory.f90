@@ -7,13 +7,10 @@ module single_trajectory
   use attractors, only: attractor_t, features_t, find_box, regime_at_rest, regime_non_impact
   use capture, only: attractor_reached, stays_in_family
   use kinds, only: int64, wp
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_features, only: features_over
   use motion_state, only: log_t, position_of, tally_t
-  use section, only: advance_past_event, advance_section, advance_section_period, begin_tally, energy_now, record_end, &
-    section_point, start_section, section_state_t
   use status, only: reason_settled, reason_time_over
-  use turn_section, only: is_undriven
   implicit none
   private
 
@@ -74,7 +71,7 @@ contains
   !> Runs from `x` [m], `v` [m/s], crank at `crank_angle` [rad]; `others`: see `start_section`. With `log` every event and
   !> sample of the duration is written down.
   pure subroutine run_trajectory(moving, catalogue, span, x, v, crank_angle, outcome, log, others)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: x, v, crank_angle
@@ -92,7 +89,7 @@ contains
 
   !> The same from a state on the section.
   pure subroutine run_from_section(moving, catalogue, span, section, outcome)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     type(section_state_t), intent(in) :: section
@@ -105,7 +102,7 @@ contains
 
   !> Runs a started trajectory to its end.
   pure subroutine continue_trajectory(moving, catalogue, span, trajectory, outcome, log)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(inout) :: trajectory
@@ -130,7 +127,7 @@ contains
 
   !> To the next stop, with what is due there.
   pure subroutine go_on(moving, catalogue, span, trajectory, outcome, log)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(inout) :: trajectory
@@ -143,76 +140,76 @@ contains
 
   !> What a log holds of the state at the start of a trajectory, and when its first sample is due.
   pure subroutine begin_record(moving, trajectory, log)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(trajectory_state_t), intent(in) :: trajectory
     type(log_t), intent(inout) :: log
-    log%balance%at_start = energy_now(moving, trajectory)
+    log%balance%at_start = moving%energy(trajectory)
     log%origin = -trajectory%state%time
     if (log%sample_interval > 0) log%next_sample = ceiling(trajectory%state%time/log%sample_interval)
   end subroutine begin_record
 
   !> What a log holds of the state at the end of the duration.
   pure subroutine end_record(moving, span, trajectory, log)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(in) :: trajectory
     type(log_t), intent(inout) :: log
-    call record_end(moving, trajectory, log%sample_interval > 0 .and. trajectory%elapsed >= span%duration, log)
+    call moving%record_end(trajectory, log%sample_interval > 0 .and. trajectory%elapsed >= span%duration, log)
   end subroutine end_record
 
   !> The trajectory of a body from `start` (see `start_section`).
   pure subroutine begin_trajectory(moving, span, start, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: start(:)
     type(trajectory_state_t), intent(out) :: trajectory
-    trajectory%section_state_t = start_section(moving, start)
+    trajectory%section_state_t = moving%start(start)
     call set_off(moving, span, trajectory)
   end subroutine begin_trajectory
 
   !> Counts and the first stop of a trajectory whose state is there.
   pure subroutine set_off(moving, span, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(inout) :: trajectory
-    call begin_tally(moving, trajectory%section_state_t, trajectory%tally)
+    call moving%begin_tally(trajectory%section_state_t, trajectory%tally)
     if (.not. span%duration - span%window > 0) call open_window(moving, trajectory)
     call set_stop(moving, span, trajectory)
   end subroutine set_off
 
   !> Moves to the next stop. `slipped`: whether the body moved on the way.
   pure subroutine go_to_stop(moving, trajectory, slipped, log)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(trajectory_state_t), intent(inout) :: trajectory
     logical, intent(out) :: slipped
     type(log_t), intent(inout), optional :: log
     integer(int64) :: slips
     slips = trajectory%tally%slips
-    if (trajectory%until >= moving%machine%period) then
-      call advance_section_period(moving, trajectory, trajectory%tally, trajectory%reason, log)
+    if (trajectory%until >= moving%period) then
+      call moving%advance_to_section(trajectory, trajectory%tally, trajectory%reason, log)
     else
-      call advance_section(moving, trajectory, trajectory%until, trajectory%tally, trajectory%reason, log)
+      call moving%advance(trajectory, trajectory%until, trajectory%tally, trajectory%reason, log)
     end if
     slipped = trajectory%tally%slips > slips
   end subroutine go_to_stop
 
   !> Moves past an event, one body past a turn to a slip at `speed` [m/s] or faster, if that comes before the next stop.
   pure subroutine go_past_event(moving, speed, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: speed
     type(trajectory_state_t), intent(inout) :: trajectory
-    call advance_past_event(moving, trajectory, speed, trajectory%until, trajectory%tally, trajectory%reason)
+    call moving%advance_past_event(trajectory, speed, trajectory%until, trajectory%tally, trajectory%reason)
   end subroutine go_past_event
 
   !> Sections to come where only convergence has to be checked.
   pure integer function sections_ahead(moving, span, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(in) :: trajectory
     sections_ahead = 0
-    if (trajectory%until < moving%machine%period .or. trajectory%since > 0) return
+    if (trajectory%until < moving%period .or. trajectory%since > 0) return
     ! One is left out in case that rounding shifts the last.
-    sections_ahead = max(0, int((end_of_phase(span, trajectory%phase) - trajectory%elapsed)/moving%machine%period) - 2)
+    sections_ahead = max(0, int((end_of_phase(span, trajectory%phase) - trajectory%elapsed)/moving%period) - 2)
   end function sections_ahead
 
   !> Makes the window the nearest whole number of drive periods [s], at least one, that the duration holds, if it is to be so.
@@ -233,7 +230,7 @@ contains
   !> What is due at a stop, the state being there: has the motion converged, is a phase over, where to stop next. `slipped`:
   !> whether the body moved since the last stop.
   pure subroutine pass_stop(moving, catalogue, span, slipped, trajectory, outcome)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     logical, intent(in) :: slipped
@@ -243,8 +240,8 @@ contains
     logical :: ended
     phase_end = end_of_phase(span, trajectory%phase)
     if (trajectory%reason == 0) then
-      if (trajectory%until >= moving%machine%period) then
-        trajectory%elapsed = trajectory%elapsed + (moving%machine%period - trajectory%since)
+      if (trajectory%until >= moving%period) then
+        trajectory%elapsed = trajectory%elapsed + (moving%period - trajectory%since)
         call note_section(moving, catalogue, slipped .or. trajectory%since > 0, trajectory, outcome)
       else
         trajectory%elapsed = phase_end
@@ -274,20 +271,20 @@ contains
 
   !> Where the trajectory stops next. In the extension only at sections.
   pure subroutine set_stop(moving, span, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(inout) :: trajectory
     real(wp) :: left
     trajectory%since = trajectory%state%time
-    trajectory%until = moving%machine%period
+    trajectory%until = moving%period
     left = end_of_phase(span, trajectory%phase) - trajectory%elapsed
-    if (trajectory%phase == phase_extension .or. moving%machine%period - trajectory%since <= left) return
+    if (trajectory%phase == phase_extension .or. moving%period - trajectory%since <= left) return
     trajectory%until = trajectory%since + left
   end subroutine set_stop
 
   !> On the section: converged, and since when?
   pure subroutine note_section(moving, catalogue, slipped, trajectory, outcome)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     logical, intent(in) :: slipped
     type(trajectory_state_t), intent(inout) :: trajectory
@@ -302,7 +299,7 @@ contains
 
   !> The phase is over, or with `ended` the trajectory is. A motion that has not converged goes on if there are attractors.
   pure subroutine end_phase(moving, span, can_converge, ended, trajectory, outcome)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     logical, intent(in) :: can_converge, ended
     type(trajectory_state_t), intent(inout) :: trajectory
@@ -312,7 +309,7 @@ contains
       if (ended) call note_state(trajectory, outcome)
       if (.not. ended) call open_window(moving, trajectory)
     case (phase_window)
-      outcome%window = features_over(moving, trajectory%tally, span%window/moving%machine%period)
+      outcome%window = features_over(moving, trajectory%tally, span%window/moving%period)
       if (outcome%window%regime == regime_non_impact .and. in_balance(moving, trajectory)) outcome%window%regime = regime_at_rest
       call note_state(trajectory, outcome)
       trajectory%phase = merge(phase_over, phase_extension, ended .or. trajectory%converged > 0 .or. .not. can_converge)
@@ -325,9 +322,9 @@ contains
 
   !> Whether the body has not moved, nor will it: nothing holds it, but no force is left.
   pure logical function in_balance(moving, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(trajectory_state_t), intent(in) :: trajectory
-    in_balance = is_undriven(moving) .and. .not. abs(trajectory%state%v) > 0 .and. &
+    in_balance = moving%undriven .and. .not. abs(trajectory%state%v) > 0 .and. &
       .not. trajectory%tally%x_max > trajectory%tally%x_min
   end function in_balance
 
@@ -345,14 +342,14 @@ contains
 
   !> Starts the statistics window.
   pure subroutine open_window(moving, trajectory)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(trajectory_state_t), intent(inout) :: trajectory
     trajectory%phase = phase_window
     trajectory%impacts = trajectory%impacts + trajectory%tally%impacts
     trajectory%last_impact_speed = latest_impact_speed(trajectory)
     trajectory%grazing_margin = min(trajectory%grazing_margin, trajectory%tally%grazing_margin)
     trajectory%tally%needs_v_max = .true.
-    call begin_tally(moving, trajectory%section_state_t, trajectory%tally)
+    call moving%begin_tally(trajectory%section_state_t, trajectory%tally)
   end subroutine open_window
 
   pure real(wp) function latest_impact_speed(trajectory) result(speed)
@@ -363,7 +360,7 @@ contains
 
   !> Reason, label and features of a finished trajectory.
   pure subroutine conclude(moving, catalogue, trajectory, outcome)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(trajectory_state_t), intent(in) :: trajectory
     type(outcome_t), intent(inout) :: outcome
@@ -383,7 +380,7 @@ contains
     else
       outcome%reason = reason_time_over
       box = 0
-      if (size(catalogue) > 0) box = find_box(catalogue, section_point(moving, trajectory), outcome%window%regime)
+      if (size(catalogue) > 0) box = find_box(catalogue, moving%point_of(trajectory), outcome%window%regime)
       outcome%features = outcome%window
       if (box > 0) then
         outcome%attractor = catalogue(box)%id

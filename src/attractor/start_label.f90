@@ -5,9 +5,8 @@
 module start_label
   use attractors, only: attractor_t
   use kinds, only: wp
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use status, only: reason_left_domain
-  use section, only: section_state_t
   use single_trajectory, only: outcome_t, run_from_section, span_t
   implicit none
   private
@@ -28,7 +27,7 @@ contains
 
   !> Label of a state on the section.
   pure integer function label_from(moving, catalogue, span, section) result(label)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
     type(section_state_t), intent(in) :: section

@@ -4,16 +4,15 @@
 !> The functions of include/separatrix.h that fly segments of structures, coordinate by coordinate.
 module c_coordinates
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
-  use build_motion, only: machine_of
+  use build_motion, only: bodies_of, has_several
   use c_segments, only: check_directions, check_length, check_samples, check_tolerance
   use c_text, only: answer, to_c
   use coordinate_segments, only: coordinate_report_t, coordinate_samples_t, propagate_coordinates
   use errors, only: error_t, fail
   use multibody, only: integral_of, is_stop, multibody_t
+  use multibody_machine, only: multibody_machine_t
   use kinds, only: wp
-  use machine_facts, only: is_one_body, structure_in
   use model_type, only: check_values, model_options, model_t
-  use motion, only: motion_t
   use status, only: exit_bad_case, exit_usage
   use text, only: to_text
   use timed_actions, only: acts_on_time
@@ -65,16 +64,18 @@ contains
     code = answer(error, message, message_size)
   end function separatrix_contact
 
-  !> The structure of a model as it is.
+  !> The structure of a model as it is; that of one body has no coordinates.
   subroutine build(model, machine, error)
     type(c_ptr), intent(in) :: model
     type(multibody_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(model_t), pointer :: self
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: several
     call c_f_pointer(model, self)
-    call machine_of(self%the_case%laws, model_options(self, self%the_case%integrator%tolerance), moving, error)
-    if (.not. allocated(error)) machine = structure_in(moving)
+    allocate (machine%joints(0))
+    if (.not. has_several(self%the_case%laws)) return
+    call bodies_of(self%the_case%laws, model_options(self, self%the_case%integrator%tolerance), several, error)
+    if (.not. allocated(error)) machine = several%bodies%machine
   end subroutine build
 
   integer(c_int) function separatrix_coordinate_segments(model, chosen_count, chosen, values, direction_count, directions, &
@@ -139,12 +140,12 @@ contains
     call prepare_family(self%the_case%laws, model_options(self, tolerance), self%parameters(chosen), values, directions, &
                         derivatives, family, error)
     if (allocated(error)) return
-    if (is_one_body(family%moving)) then
+    if (.not. allocated(family%bodies)) then
       call fail(error, exit_bad_case, 'body.law: found "'//trim(self%the_case%laws(1)%name)//'", allowed for segments of '// &
                 'coordinates structure')
       return
     end if
-    machine = structure_in(family%moving)
+    machine = family%bodies%machine
     call check_machine(machine, size(start, 1) - 1, error)
     if (.not. allocated(error)) call check_length(machine%period, times, error)
     if (.not. allocated(error)) call propagate_coordinates(family, start, first, times, derivatives, samples, report)

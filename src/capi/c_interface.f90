@@ -10,8 +10,8 @@ module c_interface
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
+  use machine_type, only: machine_t
   use model_type, only: check_values, find_parameter, model_from_text, model_options, model_t, read_model, text_with
-  use motion, only: motion_t
   use parameter_list, only: put_values
   use status, only: exit_usage
   use text, only: to_text
@@ -126,7 +126,7 @@ contains
     integer(c_size_t), value :: message_size
     type(model_t), pointer :: self
     type(error_t), allocatable :: error
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(law_choice_t), allocatable :: laws(:)
     call c_f_pointer(model, self)
     frequency = 0
@@ -136,7 +136,7 @@ contains
       call put_values(laws, self%parameters(chosen + 1), values)
       call machine_of(laws, model_options(self, self%the_case%integrator%tolerance), moving, error)
     end if
-    if (.not. allocated(error)) frequency = moving%machine%drive_frequency
+    if (.not. allocated(error)) frequency = moving%drive_frequency
     code = answer(error, message, message_size)
   end function separatrix_drive_frequency
 

@@ -12,7 +12,6 @@ module c_labels
   use errors, only: error_t, fail
   use grid, only: grid_t
   use kinds, only: int64, wp
-  use machine_facts, only: has_driver
   use model_type, only: model_t
   use point_columns, only: margin_or_infinite, outcome_values, point_values
   use status, only: exit_resumable, exit_usage
@@ -146,7 +145,7 @@ contains
                    one%capture_radius, f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed, &
                    margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, &
                    one%any_position), &
-                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, has_driver(self%prepared%ensemble%moving)), &
+                   real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, self%prepared%ensemble%moving%has_driver), &
                    real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
         shown = min(point_count, point_capacity)

@@ -15,7 +15,6 @@ module c_machine
   use model_type, only: check_values, model_t
   use parameter_list, only: put_values
   use span_check, only: check_periods
-  use section, only: start_is_allowed
   use trajectories, only: describe_all, describe_regime, ensemble_t
   use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -62,7 +61,7 @@ contains
     end if
     associate (ensemble => prepared%ensemble)
       call slice_motion(prepared%grid, 0_int64, ensemble%moving, error)
-      if (.not. allocated(error)) call check_periods(span, ensemble%moving%machine%period, error)
+      if (.not. allocated(error)) call check_periods(span, ensemble%moving%period, error)
       if (allocated(error)) return
       ensemble%span = span
       ensemble%describe = describe_regime
@@ -79,7 +78,7 @@ contains
     problem = 'found a number that is not finite'
     if (.not. all(ieee_is_finite(start))) return
     problem = ''
-    if (start_is_allowed(prepared%ensemble%moving, start)) return
+    if (prepared%ensemble%moving%allows(start)) return
     problem = beyond(prepared%the_case, no_axes, start(1))
     if (len(problem) == 0) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
   end function start_problem
@@ -89,7 +88,7 @@ contains
     type(prepared_t), intent(in) :: prepared
     real(wp), intent(in) :: start(3)
     is_start = all(ieee_is_finite(start))
-    if (is_start) is_start = start_is_allowed(prepared%ensemble%moving, start)
+    if (is_start) is_start = prepared%ensemble%moving%allows(start)
   end function is_start
 
 end module c_machine

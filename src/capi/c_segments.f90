@@ -8,7 +8,6 @@ module c_segments
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
-  use machine_facts, only: is_one_body
   use model_type, only: check_values, laws_with_force, model_options, model_t
   use segments, only: propagate, report_t, samples_t
   use status, only: exit_bad_case, exit_usage
@@ -99,7 +98,7 @@ contains
     call prepare_family(laws, model_options(self, tolerance), self%parameters(chosen), values, directions, derivatives, &
                         family, error)
     if (allocated(error)) return
-    if (.not. is_one_body(family%moving)) then
+    if (allocated(family%bodies)) then
       call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
       return
     end if

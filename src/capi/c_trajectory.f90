@@ -12,10 +12,9 @@ module c_trajectory
   use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use machine_facts, only: has_drive_period, has_driver, stops_of
+  use machine_columns, only: machine_column_t
+  use machine_type, only: machine_t
   use model_type, only: model_t
-  use motion, only: motion_t
-  use motion_history, only: contact_forces, foot_positions, kinetic_energies
   use motion_state, only: closing_error, log_t, open_log
   use restoring_law, only: position_is_angle
   use settled_cycle, only: describe_cycle
@@ -102,7 +101,7 @@ contains
     problem = start_problem(prepared, start)
     samples = samples_per_period
     if (samples == 0) samples = self%the_case%trajectory%samples_per_period
-    associate (period => prepared%ensemble%moving%machine%period)
+    associate (period => prepared%ensemble%moving%period)
       if (len(problem) > 0) then
         call fail(error, exit_usage, 'start: '//problem)
       else if (samples*(span%duration/period) > most_samples) then
@@ -131,7 +130,7 @@ contains
     type(span_t) :: span
     span = prepared%ensemble%span
     associate (moving => prepared%ensemble%moving)
-      call fit_window(moving%machine%period, span)
+      call fit_window(moving%period, span)
       call run_trajectory(moving, no_catalogue, span, start(1), start(2), start(3), outcome, log)
       if (.not. another_duration) then
         call describe_cycle(moving, span_of(the_case), span, the_case%attractors%max_period, start, outcome, cycle)
@@ -148,63 +147,65 @@ contains
   !> Rows: time, x, v, mode, foot or driving body: x and v, contact force, energy, kinetic energy, lost to friction,
   !> damping and contacts, put in by the drive.
   subroutine put_samples(moving, crank_angle, log, kept, sample)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     integer, intent(in) :: kept
     real(wp), intent(inout) :: sample(:, :)
     type(contact_t) :: stops
+    type(machine_column_t), allocatable :: columns(:)
     real(wp), allocatable :: column(:)
     sample(:3, :kept) = log%sample_data(:, :kept)
     sample(4, :kept) = log%sample_mode(:kept)
-    if (has_driver(moving)) then
+    if (moving%has_driver) then
       sample(5:6, :kept) = log%sample_driver(:, :kept)
     else
-      column = foot_positions(moving, crank_angle, log)
-      sample(5, :kept) = column(:kept)
+      sample(5, :kept) = 0
+      columns = moving%sample_columns(crank_angle, log)
+      if (columns(1)%name == 'drive') sample(5, :kept) = columns(1)%values(:kept)
       sample(6, :kept) = ieee_value(1.0_wp, ieee_quiet_nan)
     end if
     sample(7, :kept) = 0
-    stops = stops_of(moving)
+    stops = moving%stops
     if (stops%soft) then
-      column = contact_forces(moving, log)
+      column = moving%contact_forces(log)
       sample(7, :kept) = column(:kept)
     end if
     sample(8, :kept) = log%sample_balance(5, :kept)
-    column = kinetic_energies(moving, log)
+    column = moving%kinetic_energies(log)
     sample(9, :kept) = column(:kept)
     sample(10:13, :kept) = log%sample_balance(:4, :kept)
   end subroutine put_samples
 
   !> Rows: kind, time, x, v before and after, driving body: x and v.
   subroutine put_events(moving, log, kept, event)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     integer, intent(in) :: kept
     real(wp), intent(inout) :: event(:, :)
     event(1, :kept) = log%event_kind(:kept)
     event(2:5, :kept) = log%event_data(:, :kept)
     event(6:7, :kept) = ieee_value(1.0_wp, ieee_quiet_nan)
-    if (has_driver(moving)) event(6:7, :kept) = log%event_driver(:, :kept)
+    if (moving%has_driver) event(6:7, :kept) = log%event_driver(:, :kept)
   end subroutine put_events
 
   !> The steady values, the machine and the energy balance.
   subroutine summarise(moving, log, outcome, summary)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     type(outcome_t), intent(in) :: outcome
     real(wp), intent(inout) :: summary(:)
     real(wp) :: barriers(2)
     type(contact_t) :: stops
-    stops = stops_of(moving)
+    stops = moving%stops
     barriers = barrier_positions(stops)
     where (abs(barriers) > unreachable) barriers = sign(ieee_value(1.0_wp, ieee_positive_inf), barriers)
     associate (f => outcome%window, balance => log%balance)
       summary(7:12) = [f%amplitude, f%x_max, f%x_min, f%v_max, f%impacts_per_period, f%mean_impact_speed]
-      summary(13:18) = [moving%machine%period, barriers, merge(1.0_wp, 0.0_wp, stops%soft), &
-                        merge(1.0_wp, 0.0_wp, has_driver(moving)), real(outcome%reason, wp)]
+      summary(13:18) = [moving%period, barriers, merge(1.0_wp, 0.0_wp, stops%soft), &
+                        merge(1.0_wp, 0.0_wp, moving%has_driver), real(outcome%reason, wp)]
       summary(19:23) = [balance%at_start, balance%friction, balance%damping, balance%contact, balance%work]
-      summary(27) = merge(1.0_wp, 0.0_wp, has_drive_period(moving))
+      summary(27) = merge(1.0_wp, 0.0_wp, moving%has_drive_period)
       if (outcome%reason == reason_time_over) summary(24:25) = [balance%at_end, closing_error(balance)]
     end associate
   end subroutine summarise

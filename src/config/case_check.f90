@@ -16,11 +16,10 @@ module case_check
   use kinds, only: wp
   use law_check, only: check_laws, is_good
   use law_table, only: effect_family, families, law_choice_t
-  use motion, only: motion_t
+  use machine_type, only: machine_t
   use motion_state, only: options_t
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
-  use section, only: start_is_allowed
   use text, only: to_text
   implicit none
   private
@@ -198,7 +197,7 @@ contains
     type(case_t), intent(in) :: the_case
     type(law_choice_t) :: laws(size(the_case%laws))
     type(axis_t), allocatable :: axes(:)
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(error_t), allocatable :: error
     character(len=:), allocatable :: at
     real(wp) :: start(3), value
@@ -226,7 +225,7 @@ contains
       end do
       call machine_of(laws, options_t(), moving, error)
       if (allocated(error)) return
-      if (start_is_allowed(moving, start)) cycle
+      if (moving%allows(start)) cycle
       if (len(at) > 0) at = ' (at'//at//')'
       call report(source, 'start.x0', 'found bodies beyond a stop of a [contact.NAME] at the start, allowed within all of '// &
                   'them'//at)

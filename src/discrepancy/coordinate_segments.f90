@@ -73,14 +73,14 @@ contains
     total = 0
     do i = 1, size(start, 2)
       associate (from => first(i) + 1, to => first(i + 1))
-        call fly(family%moving%multibody, start(:, i), times(from:to), base)
+        call fly(family%bodies, start(:, i), times(from:to), base)
         samples%motion(:, from:to) = base%motion
         report%impacts(i) = base%count
         report%reason(i) = base%reason
         report%steady(i) = base%reason == 0
         if (derivatives) then
           if (any(base%impact(3, :base%count) < family%least_speed)) report%steady(i) = .false.
-          if (allocated(family%adaptive)) call fly(family%adaptive%multibody, start(:, i), times(from:to), adaptive)
+          if (allocated(family%adaptive)) call fly(family%adaptive%bodies, start(:, i), times(from:to), adaptive)
           call differentiate(family, start(:, i), times(from:to), base, adaptive, other, samples%slope(:, :, from:to), &
                              report%steady(i))
         end if
@@ -229,7 +229,7 @@ contains
         step = sense*family%start_step(merge(3, merge(1, 2, k <= n), k > 2*n))
         moved = start
         moved(k) = start(k) + step
-        call compare(family%moving%multibody, moved, moved(k) - start(k), times, base, other, open, slope(row, :, :), steady)
+        call compare(family%bodies, moved, moved(k) - start(k), times, base, other, open, slope(row, :, :), steady)
         if (.not. any(open)) exit
         sense = -sense
       end do
@@ -254,18 +254,18 @@ contains
       associate (variant => family%further(k))
         if (.not. abs(variant%step) > 0) return
         if (variant%leaves_exact) then
-          call compare(variant%moving%multibody, start, variant%step, times, adaptive, other, open, slope, steady)
+          call compare(variant%bodies, start, variant%step, times, adaptive, other, open, slope, steady)
         else
-          call compare(variant%moving%multibody, start, variant%step, times, base, other, open, slope, steady)
+          call compare(variant%bodies, start, variant%step, times, base, other, open, slope, steady)
         end if
       end associate
     else
       associate (variant => family%back(k))
         if (.not. abs(variant%step) > 0) return
         if (variant%leaves_exact) then
-          call compare(variant%moving%multibody, start, variant%step, times, adaptive, other, open, slope, steady)
+          call compare(variant%bodies, start, variant%step, times, adaptive, other, open, slope, steady)
         else
-          call compare(variant%moving%multibody, start, variant%step, times, base, other, open, slope, steady)
+          call compare(variant%bodies, start, variant%step, times, base, other, open, slope, steady)
         end if
       end associate
     end if

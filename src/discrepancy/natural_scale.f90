@@ -4,40 +4,14 @@
 !> The natural size of a quantity for a machine: what its unit is worth in the length, time and mass that the machine itself
 !> sets. Steps of finite differences are shares of it, so that a parameter whose value is 0 has one too.
 module natural_scale
-  use multibody, only: multibody_t
   use kinds, only: wp
-  use oscillator, only: oscillator_t
+  use machine_type, only: scales_t
   implicit none
   private
 
-  public :: scales_of, scales_of_structure, natural_size
-
-  !> Length [m], time [s] and mass [kg] of a machine.
-  type, public :: scales_t
-    real(wp) :: length = 1, time = 1, mass = 1
-  end type scales_t
+  public :: natural_size
 
 contains
-
-  !> The extension that the springs and the drive of a machine can cause, the time of a radian of its section, its mass.
-  pure function scales_of(machine) result(scales)
-    type(oscillator_t), intent(in) :: machine
-    type(scales_t) :: scales
-    scales%time = 1/machine%drive_frequency
-    scales%mass = machine%mass
-    if (machine%restoring%stiffness > 0) scales%length = machine%force_scale/machine%restoring%stiffness
-    if (.not. scales%length > 0) scales%length = 1
-  end function scales_of
-
-  !> The length that stops and forces of a structure set, the time of a radian of its section, its heaviest body.
-  pure function scales_of_structure(machine) result(scales)
-    type(multibody_t), intent(in) :: machine
-    type(scales_t) :: scales
-    integer :: i
-    if (machine%frequency > 0) scales%time = 1/machine%frequency
-    if (machine%length_scale > 0) scales%length = machine%length_scale
-    scales%mass = maxval([(machine%mass(i, i), i=1, machine%n)])
-  end function scales_of_structure
 
   !> Natural size of the SI unit `unit`, as the law table writes it: factors parted by blanks, '/' before those below,
   !> '^' before an exponent, which is the exponent of Hertz where it is a letter.

@@ -87,7 +87,7 @@ contains
         end if
         call fly(family%moving, start(:, i), times(from:to), base)
         report%steady(i) = base%flight%reason == 0 .and. .not. (derivatives .and. grazes(family, base%flight))
-        if (derivatives .and. allocated(family%adaptive)) call fly(family%adaptive, start(:, i), times(from:to), adaptive)
+        if (derivatives .and. allocated(family%adaptive)) call fly(family%adaptive%moving, start(:, i), times(from:to), adaptive)
         if (derivatives) call differentiate(family, start(:, i), times(from:to), base%flight, adaptive%flight, other, &
                                             samples%x_slope(:, from:to), samples%v_slope(:, from:to), report%steady(i))
         call keep(family, base%flight, i, from, to, total, samples, report)

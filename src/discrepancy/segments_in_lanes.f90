@@ -5,8 +5,8 @@
 !> leaves to the event loop flies there with all its neighbours.
 module segments_in_lanes
   use contact_law, only: barrier_positions
-  use lane_slots, only: prepare_flow
   use kinds, only: wp
+  use lane_preparation, only: prepare_lanes
   use lane_sampling, only: can_sample, sample_in_lanes, sampled_t
   use lane_types, only: lane_flow_t
   use motion, only: motion_t, start_state
@@ -68,7 +68,9 @@ contains
     real(wp), allocatable :: instants(:)
     integer :: i, k
     if (.not. any(asked)) return
-    call prepare_flow(moving, flow)
+    flow%width = moving%options%lane_width
+    flow%gpu = moving%options%gpu
+    if (flow%width > 0) call prepare_lanes(moving, flow)
     asked = asked .and. can_sample(flow)
     which = pack([(i, i=1, size(asked))], asked)
     if (size(which) == 0) return

@@ -7,16 +7,18 @@
 !> own error s: both are least at e = sqrt(s), s being rounding for exact flights and, for adaptive ones, the part of the
 !> tolerance that neighbours do not share.
 module variants
-  use build_motion, only: limit_budgets, machine_of
+  use body_machine, only: body_machine_t
+  use build_motion, only: bodies_of, body_of, has_several
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
-  use multibody, only: multibody_t
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
-  use machine_facts, only: is_one_body, structure_in
+  use machine_type, only: machine_t, scales_t
   use motion, only: motion_t
   use motion_state, only: flight_adaptive, options_t
-  use natural_scale, only: natural_size, scales_of, scales_of_structure, scales_t
+  use multibody_machine, only: multibody_machine_t
+  use multibody_motion, only: multibody_motion_t
+  use natural_scale, only: natural_size
   use parameter_list, only: parameter_t, put_values
   use status, only: exit_bad_case
   implicit none
@@ -43,9 +45,17 @@ module variants
   character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
     'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
 
-  !> A machine that is a step away.
-  type, public :: variant_t
+  !> A machine of which segments are flown: one body, or several.
+  type, public :: flown_t
     type(motion_t) :: moving
+    type(multibody_motion_t), allocatable :: bodies
+    type(scales_t) :: sizes
+    !> No mode is flown adaptively.
+    logical :: closed_form = .false.
+  end type flown_t
+
+  !> A machine that is a step away.
+  type, extends(flown_t), public :: variant_t
     !> Signed step in units of the direction; 0 where there is no such machine.
     real(wp) :: step = 0
     !> Only what happens at the barriers differs, so a motion that reaches none is the same.
@@ -55,10 +65,9 @@ module variants
     logical :: leaves_exact = .false.
   end type variant_t
 
-  type, public :: family_t
-    type(motion_t) :: moving
+  type, extends(flown_t), public :: family_t
     !> The same machine flown adaptively, where a variant needs it.
-    type(motion_t), allocatable :: adaptive
+    type(flown_t), allocatable :: adaptive
     !> One per direction: a step further; and a step back.
     type(variant_t), allocatable :: further(:), back(:)
     !> Components of the directions along bias, gain and delay of the sensor, by column.
@@ -96,15 +105,11 @@ contains
     real(wp) :: share
     integer :: i, at
     plan = plan_t(laws, options, chosen, values, directions)
-    call build(plan, values, .false., family%moving, error)
+    call build(plan, values, .false., family%flown_t, error)
     if (allocated(error)) return
     if (.not. derivatives) return
-    if (is_one_body(family%moving)) then
-      plan%scales = scales_of(family%moving%machine)
-    else
-      plan%scales = scales_of_structure(structure_in(family%moving))
-    end if
-    share = share_of(options, all_exact(family%moving))
+    plan%scales = family%sizes
+    share = share_of(options, family%closed_form)
     family%start_step = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
     family%least_clearance = 10*family%start_step(1)
     family%least_speed = 10*sqrt(share)*plan%scales%length/plan%scales%time
@@ -118,7 +123,7 @@ contains
     end do
     do i = 1, size(directions, 2)
       if (.not. any(abs(plan%directions(:, i)) > 0)) cycle
-      call build_neighbours(plan, i, all_exact(family%moving), family%further(i), family%back(i), error)
+      call build_neighbours(plan, i, family%closed_form, family%further(i), family%back(i), error)
       if (allocated(error)) return
       if (.not. family%further(i)%leaves_exact .or. allocated(family%adaptive)) cycle
       allocate (family%adaptive)
@@ -127,18 +132,6 @@ contains
     end do
   end subroutine prepare_family
 
-  !> Whether no mode of a machine is flown adaptively.
-  pure logical function all_exact(moving)
-    type(motion_t), intent(in) :: moving
-    type(multibody_t) :: machine
-    if (is_one_body(moving)) then
-      all_exact = moving%exact .and. .not. moving%layer > 0 .and. .not. moving%machine%contact%soft
-    else
-      machine = structure_in(moving)
-      all_exact = machine%linear .and. moving%options%flight /= flight_adaptive
-    end if
-  end function all_exact
-
   !> Step relative to the size of a quantity.
   pure real(wp) function share_of(options, exact) result(share)
     type(options_t), intent(in) :: options
@@ -146,27 +139,45 @@ contains
     share = sqrt(merge(exact_error, max(exact_error, uncommon*options%tolerance), exact))
   end function share_of
 
-  pure subroutine build(plan, values, adaptive, moving, error)
+  pure subroutine build(plan, values, adaptive, flown, error)
     type(plan_t), intent(in) :: plan
     real(wp), intent(in) :: values(:)
     logical, intent(in) :: adaptive
-    type(motion_t), intent(out) :: moving
+    type(flown_t), intent(out) :: flown
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t) :: changed(size(plan%laws))
     type(options_t) :: options
-    integer(int64) :: budget
+    type(body_machine_t) :: body
+    type(multibody_machine_t) :: several
     changed = plan%laws
     call put_values(changed, plan%chosen, values)
     options = plan%options
     if (adaptive) options%flight = flight_adaptive
-    call machine_of(changed, options, moving, error)
-    if (allocated(error)) return
-    budget = most_a_period
-    if (allocated(moving%machine%drive%force)) budget = budget + most_a_sample*size(moving%machine%drive%force)
-    call limit_budgets(moving, budget, budget)
-    ! Samples within the Stribeck layer need the adaptive flight anyhow.
-    moving%transit%available = .false.
+    if (has_several(changed)) then
+      call bodies_of(changed, options, several, error)
+      if (allocated(error)) return
+      call take_facts(several, flown)
+      flown%bodies = several%bodies
+    else
+      call body_of(changed, options, body, error)
+      if (allocated(error)) return
+      call take_facts(body, flown)
+      flown%moving = body%body
+      ! Samples within the Stribeck layer need the adaptive flight anyhow.
+      flown%moving%transit%available = .false.
+    end if
   end subroutine build
+
+  !> Limits the budgets of a machine and takes over its facts.
+  pure subroutine take_facts(machine, flown)
+    class(machine_t), intent(inout) :: machine
+    type(flown_t), intent(inout) :: flown
+    integer(int64) :: budget
+    budget = most_a_period + most_a_sample*machine%force_samples
+    call machine%limit_budgets(budget, budget)
+    flown%sizes = machine%sizes
+    flown%closed_form = machine%closed_form
+  end subroutine take_facts
 
   !> The neighbours along direction `which`. If the first cannot be built, the other replaces it.
   pure subroutine build_neighbours(plan, which, exact, further, back, error)
@@ -193,7 +204,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call take_step(plan, which, sense, share_of(plan%options, exact), .false., variant, error)
     if (allocated(error)) return
-    if (exact .and. .not. all_exact(variant%moving)) then
+    if (exact .and. .not. variant%closed_form) then
       variant%leaves_exact = .true.
       call take_step(plan, which, sense, share_of(plan%options, .false.), .true., variant, error)
     end if
@@ -230,7 +241,7 @@ contains
     call check_bounds(plan%chosen, moved, error)
     if (allocated(error)) variant%step = 0
     if (allocated(error)) return
-    call build(plan, moved, adaptive, variant%moving, error)
+    call build(plan, moved, adaptive, variant%flown_t, error)
     if (allocated(error)) variant%step = 0
   contains
     !> Size of a step of one parameter.

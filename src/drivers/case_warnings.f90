@@ -13,14 +13,11 @@ module case_warnings
   use errors, only: error_t
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
+  use machine_type, only: machine_t
   use multibody, only: joint_contact, multibody_t
   use journal, only: journal_t
   use kinds, only: int64, wp
-  use machine_facts, only: contact_sizes, stops_of
-  use motion, only: motion_t
-  use section, only: section_obstacle
   use text, only: to_text
-  use touching_row, only: contacts_in_row
   implicit none
   private
 
@@ -37,17 +34,16 @@ contains
     type(case_t), intent(in) :: the_case
     type(journal_t), intent(inout) :: journal
     type(grid_t) :: grid
-    type(motion_t) :: moving
-    type(contact_t) :: stops
+    class(machine_t), allocatable :: moving
     type(error_t), allocatable :: error
     character(len=:), allocatable :: obstacle
     if (len(the_case%assumed) > 0) call journal%line('assumed', 'assumed: '//the_case%assumed)
     grid = grid_of(the_case, the_case%axes(:0))
     call slice_motion(grid, 0_int64, moving, error)
     if (allocated(error)) return
-    if (moving%machine%drive%interval > 0) call warn_about_force(command, the_case, moving, journal)
+    if (moving%sample_interval > 0) call warn_about_force(command, the_case, moving, journal)
     call warn_about_impulse(the_case, journal)
-    obstacle = section_obstacle(moving)
+    obstacle = moving%section_obstacle()
     if ((command == 'basin' .or. command == 'sweep') .and. len(obstacle) > 0) then
       call journal%line('warning', 'warning: no attractors are looked for: '//obstacle//'. Points get the regime at the end of '// &
         'their run')
@@ -55,8 +51,7 @@ contains
     if (any(index(the_case%laws%name, 'structure:') == 1)) call warn_about_modes(the_case, journal)
     call warn_about_impulses(the_case, journal)
     if (any(the_case%laws%family == 'body' .and. the_case%laws%name == 'structure')) call note_row(grid, moving, journal)
-    stops = stops_of(moving)
-    if (stops%soft .and. .not. moving%pressed%available) call warn_about_steps(the_case, moving, journal)
+    if (moving%presses_by_steps) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
 
   !> Warns if an impulse comes after the end.
@@ -91,10 +86,10 @@ contains
   !> Reports that bodies which touch in a row at the start are struck at once, where the order of impacts would matter.
   subroutine note_row(grid, moving, journal)
     type(grid_t), intent(in) :: grid
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
     character(len=:), allocatable :: names
-    names = contacts_in_row(moving, grid%start)
+    names = moving%contacts_in_row(grid%start)
     if (len(names) == 0) return
     call journal%line('note', 'note: bodies touch in a row ('//names//'): impacts of contacts that touch come all at once. '// &
       "If they are to come one after the other, as in Newton's cradle, set in_sequence = 1 in [body]")
@@ -136,16 +131,16 @@ contains
   subroutine warn_about_force(command, the_case, moving, journal)
     character(len=*), intent(in) :: command
     type(case_t), intent(in) :: the_case
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
     integer :: last
-    associate (force => moving%machine%drive%force, period => moving%machine%period)
+    associate (force => moving%measured_force(), period => moving%period)
       last = size(force)
       if (ends_with_its_first(force)) return
       if (command /= 'basin' .and. command /= 'sweep' .and. the_case%run%duration <= period) return
       call journal%line('warning', 'warning: drive.force begins with '//to_text(force(1), 6)//' N and ends with '// &
         to_text(force(last), 6)//' N: repeated every '//to_text(period, 6)//' s, from its first sample to its last, it jumps. '// &
-        'If its '//to_text(last)//' samples are one period, of '//to_text(last*moving%machine%drive%interval, 6)// &
+        'If its '//to_text(last)//' samples are one period, of '//to_text(last*moving%sample_interval, 6)// &
         ' s, set drive.periodic = 1')
     end associate
   end subroutine warn_about_force
@@ -153,13 +148,13 @@ contains
   !> Warns if a body that leans on a soft barrier would use up the steps of a trajectory.
   subroutine warn_about_steps(the_case, moving, journal)
     type(case_t), intent(in) :: the_case
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(journal_t), intent(inout) :: journal
     type(contact_t) :: stops
     real(wp) :: force, mass, rate, lasts
     logical :: closed_form
-    call contact_sizes(moving, mass, force, closed_form)
-    stops = stops_of(moving)
+    call moving%contact_sizes(mass, force, closed_form)
+    stops = moving%stops
     rate = steps_per_second(stops, mass, force)
     ! In closed form, one a radian of the fastest motion.
     if (closed_form) rate = max(sqrt(stops%stiffness/mass), stops%damping/mass)

@@ -12,7 +12,7 @@ module catalogue_search
   use grid, only: grid_t, slice_neighbours
   use journal, only: journal_t
   use kinds, only: int64, wp
-  use motion, only: motion_t
+  use machine_type, only: machine_t
   use parallel, only: make_scheduler
   use scheduler, only: scheduler_options_t, scheduler_t
   use status, only: exit_bad_case, exit_io, exit_resumable
@@ -37,7 +37,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     type(error_t), allocatable, intent(out) :: error
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     if (any(grid%start_axis > 0) .and. grid%slices > most_slices) call fail(error, exit_bad_case, &
       "key 'axis.count': found "//to_text(grid%slices)//' slices of starts over the parameters of the machine, allowed at most '// &
       to_text(most_slices)//'; divide the map')
@@ -134,7 +134,7 @@ contains
     integer, intent(in) :: max_period
     type(catalogue_t), intent(inout) :: catalogue
     type(error_t), allocatable, intent(out) :: error
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     integer :: i
     call open_slice(grid, span, slice, moving, error)
     if (allocated(error)) return

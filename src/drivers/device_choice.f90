@@ -12,7 +12,7 @@ module device_choice
   use kinds, only: int64, wp
   use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, gpu_number, use_gpu
   use lane_types, only: lane_flow_t
-  use motion, only: motion_t
+  use machine_type, only: machine_t
   use motion_state, only: options_t
   use refined_tile, only: layers_of
   use refinement, only: automatic_block
@@ -165,7 +165,7 @@ contains
   logical function has_lanes(the_case, on_gpu)
     type(case_t), intent(in) :: the_case
     logical, intent(in) :: on_gpu
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(lane_flow_t) :: flow
     type(error_t), allocatable :: error
     has_lanes = .false.

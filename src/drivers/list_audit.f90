@@ -101,7 +101,7 @@ contains
     end do
     grid = grid_of(own, axes(:merge(1, 0, ratio > 0)))
     call open_list_ensemble(grid, the_case, ensemble, error)
-    if (.not. allocated(error)) call check_periods(ensemble%span, ensemble%moving%machine%period, error)
+    if (.not. allocated(error)) call check_periods(ensemble%span, ensemble%moving%period, error)
   end subroutine open_point
 
 end module list_audit

@@ -15,7 +15,6 @@ module points_driver
   use lane_slots, only: prepare_flow
   use grid, only: grid_t, machine_with, make_grid, point_start, sample_axis, slice_motion
   use kinds, only: int64, int8, wp
-  use machine_facts, only: stops_of
   use map_file, only: map_file_t
   use map_reader, only: open_final, reader_t
   use map_schema, only: schema_t, type_float64, type_int32
@@ -74,8 +73,8 @@ contains
     work%grid = grid_of(session%the_case, session%the_case%axes(:0))
     call open_list_ensemble(work%grid, session%the_case, work%ensemble, error)
     work%block = block_size(work%ensemble)
-    if (.not. allocated(error)) work%ratio = work%ensemble%moving%machine%drive%ratio
-    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, stops_of(work%ensemble%moving), &
+    if (.not. allocated(error)) work%ratio = work%ensemble%moving%drive_ratio
+    if (.not. allocated(error)) call read_point_list(command%list, work%ratio, work%ensemble%moving%stops, &
                                                      session%the_case%laws, work%list, error)
     if (.not. allocated(error)) work%starts = starts_of(work%grid, work%list)
     if (.not. allocated(error)) call check_periods(work%ensemble%span, shortest_period(work), error)
@@ -162,7 +161,7 @@ contains
   !> The drive period of the fastest point.
   pure real(wp) function shortest_period(work)
     type(list_work_t), intent(in) :: work
-    shortest_period = work%ensemble%moving%machine%period
+    shortest_period = work%ensemble%moving%period
     if (work%ratio > 0) shortest_period = shortest_period*work%ratio/maxval(work%list%ratio)
   end function shortest_period
 

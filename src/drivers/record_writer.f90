@@ -5,14 +5,11 @@
 module record_writer
   use case_type, only: case_t, record_t
   use constants, only: two_pi
-  use drive_law, only: measured_force
   use effect_law, only: observed
   use elementary, only: logarithm, sine_cosine
   use errors, only: error_t, fail
   use kinds, only: int64, real64, wp
-  use machine_facts, only: has_driver
-  use motion, only: motion_t
-  use oscillator, only: oscillator_t
+  use machine_type, only: machine_t
   use random, only: uniform
   use sampling, only: sample_positions
   use status, only: exit_bad_case, exit_given_up, is_given_up, reason_name
@@ -29,7 +26,7 @@ contains
   subroutine write_record(path, the_case, moving, start, error)
     character(len=*), intent(in) :: path
     type(case_t), intent(in) :: the_case
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     type(error_t), allocatable, intent(out) :: error
     type(table_t) :: table
@@ -40,7 +37,7 @@ contains
     count = floor(the_case%run%duration*the_case%record%rate) + 1
     times = [(i/the_case%record%rate, i=0, count - 1)]
     allocate (x(count), driver(count))
-    associate (sensor => moving%machine%sensor)
+    associate (sensor => moving%sensor)
       call sample_positions(moving, start, max(0.0_wp, times - (the_case%record%delay + sensor%delay)), x, driver, reason)
       x = observed(sensor, x)
     end associate
@@ -52,8 +49,8 @@ contains
     call measure(the_case%record, 0_int64, x)
     call measure(the_case%record, int(count, int64), driver)
     allocate (second(0))
-    if (has_driver(moving)) second = driver
-    if (moving%machine%drive%interval > 0) second = force_at(moving%machine, start(3), times)
+    if (moving%has_driver) second = driver
+    if (moving%sample_interval > 0) second = moving%force_at(start(3), times)
     call table%create(path)
     associate (heading => heading_of(the_case, moving, start))
       do i = 1, size(heading)
@@ -71,22 +68,10 @@ contains
     call table%close(error)
   end subroutine write_record
 
-  !> The measured force [N] that drives a machine, at `times` [s since the start at `crank_angle`].
-  pure function force_at(machine, crank_angle, times) result(force)
-    type(oscillator_t), intent(in) :: machine
-    real(wp), intent(in) :: crank_angle, times(:)
-    real(wp) :: force(size(times)), rate, start
-    integer :: i
-    start = modulo(crank_angle, two_pi)/machine%drive_frequency
-    do i = 1, size(times)
-      call measured_force(machine%drive, modulo(start + times(i), machine%period), force(i), rate)
-    end do
-  end function force_at
-
   !> What the sensor and the start were, and the names of the columns.
   function heading_of(the_case, moving, start) result(lines)
     type(case_t), intent(in) :: the_case
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     character(len=80), allocatable :: lines(:)
     lines = [character(len=80) :: '# units: s, m', &
@@ -97,13 +82,13 @@ contains
       '# x0_m: '//to_text(start(1)), &
       '# v0_m_s: '//to_text(start(2)), &
       '# phase: '//to_text(start(3))]
-    if (moving%machine%drive%ratio > 0) then
-      lines = [character(len=80) :: lines, '# drive_ratio: '//to_text(moving%machine%drive%ratio)]
+    if (moving%drive_ratio > 0) then
+      lines = [character(len=80) :: lines, '# drive_ratio: '//to_text(moving%drive_ratio)]
     end if
-    if (moving%machine%drive%interval > 0) then
+    if (moving%sample_interval > 0) then
       lines = [character(len=80) :: lines, 't,x,force']
     else
-      lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', has_driver(moving))]
+      lines = [character(len=80) :: lines, merge('t,x,driver_x', 't,x         ', moving%has_driver)]
     end if
   end function heading_of
 

@@ -15,11 +15,11 @@ module second_look
   use grid, only: grid_t, point_slice, point_start, slice_neighbours
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use machine_type, only: machine_t
   use map_file, only: map_file_t
   use map_record, only: add_record, read_record, rows_of, write_row
   use map_schema, only: schema_t
   use match, only: carry_labels, number_new
-  use motion, only: motion_t
   use random, only: uniform
   use restoring_law, only: position_is_angle
   use session, only: session_t
@@ -252,7 +252,7 @@ contains
     type(catalogue_t), intent(inout) :: catalogues(:)
     logical, intent(out) :: changed
     type(error_t), allocatable, intent(out) :: error
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     real(wp), allocatable :: before(:), everything(:)
     integer(int64) :: slice(size(row))
     logical :: touched(size(catalogues)), mine(size(catalogues))

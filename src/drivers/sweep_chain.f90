@@ -9,10 +9,10 @@ module sweep_chain
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use machine_type, only: section_state_t
   use status, only: reason_time_over
   use stop_check, only: check_stop
   use settling, only: settled_t
-  use section, only: section_state_t
   use sweep, only: hold_parameter, hold_t
   use sweep_limits, only: branch_end, limit_not_known, observe_limit
   use team, only: team_t

@@ -18,13 +18,13 @@ module sweep_driver
   use grid, only: grid_t
   use journal, only: duration_text
   use kinds, only: int64, wp
+  use machine_type, only: section_state_t
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
   use point_columns, only: point_values
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
-  use section, only: section_state_t
   use sweep, only: hold_parameter, hold_t
   use sweep_chain, only: chains_t, hold_reason, new_chains, run_chains
   use sweep_report, only: describe_chains, report_given_up, report_limits

@@ -14,29 +14,24 @@ module trajectory_driver
   use errors, only: error_t, fail
   use file_layout, only: add_events
   use grid, only: grid_t, slice_motion
-  use multibody, only: multibody_t
+  use machine_columns, only: machine_column_t
+  use machine_type, only: machine_t
   use kinds, only: int64, wp
   use map_final, only: write_whole
   use map_schema, only: schema_t, type_float64, type_int8
-  use machine_facts, only: has_drive_period, has_driver, is_one_body, stops_of, structure_in
-  use motion, only: motion_t
-  use motion_columns, only: event_columns, motion_column_t, sample_columns
-  use motion_history, only: contact_forces, kinetic_energies
   use motion_state, only: energy_balance_t, closing_error, event_names, log_t, open_log
   use record_writer, only: write_record
   use session, only: describe_file, open_session, session_t
   use settled_cycle, only: describe_cycle
   use span_check, only: check_periods
   use status, only: exit_bad_case, exit_done, reason_name, reason_time_over
-  use section, only: coordinates_of
   use system, only: monotonic_seconds
   use text, only: to_text
   use text_table, only: table_t
   use written_check, only: check_written
   use trajectory_report, only: counted_over, ended_after, explained, report
   use single_trajectory, only: begin_trajectory, begin_record, conclude, trajectory_state_t, end_record, fit_window, go_on, &
-    is_recorded, &
-    outcome_t, span_t
+    is_recorded, outcome_t, span_t
   implicit none
   private
 
@@ -55,7 +50,7 @@ contains
     type(session_t) :: session
     type(grid_t) :: grid
     type(span_t) :: span
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(log_t) :: log
     type(outcome_t) :: outcome
     type(schema_t) :: schema
@@ -70,20 +65,20 @@ contains
     span%extension = 1
     span%stop_when_converged = .false.
     call slice_motion(grid, 0_int64, moving, error)
-    if (.not. allocated(error)) call fit_window(moving%machine%period, span)
-    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
-    if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%machine%period, error)
+    if (.not. allocated(error)) call fit_window(moving%period, span)
+    if (.not. allocated(error)) call check_periods(span, moving%period, error)
+    if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%period, error)
     if (.not. allocated(error) .and. len(command%record) > 0) call check_record(session%the_case, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path, command%name)
     if (command%validate .or. command%dry_run) then
       call session%journal%line('valid', command%path//' is a valid case for trajectory: about '// &
-        to_text(nint(span%duration/moving%machine%period*session%the_case%trajectory%samples_per_period))// &
+        to_text(nint(span%duration/moving%period*session%the_case%trajectory%samples_per_period))// &
         ' samples, well under a second, into '//path)
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.false.)
-    call open_log(log, moving%machine%period/session%the_case%trajectory%samples_per_period)
+    call open_log(log, moving%period/session%the_case%trajectory%samples_per_period)
     call fly(session, moving, span, grid%start, outcome, log)
     call describe_cycle(moving, span_of(session%the_case), span, session%the_case%attractors%max_period, grid%start, outcome, &
                         cycle)
@@ -91,14 +86,14 @@ contains
     call describe_motion(moving, span, outcome, cycle, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
-    call add_columns(event_columns(moving, log), 'event', 'event_', schema)
+    call add_columns(moving%event_columns(log), 'event', 'event_', schema)
     call add_energy(moving, log, schema)
     call add_balance(log%balance, outcome%reason == reason_time_over, schema)
     call session%provenance%finish(schema)
     if (session%team%is_root()) then
       call write_whole(path, schema, command%force, error)
       if (.not. allocated(error) .and. len(command%csv) > 0) then
-        call write_events(command%csv, log, event_columns(moving, log), error)
+        call write_events(command%csv, log, moving%event_columns(log), error)
       end if
       if (.not. allocated(error) .and. len(command%record) > 0) then
         call write_record(command%record, session%the_case, moving, grid%start, error)
@@ -118,7 +113,7 @@ contains
   !> The motion, with a word on how far it is where it takes its time.
   subroutine fly(session, moving, span, start, outcome, log)
     type(session_t), intent(inout) :: session
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: start(3)
     type(outcome_t), intent(out) :: outcome
@@ -128,40 +123,32 @@ contains
     real(wp) :: began, periods, searched
     began = monotonic_seconds()
     call begin_trajectory(moving, span, start, trajectory)
-    call session%journal%begin('periods', ceiling(span%duration/moving%machine%period, int64), 0_int64)
+    call session%journal%begin('periods', ceiling(span%duration/moving%period, int64), 0_int64)
     call begin_record(moving, trajectory, log)
     do while (is_recorded(trajectory))
       call go_on(moving, no_catalogue, span, trajectory, outcome, log)
-      call session%journal%progress(int(trajectory%elapsed/moving%machine%period, int64))
+      call session%journal%progress(int(trajectory%elapsed/moving%period, int64))
     end do
     call end_record(moving, span, trajectory, log)
     call conclude(moving, no_catalogue, trajectory, outcome)
     call note_rest(moving, span, log, outcome%window)
     if (.not. span%whole_periods .or. outcome%reason /= reason_time_over) return
     ! Newton's method at each period, four steps in the mean, with differences along every coordinate.
-    periods = span%duration/moving%machine%period
+    periods = span%duration/moving%period
     searched = session%the_case%run%extension*periods &
-               + 2*(2*coordinates_of(moving) + 1)*min(periods, real(session%the_case%attractors%max_period, wp))**2
+               + 2*(2*moving%coordinates() + 1)*min(periods, real(session%the_case%attractors%max_period, wp))**2
     if ((monotonic_seconds() - began)/periods*searched < worth_a_word) return
     call session%journal%line('search', 'looking for the cycle that it came to; run.average = "window" leaves that out')
   end subroutine fly
 
   !> A structure without a drive is at rest where all its velocities in the window are rounding.
   pure subroutine note_rest(moving, span, log, features)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(log_t), intent(in) :: log
     type(features_t), intent(inout) :: features
-    type(multibody_t) :: machine
-    integer :: i
-    if (is_one_body(moving) .or. features%regime /= regime_non_impact) return
-    if (has_drive_period(moving) .or. has_driver(moving)) return
-    machine = structure_in(moving)
-    if (features%amplitude > machine%negligible_speed*machine%period) return
-    do i = log%samples, 1, -1
-      if (log%sample_data(1, i) < span%duration - span%window) exit
-      if (any(abs(log%sample_coordinates(machine%n + 1:, i)) > machine%negligible_speed)) return
-    end do
+    if (features%regime /= regime_non_impact) return
+    if (.not. moving%rests_at_end(features%amplitude, span%duration - span%window, log)) return
     features%regime = regime_at_rest
     features%amplitude = 0
     features%v_max = 0
@@ -190,7 +177,7 @@ contains
 
   !> Attributes: the drive, the barriers, and the steady values over the cycle or the window.
   subroutine describe_motion(moving, span, outcome, cycle, log, schema)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(outcome_t), intent(in) :: outcome
     type(attractor_t), intent(in) :: cycle
@@ -198,11 +185,11 @@ contains
     type(schema_t), intent(inout) :: schema
     real(wp) :: barriers(2)
     type(contact_t) :: stops
-    stops = stops_of(moving)
+    stops = moving%stops
     barriers = barrier_positions(stops)
-    call schema%add_attribute('', 'drive_period', moving%machine%period)
-    call schema%add_attribute('', 'driven', merge(1, 0, has_drive_period(moving)))
-    call schema%add_attribute('', 'drive_ratio', moving%machine%drive%ratio)
+    call schema%add_attribute('', 'drive_period', moving%period)
+    call schema%add_attribute('', 'driven', merge(1, 0, moving%has_drive_period))
+    call schema%add_attribute('', 'drive_ratio', moving%drive_ratio)
     if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
     if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
     if (stops%soft) then
@@ -221,8 +208,8 @@ contains
       call schema%add_attribute('', 'impacts', nint(f%impacts_per_period*span%window/counted_over(moving, cycle)))
       call schema%add_attribute('', 'impacts_per_period', f%impacts_per_period)
       call schema%add_attribute('', 'mean_impact_speed', f%mean_impact_speed)
-      if (moving%machine%turn > 0) then
-        call schema%add_attribute('', 'turn', moving%machine%turn)
+      if (moving%turn > 0) then
+        call schema%add_attribute('', 'turn', moving%turn)
         call schema%add_attribute('', 'rotation_number', f%rotation)
       end if
       call schema%add_attribute('', 'regime', trim(regime_names(f%regime)))
@@ -231,7 +218,7 @@ contains
   end subroutine describe_motion
 
   subroutine add_history(moving, crank_angle, log, schema)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
@@ -243,11 +230,11 @@ contains
                              data=log%sample_data(2, :log%samples))
     call schema%add_variable('v', type_float64, ['time'], units='m/s', long_name='velocity', &
                              data=log%sample_data(3, :log%samples))
-    call add_columns(sample_columns(moving, crank_angle, log), 'time', '', schema)
-    stops = stops_of(moving)
+    call add_columns(moving%sample_columns(crank_angle, log), 'time', '', schema)
+    stops = moving%stops
     if (stops%soft) then
       call schema%add_variable('contact_force', type_float64, ['time'], units='N', &
-        long_name='force of the barriers on the body', data=contact_forces(moving, log))
+        long_name='force of the barriers on the body', data=moving%contact_forces(log))
     end if
     call schema%add_variable('mode', type_int8, ['time'], units='1', long_name='mode', flag_values=[1, 2, 3, 4, 5, 6], &
       flag_meanings='slip_plus slip_minus stick upper_barrier lower_barrier held', &
@@ -271,7 +258,7 @@ contains
 
   !> The columns of the machine along a dimension; `prefix` comes before their names.
   subroutine add_columns(columns, dimension, prefix, schema)
-    type(motion_column_t), intent(in) :: columns(:)
+    type(machine_column_t), intent(in) :: columns(:)
     character(len=*), intent(in) :: dimension, prefix
     type(schema_t), intent(inout) :: schema
     integer :: i, k
@@ -297,11 +284,11 @@ contains
 
   !> Where the energy went over time.
   subroutine add_energy(moving, log, schema)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(log_t), intent(in) :: log
     type(schema_t), intent(inout) :: schema
     real(wp) :: kinetic(log%samples)
-    kinetic = kinetic_energies(moving, log)
+    kinetic = moving%kinetic_energies(log)
     associate (balance => log%sample_balance(:, :log%samples))
       call add('energy', balance(5, :), 'energy of spring and bodies')
       call add('kinetic_energy', kinetic, 'kinetic energy')
@@ -326,7 +313,7 @@ contains
   subroutine write_events(path, log, columns, error)
     character(len=*), intent(in) :: path
     type(log_t), intent(in) :: log
-    type(motion_column_t), intent(in) :: columns(:)
+    type(machine_column_t), intent(in) :: columns(:)
     type(error_t), allocatable, intent(out) :: error
     type(table_t) :: table
     character(len=:), allocatable :: more

@@ -7,9 +7,8 @@ module trajectory_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, features_t, kind_rest, regime_names
   use kinds, only: wp
-  use machine_facts, only: has_drive_period, has_mode, has_stops
-  use motion, only: motion_t
-  use motion_state, only: log_t
+  use machine_type, only: machine_t
+  use motion_state, only: log_t, options_t
   use restoring_law, only: position_is_angle
   use session, only: session_t
   use status, only: is_given_up, reason_event_budget, reason_left_domain, reason_name, reason_time_over
@@ -25,7 +24,7 @@ contains
   !> Two lines: the steady motion, and how the run ended.
   subroutine report(session, moving, span, outcome, cycle, log)
     type(session_t), intent(inout) :: session
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(outcome_t), intent(in) :: outcome
     type(attractor_t), intent(in) :: cycle
@@ -45,31 +44,33 @@ contains
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
       call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, '// &
         name_of_period(moving)//' '// &
-        to_text(moving%machine%period, 6)//' s, ended as '//reason_name(outcome%reason))
+        to_text(moving%period, 6)//' s, ended as '//reason_name(outcome%reason))
     end associate
   end subroutine report
 
   !> What the time between two sections is.
   pure function name_of_period(moving) result(name)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     character(len=:), allocatable :: name
     name = 'unit of time'
-    if (has_mode(moving)) name = 'period of the slowest mode'
-    if (has_drive_period(moving)) name = 'drive period'
+    if (moving%has_mode()) name = 'period of the slowest mode'
+    if (moving%has_drive_period) name = 'drive period'
   end function name_of_period
 
   !> When a motion ended [s], to the distance of two samples: as far as it is recorded, or where it left the domain.
   pure real(wp) function ended_after(moving, reason, log) result(time)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     integer, intent(in) :: reason
     type(log_t), intent(in) :: log
+    type(options_t) :: options
     integer :: i
     time = 0
+    options = moving%options()
     if (log%samples > 0) time = log%sample_data(1, log%samples)
     if (log%events > 0) time = max(time, log%event_data(1, log%events))
     if (reason /= reason_left_domain) return
     do i = log%samples, 1, -1
-      if (abs(log%sample_data(2, i)) <= moving%options%domain) exit
+      if (abs(log%sample_data(2, i)) <= options%domain) exit
       time = log%sample_data(1, i)
     end do
   end function ended_after
@@ -77,15 +78,15 @@ contains
   !> ', 1.0 impacts per period at 0.2 m/s', of a machine that has something to hit; without a drive, or in less than a period of
   !> it, per second.
   pure function impacts_text(moving, span, features, cycle, is_angle) result(text)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(features_t), intent(in) :: features
     type(attractor_t), intent(in) :: cycle
     logical, intent(in) :: is_angle
     character(len=:), allocatable :: text
     text = ''
-    if (.not. has_stops(moving)) return
-    if (has_drive_period(moving) .and. .not. is_short(moving, span)) then
+    if (.not. moving%has_stops) return
+    if (moving%has_drive_period .and. .not. is_short(moving, span)) then
       text = ', '//to_text(features%impacts_per_period, 5)//' impacts per period'
     else
       text = ', '//to_text(features%impacts_per_period/counted_over(moving, cycle), 5)//' impacts per second'
@@ -95,33 +96,33 @@ contains
 
   !> The time [s] for which `impacts_per_period` stands: of a limit cycle, one of its returns.
   pure real(wp) function counted_over(moving, cycle) result(time)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: cycle
-    time = moving%machine%period
+    time = moving%period
     if (cycle%by_event .and. cycle%period > 0 .and. cycle%duration > 0) time = cycle%duration/cycle%period
   end function counted_over
 
   !> Whether a run holds no period of the drive.
   pure logical function is_short(moving, span)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
-    is_short = span%duration < moving%machine%period
+    is_short = span%duration < moving%period
   end function is_short
 
   !> What steady values are taken over.
   pure function taken_over(moving, span, cycle) result(text)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
     type(attractor_t), intent(in) :: cycle
     character(len=:), allocatable :: text
     if (cycle%period > 0) then
       text = 'over its cycle of period '//to_text(cycle%period)
-      if (.not. has_drive_period(moving)) text = 'over its cycle of '//to_text(cycle%period*moving%machine%period, 6)//' s'
+      if (.not. moving%has_drive_period) text = 'over its cycle of '//to_text(cycle%period*moving%period, 6)//' s'
       if (cycle%by_event) text = 'over its limit cycle of '//to_text(cycle%duration, 10)//' s'
-      if (cycle%kind == kind_rest .and. .not. has_drive_period(moving)) text = 'at rest'
+      if (cycle%kind == kind_rest .and. .not. moving%has_drive_period) text = 'at rest'
       if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
-    else if (span%whole_periods .and. has_drive_period(moving) .and. .not. is_short(moving, span)) then
-      text = 'last '//to_text(nint(span%window/moving%machine%period))//' drive periods'
+    else if (span%whole_periods .and. moving%has_drive_period .and. .not. is_short(moving, span)) then
+      text = 'last '//to_text(nint(span%window/moving%period))//' drive periods'
     else
       text = 'last '//to_text(span%window, 6)//' s'
     end if

@@ -1,15 +1,16 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> From laws to a machine ready to move, of one body, two, or several.
+!> From laws to a machine ready to move.
 module build_motion
+  use body_machine, only: body_machine_t, prepare_body
   use build_multibody, only: is_multibody, multibody_of
   use errors, only: error_t
   use multibody, only: multibody_t
-  use multibody_motion, only: prepare_multibody
-  use kinds, only: int64, wp
+  use multibody_machine, only: multibody_machine_t, set_structure
+  use kinds, only: wp
   use law_table, only: law_choice_t
-  use motion, only: motion_t, prepare_motion
+  use machine_type, only: machine_t
   use motion_state, only: options_t
   use oscillator, only: build_oscillator, oscillator_t
   use pair, only: build_pair, is_pair, pair_t
@@ -17,29 +18,58 @@ module build_motion
   implicit none
   private
 
-  public :: machine_of, period_of, limit_budgets
+  public :: body_of, bodies_of, has_several, machine_of, period_of
 
 contains
 
   !> The machine that `laws` describe.
-  pure subroutine machine_of(laws, options, moving, error)
+  subroutine machine_of(laws, options, machine, error)
     type(law_choice_t), intent(in) :: laws(:)
     type(options_t), intent(in) :: options
-    type(motion_t), intent(out) :: moving
+    class(machine_t), allocatable, intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    type(oscillator_t) :: machine
+    type(body_machine_t) :: body
+    type(multibody_machine_t) :: bodies
+    if (has_several(laws)) then
+      call bodies_of(laws, options, bodies, error)
+      if (.not. allocated(error)) allocate (machine, source=bodies)
+    else
+      call body_of(laws, options, body, error)
+      if (.not. allocated(error)) allocate (machine, source=body)
+    end if
+  end subroutine machine_of
+
+  !> Whether a machine has several bodies.
+  pure logical function has_several(laws)
+    type(law_choice_t), intent(in) :: laws(:)
+    has_several = is_multibody(laws) .or. is_pair(laws)
+  end function has_several
+
+  !> The machine of one body that `laws` describe.
+  pure subroutine body_of(laws, options, machine, error)
+    type(law_choice_t), intent(in) :: laws(:)
+    type(options_t), intent(in) :: options
+    type(body_machine_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(oscillator_t) :: oscillator
+    call build_oscillator(laws, oscillator, error)
+    if (.not. allocated(error)) call prepare_body(oscillator, options, machine, error)
+  end subroutine body_of
+
+  !> The machine of several bodies, or of two that friction or play couples, that `laws` describe.
+  pure subroutine bodies_of(laws, options, machine, error)
+    type(law_choice_t), intent(in) :: laws(:)
+    type(options_t), intent(in) :: options
+    type(multibody_machine_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
     type(multibody_t) :: structure
     if (is_multibody(laws)) then
       call multibody_of(laws, structure, error)
-    else if (is_pair(laws)) then
-      call structure_of_two(laws, structure, error)
     else
-      call build_oscillator(laws, machine, error)
-      if (.not. allocated(error)) call prepare_motion(machine, options, moving, error)
-      return
+      call structure_of_two(laws, structure, error)
     end if
-    if (.not. allocated(error)) call set_structure(structure, options, moving)
-  end subroutine machine_of
+    if (.not. allocated(error)) call set_structure(structure, options, machine)
+  end subroutine bodies_of
 
   !> The structure of two bodies that friction couples.
   pure subroutine structure_of_two(laws, machine, error)
@@ -50,28 +80,6 @@ contains
     call build_pair(laws, pair, error)
     if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
   end subroutine structure_of_two
-
-  !> A machine of several bodies, in `moving%multibody`; `moving%machine` has its section, and the mass that is watched.
-  pure subroutine set_structure(machine, options, moving)
-    type(multibody_t), intent(in) :: machine
-    type(options_t), intent(in) :: options
-    type(motion_t), intent(out) :: moving
-    moving%options = options
-    moving%machine%mass = machine%mass(machine%watched, machine%watched)
-    moving%machine%period = machine%period
-    moving%machine%drive_frequency = machine%frequency
-    allocate (moving%machine%drive%cosine(0), moving%machine%drive%sine(0), moving%multibody)
-    call prepare_multibody(machine, options, moving%multibody)
-  end subroutine set_structure
-
-  !> So many events and steps a trajectory may take at most, or fewer where it may take fewer already.
-  pure subroutine limit_budgets(moving, events, steps)
-    type(motion_t), intent(inout) :: moving
-    integer(int64), intent(in) :: events, steps
-    moving%options%event_budget = min(moving%options%event_budget, events)
-    moving%options%step_budget = min(moving%options%step_budget, steps)
-    if (allocated(moving%multibody)) moving%multibody%options = moving%options
-  end subroutine limit_budgets
 
   !> Period of the section of the machine that `laws` describe [s].
   pure subroutine period_of(laws, period, error)

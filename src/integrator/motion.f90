@@ -14,7 +14,6 @@ module motion
   use exact_flight, only: flight_barrier, flight_failed, flight_layer_left, flight_speed_reached, &
     fly_exact
   use exact_flow, only: flow_t, prepare_flow
-  use multibody_motion, only: multibody_motion_t
   use kinds, only: wp
   use layer_transit, only: cross_layer, prepare_transit, transit_t
   use motion_state, only: append_word, event_chatter_lower, &
@@ -42,7 +41,7 @@ module motion
   !> to the last bit can bring this about.
   integer, parameter :: most_idle_steps = 8
 
-  !> A machine ready to move: all that does not change along a trajectory.
+  !> A body ready to move: all that does not change along a trajectory.
   type, public :: motion_t
     type(oscillator_t) :: machine
     type(options_t) :: options
@@ -54,10 +53,6 @@ module motion
     logical :: exact = .false.
     !> Edge of the Stribeck layer [m/s], 0 without one.
     real(wp) :: layer = 0
-    !> The section is where the motion turns round, not at a given time.
-    logical :: by_event = .false.
-    !> Several bodies with joints.
-    type(multibody_motion_t), allocatable :: multibody
   end type motion_t
 
 contains

@@ -7,27 +7,26 @@ module touching_row
   use multibody_section, only: start_of_multibody
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
-  use motion, only: motion_t
+  use multibody_flows, only: multibody_motion_t
   implicit none
   private
 
-  public :: contacts_in_row
+  public :: names_in_row
 
 contains
 
   !> Names of the rigid contacts that are closed at the `start` (x [m], v [m/s], crank angle [rad] of the watched body) and whose
   !> impacts change the speed of another one, as 'ab, bc'; '' if there are none, or if impacts come one after the other.
-  pure function contacts_in_row(moving, start) result(names)
-    type(motion_t), intent(in) :: moving
+  pure function names_in_row(moving, start) result(names)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: start(3)
     character(len=:), allocatable :: names
     type(multibody_state_t) :: state
     integer :: i, j
     names = ''
-    if (.not. allocated(moving%multibody)) return
-    associate (machine => moving%multibody%machine)
+    associate (machine => moving%machine)
       if (machine%together /= together_newton) return
-      state = start_of_multibody(moving%multibody, start(1), start(2), start(3))
+      state = start_of_multibody(moving, start(1), start(2), start(3))
       do j = 1, size(machine%joints)
         if (.not. rebounds(machine, j) .or. (state%phase(j) == 0 .and. state%left(j) == 0)) cycle
         if (.not. any([(rebounds(machine, i) .and. i /= j .and. yields_with(machine, j, i), i=1, size(machine%joints))])) cycle
@@ -35,7 +34,7 @@ contains
         names = names//trim(machine%joints(j)%name)
       end do
     end associate
-  end function contacts_in_row
+  end function names_in_row
 
   !> Whether joint `j` is a rigid contact with a rebound.
   pure logical function rebounds(machine, j)

@@ -8,7 +8,7 @@
 !> which is continuous where the maximum comes to the half turn.
 module turn_section
   use multibody_motion, only: advance_to_turn, multibody_motion_t
-  use multibody_section, only: coordinates_of_multibody, fits_section, multibody_at, multibody_point, scales_of_multibody, &
+  use multibody_section, only: coordinates_of_multibody, multibody_at, multibody_point, scales_of_multibody, &
     watched_speed
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
@@ -19,47 +19,19 @@ module turn_section
   implicit none
   private
 
-  public :: has_no_clock, is_undriven, coordinates_of_turn, body_at_turn, body_turn_point, multibody_at_turn, &
-    multibody_turn_point, &
-    scales_of_turn, advance_body_to_turn, advance_multibody_to_turn
+  public :: advance_body_to_turn, advance_multibody_to_turn, body_at_turn, body_turn_point, coordinates_at_turn, &
+    multibody_at_turn, multibody_turn_point, scales_at_turn
 
   !> Longest return to the section, in periods of the slowest mode: a belt may carry a body for long.
   integer, parameter, public :: longest_return = 256
 
 contains
 
-  !> Whether nothing depends on the time: what does not move at one instant never will.
-  pure logical function is_undriven(moving)
-    type(motion_t), intent(in) :: moving
-    if (allocated(moving%multibody)) then
-      is_undriven = has_no_clock(moving)
-    else
-      associate (drive => moving%machine%drive)
-        is_undriven = .not. any([drive%ratio, drive%interval, moving%machine%effects%dahl_stiffness] > 0) .and. &
-                      .not. any(abs([drive%cosine, drive%sine]) > 0)
-      end associate
-    end if
-  end function is_undriven
-
-  !> Whether no drive gives a time: several bodies without one, or an angle under forces that turn it.
-  pure logical function has_no_clock(moving)
-    type(motion_t), intent(in) :: moving
-    if (allocated(moving%multibody)) then
-      has_no_clock = moving%multibody%section > 0 .and. fits_section(moving%multibody)
-    else
-      associate (machine => moving%machine)
-        has_no_clock = machine%turn > 0 .and. .not. machine%drive%ratio > 0 .and. .not. machine%drive%interval > 0 .and. &
-                       .not. machine%effects%dahl_stiffness > 0
-      end associate
-    end if
-  end function has_no_clock
-
-  !> Number of coordinates on the section: the speed that is zero there is none.
-  pure integer function coordinates_of_turn(moving) result(n)
-    type(motion_t), intent(in) :: moving
-    n = 1
-    if (allocated(moving%multibody)) n = coordinates_of_multibody(moving%multibody) - 1
-  end function coordinates_of_turn
+  !> Number of coordinates of a structure on the section: the speed that is zero there is none.
+  pure integer function coordinates_at_turn(moving) result(n)
+    type(multibody_motion_t), intent(in) :: moving
+    n = coordinates_of_multibody(moving) - 1
+  end function coordinates_at_turn
 
   !> A body with the coordinate `s` on the section.
   pure type(state_t) function body_at_turn(moving, s) result(state)
@@ -147,20 +119,15 @@ contains
     call advance_to_turn(moving, longest_return*moving%machine%period, state, lasted, tally, reason)
   end subroutine advance_multibody_to_turn
 
-  !> Sizes of the coordinates in a motion over `half_range` of the position.
-  pure function scales_of_turn(moving, half_range) result(scales)
-    type(motion_t), intent(in) :: moving
+  !> Sizes of the coordinates of a structure in a motion over `half_range` of the position.
+  pure function scales_at_turn(moving, half_range) result(scales)
+    type(multibody_motion_t), intent(in) :: moving
     real(wp), intent(in) :: half_range
     real(wp) :: scales(most_coordinates)
-    scales = 1
-    if (.not. allocated(moving%multibody)) then
-      scales(1) = half_range
-      return
-    end if
-    scales = scales_of_multibody(moving%multibody, half_range)
-    associate (at => watched_speed(moving%multibody))
+    scales = scales_of_multibody(moving, half_range)
+    associate (at => watched_speed(moving))
       scales(at:) = [scales(at + 1:), 1.0_wp]
     end associate
-  end function scales_of_turn
+  end function scales_at_turn
 
 end module turn_section

@@ -3,15 +3,15 @@
 
 !> The lanes of a machine, of one body or of several with joints: what can be in them, what comes out of them.
 module lane_slots
+  use machine_type, only: machine_t, section_state_t
+  use body_machine, only: body_machine_t
   use multibody_log, only: watched_state
   use kinds, only: wp
   use lane_preparation, only: prepare_lanes
   use lane_types, only: lane_batch_t, lane_flow_t, regions_t
   use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
-  use machine_facts, only: is_one_body
-  use motion, only: motion_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus, tally_t
-  use section, only: coordinates_of, section_state_t
+  use multibody_machine, only: multibody_machine_t
+  use motion_state, only: mode_slip_minus, mode_slip_plus, options_t, tally_t
   use structure_lanes, only: add_structure_region, fly_structure_lanes, occupy_structure_lane, structure_flies, &
     structure_lane_state, take_structure_counts
   use structure_preparation, only: prepare_structure_lanes
@@ -33,89 +33,104 @@ contains
 
   !> How lanes fly a machine, if its options ask for lanes.
   pure subroutine prepare_flow(moving, flow)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(lane_flow_t), intent(out) :: flow
-    flow%width = moving%options%lane_width
+    type(options_t) :: options
+    options = moving%options()
+    flow%width = options%lane_width
     if (flow%width <= 0) return
-    if (allocated(moving%multibody)) call prepare_structure_lanes(moving%multibody, flow)
-    if (is_one_body(moving)) call prepare_lanes(moving, flow)
+    select type (moving)
+    type is (multibody_machine_t)
+      call prepare_structure_lanes(moving%bodies, flow)
+    type is (body_machine_t)
+      flow%gpu = options%gpu
+      call prepare_lanes(moving%body, flow)
+    end select
   end subroutine prepare_flow
 
   !> Empty lanes for a machine.
   pure subroutine open_lanes(moving, lane_slots)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(lane_slots_t), intent(out) :: lane_slots
-    if (allocated(moving%multibody)) allocate (lane_slots%structures)
+    select type (moving)
+    type is (multibody_machine_t)
+      allocate (lane_slots%structures)
+    end select
   end subroutine open_lanes
 
   !> The lanes can converge to attractor number `attractor` near its `point`; see `add_region`, `add_structure_region`. What does
   !> not fit makes every lane stop at every section.
   pure subroutine add_capture(moving, lane_slots, attractor, point, scale, metric, reach)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(lane_slots_t), intent(inout) :: lane_slots
     integer, intent(in) :: attractor
     real(wp), intent(in) :: point(:), scale(:), metric(:), reach
-    integer :: n
-    logical :: fits
-    n = 2
-    if (allocated(moving%multibody)) n = 2*moving%multibody%machine%n
-    fits = size(point) == n .and. coordinates_of(moving) == n
-    if (.not. fits) then
-      lane_slots%regions%complete = 0
-      if (allocated(lane_slots%structures)) lane_slots%structures%complete = 0
-    else if (allocated(moving%multibody)) then
-      call add_structure_region(moving%multibody, lane_slots%structures, attractor, point, scale, metric, reach)
-    else
-      call add_region(lane_slots%regions, attractor, point, scale, metric(:3), reach)
-    end if
+    select type (moving)
+    type is (multibody_machine_t)
+      if (all([size(point), moving%coordinates()] == 2*moving%bodies%machine%n)) then
+        call add_structure_region(moving%bodies, lane_slots%structures, attractor, point, scale, metric, reach)
+        return
+      end if
+      lane_slots%structures%complete = 0
+    type is (body_machine_t)
+      if (all([size(point), moving%coordinates()] == 2)) then
+        call add_region(lane_slots%regions, attractor, point, scale, metric(:3), reach)
+        return
+      end if
+    end select
+    lane_slots%regions%complete = 0
   end subroutine add_capture
 
   !> Whether a lane can take a motion: one body that slips fast enough, a structure in a mode that lanes know.
   pure logical function flies_in_lane(moving, flow, section) result(flies)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(lane_flow_t), intent(in) :: flow
     class(section_state_t), intent(in) :: section
-    if (allocated(moving%multibody)) then
-      flies = structure_flies(flow, moving%multibody, section%multibody)
-    else
+    flies = .false.
+    select type (moving)
+    type is (multibody_machine_t)
+      flies = structure_flies(flow, moving%bodies, section%multibody)
+    type is (body_machine_t)
       flies = (section%state%mode == mode_slip_plus .or. section%state%mode == mode_slip_minus) .and. &
         abs(section%state%v) >= flow%slowest
-    end if
+    end select
   end function flies_in_lane
 
   !> Puts a motion into a lane of a batch, which will fly it to the section. `new`: without memory of flights before. Several
   !> bodies alone ask for `structures`.
   pure subroutine put_into_lane(moving, flow, lane, section, new, batch, structures)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(lane_flow_t), intent(in) :: flow
     integer, intent(in) :: lane
     class(section_state_t), intent(in) :: section
     logical, intent(in) :: new
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
-    if (allocated(moving%multibody)) then
-      call occupy_structure_lane(moving%multibody, lane, section%multibody, batch, structures)
-    else
+    select type (moving)
+    type is (multibody_machine_t)
+      call occupy_structure_lane(moving%bodies, lane, section%multibody, batch, structures)
+    type is (body_machine_t)
       call occupy_lane(flow, lane, section%state, new, batch)
-    end if
+    end select
   end subroutine put_into_lane
 
   !> The motion in a lane, where it stopped or at the start of the flight that is left to the event loop; what the lane has
   !> counted goes to the tally. Not a function: the copy of its result, just written, would delay every stop.
   pure subroutine take_from_lane(moving, lane, batch, structures, section, tally)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     class(section_state_t), intent(inout) :: section
     type(tally_t), intent(inout) :: tally
-    if (allocated(moving%multibody)) then
-      call structure_lane_state(moving%multibody, structures, lane, section%multibody)
-      section%state = watched_state(moving%multibody%machine, section%multibody)
+    select type (moving)
+    type is (multibody_machine_t)
+      call structure_lane_state(moving%bodies, structures, lane, section%multibody)
+      section%state = watched_state(moving%bodies%machine, section%multibody)
       call take_structure_counts(structures, lane, tally)
-    else
+    type is (body_machine_t)
       call lane_state(batch, lane, section%state)
-    end if
+    end select
     call take_counts(batch, lane, tally)
   end subroutine take_from_lane
 

@@ -9,8 +9,8 @@ module basin
   use lane_slots, only: prepare_flow
   use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
   use kinds, only: int64, wp
+  use machine_type, only: machine_t
   use match, only: carry_labels, number_new, remember
-  use motion, only: motion_t
   use pair, only: is_pair
   use point_columns, only: outcome_values
   use span_check, only: check_periods
@@ -43,13 +43,13 @@ contains
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     integer(int64), intent(in) :: slice
-    type(motion_t), intent(out) :: moving
+    class(machine_t), allocatable, intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
     call slice_motion(grid, slice, moving, error)
     if (allocated(error)) return
-    if (span%duration < moving%machine%period) call fail(error, exit_bad_case, "key 'run.duration': found "// &
-      to_text(span%duration)//' s, allowed at least one drive period, '//to_text(moving%machine%period, 6)//' s')
-    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
+    if (span%duration < moving%period) call fail(error, exit_bad_case, "key 'run.duration': found "// &
+      to_text(span%duration)//' s, allowed at least one drive period, '//to_text(moving%period, 6)//' s')
+    if (.not. allocated(error)) call check_periods(span, moving%period, error)
   end subroutine open_slice
 
   !> The machine of a slice, ready for whole trajectories.
@@ -63,7 +63,7 @@ contains
     call open_slice(grid, span, slice, ensemble%moving, error)
     if (allocated(error)) return
     ensemble%span = span
-    call fit_window(ensemble%moving%machine%period, ensemble%span)
+    call fit_window(ensemble%moving%period, ensemble%span)
     ensemble%describe = describe
     call prepare_flow(ensemble%moving, ensemble%flow)
   end subroutine open_ensemble

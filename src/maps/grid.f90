@@ -9,10 +9,10 @@ module grid
   use build_multibody, only: is_multibody, multibody_of
   use build_motion, only: machine_of, period_of
   use errors, only: error_t
+  use machine_type, only: machine_t
   use multibody, only: multibody_t
   use kinds, only: int64, wp
   use law_table, only: change_parameter, is_start_parameter, law_choice_t
-  use motion, only: motion_t
   use motion_state, only: options_t
   use text, only: number_in
   implicit none
@@ -205,10 +205,10 @@ contains
   end function point_slice
 
   !> The machine of a slice, ready to move.
-  pure subroutine slice_motion(grid, slice, moving, error)
+  subroutine slice_motion(grid, slice, moving, error)
     type(grid_t), intent(in) :: grid
     integer(int64), intent(in) :: slice
-    type(motion_t), intent(out) :: moving
+    class(machine_t), allocatable, intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
     call machine_of(slice_laws(grid, slice), grid%options, moving, error)
   end subroutine slice_motion
@@ -252,11 +252,11 @@ contains
   end function slice_laws
 
   !> The machine with one parameter 'family.parameter' changed.
-  pure subroutine machine_with(grid, path, value, moving, error)
+  subroutine machine_with(grid, path, value, moving, error)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: value
-    type(motion_t), intent(out) :: moving
+    class(machine_t), allocatable, intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
     logical :: known

@@ -8,12 +8,9 @@ module settling
   use attractors, only: features_t, most_coordinates, regime_impact, regime_non_impact
   use circle, only: point_near
   use kinds, only: wp
-  use machine_facts, only: rides_along
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
-  use section, only: advance_section_period, begin_tally, coordinates_of, scales_of, section_point, section_state_t, turn_of
-  use turn_section, only: has_no_clock
   implicit none
   private
 
@@ -53,15 +50,15 @@ contains
   !> returns no longer shrink and `patience` drive periods are over. Without a clock it may settle on an equilibrium, or on a cycle
   !> with at most `longest` turns.
   pure subroutine settle(moving, start, longest, patience, settled)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: start
     integer, intent(in) :: longest, patience
     type(settled_t), intent(out) :: settled
-    type(motion_t) :: turning
+    class(machine_t), allocatable :: turning
     type(settled_t) :: turned
     call settle_on_section(moving, start, longest, patience, settled)
-    if (settled%period > 0 .or. settled%reason /= 0 .or. .not. has_no_clock(moving)) return
-    turning = moving
+    if (settled%period > 0 .or. settled%reason /= 0 .or. moving%has_clock) return
+    allocate (turning, source=moving)
     turning%by_event = .true.
     call settle_on_section(turning, start, longest, patience, turned)
     if (turned%reason == 0) settled = turned
@@ -69,7 +66,7 @@ contains
 
   !> The same with the section as it is.
   pure subroutine settle_on_section(moving, start, longest, patience, settled)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: start
     integer, intent(in) :: longest, patience
     type(settled_t), intent(out) :: settled
@@ -105,7 +102,7 @@ contains
       if (settled%reason == 0) call run_periods(moving, settled%period, tally, settled)
       if (settled%reason /= 0) settled%period = 0
       if (moving%by_event) then
-        settled%features = features_over(moving, tally, settled%duration/moving%machine%period)
+        settled%features = features_over(moving, tally, settled%duration/moving%period)
       else
         settled%features = features_over(moving, tally, real(max(1, settled%period), wp))
       end if
@@ -120,37 +117,37 @@ contains
 
   !> The mark by which limits are found: the regime of bodies that may ride along, else whether there are impacts.
   pure integer function mark_of(moving, features) result(mark)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(features_t), intent(in) :: features
     mark = merge(regime_impact, regime_non_impact, features%impacts_per_period > 0)
-    if (rides_along(moving)) mark = features%regime
+    if (moving%has_driver) mark = features%regime
   end function mark_of
 
   !> Drive periods whose section points are all kept.
   pure subroutine run_round(moving, points, tally, settled)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(out) :: points(:, :)
     type(tally_t), intent(out) :: tally
     type(settled_t), intent(inout) :: settled
     integer :: i
-    call begin_tally(moving, settled%state, tally)
+    call moving%begin_tally(settled%state, tally)
     do i = 1, size(points, 2)
-      call advance_section_period(moving, settled%state, tally, settled%reason)
+      call moving%advance_to_section(settled%state, tally, settled%reason)
       if (settled%reason /= 0) return
-      points(:, i) = section_point(moving, settled%state)
+      points(:, i) = moving%point_of(settled%state)
     end do
   end subroutine run_round
 
   pure subroutine run_periods(moving, periods, tally, settled)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     integer, intent(in) :: periods
     type(tally_t), intent(out) :: tally
     type(settled_t), intent(inout) :: settled
     integer :: i
-    call begin_tally(moving, settled%state, tally)
+    call moving%begin_tally(settled%state, tally)
     settled%duration = 0
     do i = 1, periods
-      call advance_section_period(moving, settled%state, tally, settled%reason)
+      call moving%advance_to_section(settled%state, tally, settled%reason)
       if (settled%reason /= 0) return
       settled%duration = settled%duration + settled%state%lasted
     end do
@@ -159,17 +156,17 @@ contains
   !> How far the last section points, of twice the longest period, are from coming back after 1, 2, ... drive periods, in
   !> sizes of the motion. `half_range` [m] is that of the position.
   pure function misses_of(moving, points, half_range) result(misses)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: points(:, :), half_range
     real(wp) :: misses(size(points, 2)/2), sizes(most_coordinates)
     integer :: p, i, n, last
-    n = coordinates_of(moving)
-    sizes = scales_of(moving, half_range) + tiny(1.0_wp)
+    n = moving%coordinates()
+    sizes = moving%scales(half_range) + tiny(1.0_wp)
     last = size(points, 2)
     misses = 0
     do p = 1, last/2
       do i = min(last/2, last - 2*p + 1), last - p
-        associate (later => point_near(points(:n, i + p), points(:n, i), turn_of(moving)))
+        associate (later => point_near(points(:n, i + p), points(:n, i), moving%turn_on_section()))
           misses(p) = max(misses(p), norm2((later - points(:n, i))/sizes(:n)))
         end associate
       end do

@@ -9,15 +9,13 @@ module sweep
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use motion_features, only: features_over
   use motion_state, only: tally_t
   use settling, only: mark_of, settle, settled_t
   use span_check, only: check_periods
   use status, only: reason_time_over
-  use section, only: advance_section_period, advance_to_section, begin_tally, resume_section, section_state_t
   use single_trajectory, only: span_t
-  use turn_section, only: has_no_clock
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -52,23 +50,23 @@ contains
     integer, intent(in) :: samples, longest
     type(hold_t), intent(out) :: held
     type(error_t), allocatable, intent(out) :: error
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(tally_t) :: tally
     integer :: periods, in_window, i
     call machine_with(grid, path, value, moving, error)
-    if (.not. allocated(error)) call check_periods(span, moving%machine%period, error)
+    if (.not. allocated(error)) call check_periods(span, moving%period, error)
     if (allocated(error)) return
-    in_window = max(1, ceiling(span%window/moving%machine%period))
-    periods = max(ceiling(span%duration/moving%machine%period), in_window, samples)
+    in_window = max(1, ceiling(span%window/moving%period))
+    periods = max(ceiling(span%duration/moving%period), in_window, samples)
     allocate (held%samples(2, samples), source=ieee_value(1.0_wp, ieee_quiet_nan))
-    held%state = resume_section(moving, state, crank_angle)
-    call begin_tally(moving, held%state, tally)
+    held%state = moving%resume(state, crank_angle)
+    call moving%begin_tally(held%state, tally)
     do i = 1, periods
       if (i == periods - in_window + 1) then
         tally%needs_v_max = .true.
-        call begin_tally(moving, held%state, tally)
+        call moving%begin_tally(held%state, tally)
       end if
-      call advance_section_period(moving, held%state, tally, held%reason)
+      call moving%advance_to_section(held%state, tally, held%reason)
       if (held%reason /= 0) then
         held%samples = ieee_value(1.0_wp, ieee_quiet_nan)
         held%features = no_features()
@@ -76,7 +74,7 @@ contains
       end if
       if (i > periods - samples) held%samples(:, i - periods + samples) = [held%state%state%x, held%state%state%v]
     end do
-    if (has_no_clock(moving)) call sample_turns(moving, held%state, held%samples)
+    if (.not. moving%has_clock) call sample_turns(moving, held%state, held%samples)
     held%reason = reason_time_over
     held%features = features_over(moving, tally, real(in_window, wp))
     held%mark = mark_of(moving, held%features)
@@ -95,7 +93,7 @@ contains
 
   !> Where a machine without a clock turns round next, rows x [m] and v [m/s]; the state as it is, where it does not.
   pure subroutine sample_turns(moving, state, samples)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(section_state_t), intent(in) :: state
     real(wp), intent(out) :: samples(:, :)
     type(section_state_t) :: later
@@ -104,7 +102,7 @@ contains
     samples = spread([state%state%x, state%state%v], 2, size(samples, 2))
     later = state
     do i = 1, size(samples, 2)
-      call advance_to_section(moving, later, unused, reason)
+      call moving%advance_to_turn(later, unused, reason)
       if (reason /= 0) return
       samples(:, i) = [later%state%x, later%state%v]
     end do

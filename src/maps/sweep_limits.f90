@@ -9,11 +9,9 @@ module sweep_limits
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
-  use machine_facts, only: has_driver
-  use motion, only: motion_t
+  use machine_type, only: machine_t, section_state_t
   use settling, only: settle, settled_t
   use status, only: reason_time_over
-  use section, only: coordinates_of, resume_section, section_at, section_state_t
   use sweep, only: hold_parameter, hold_t
   use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -207,19 +205,19 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(settled_t), intent(in), optional :: before
     real(wp), intent(in), optional :: ahead
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(section_state_t) :: start
     real(wp) :: here(2), behind(2)
     call machine_with(grid, path, value, moving, error)
     if (allocated(error)) return
-    start = resume_section(moving, from%state, 0.0_wp)
-    if (present(ahead) .and. .not. has_driver(moving) .and. coordinates_of(moving) == 2) then
+    start = moving%resume(from%state, 0.0_wp)
+    if (present(ahead) .and. .not. moving%has_driver .and. moving%coordinates() == 2) then
       if (before%period == from%period) then
         here = [from%state%state%x, from%state%state%v]
-        behind = point_near([before%state%state%x, before%state%state%v], here, moving%machine%turn)
+        behind = point_near([before%state%state%x, before%state%state%v], here, moving%turn)
         here = here + ahead*(here - behind)
-        here(1) = min(max(here(1), moving%machine%contact%lower), moving%machine%contact%upper)
-        start = section_at(moving, here)
+        here(1) = min(max(here(1), moving%lower), moving%upper)
+        start = moving%state_at(here)
       end if
     end if
     call settle(moving, start, longest, patience, settled)

@@ -10,12 +10,12 @@ module trajectories
   use kinds, only: wp
   use lane_gpu, only: await_half, gpu_half_t, gpu_threads, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
-  use motion, only: motion_t
+  use machine_type, only: machine_t
+  use motion_state, only: options_t
   use status, only: reason_left_domain
   use structure_types, only: structure_batch_t
   use single_trajectory, only: begin_trajectory, conclude, trajectory_state_t, ends_converged, go_past_event, go_to_stop, &
-    outcome_t, pass_stop, &
-    phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
+    outcome_t, pass_stop, phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
   use, intrinsic :: iso_fortran_env, only: int64
   implicit none
@@ -28,7 +28,7 @@ module trajectories
 
   !> All that trajectories have in common.
   type, public :: ensemble_t
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(lane_flow_t) :: flow
     type(span_t) :: span
     !> With `describe_regime` the extremes, which take a search in every flight, are not asked for.
@@ -301,7 +301,7 @@ contains
 
   !> Gives the lanes the attractors to which they can converge: what moves, to a cycle.
   pure subroutine set_regions(moving, catalogue, lanes)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(lane_slots_t), intent(inout) :: lanes
     integer :: k, i
@@ -324,10 +324,12 @@ contains
     type(outcome_t), intent(in) :: outcome
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
+    type(options_t) :: options
     batch%until(lane) = trajectory%until
     batch%sections(lane) = sections_ahead(ensemble%moving, ensemble%span, trajectory)
     if (trajectory%phase == phase_extension .and. any(catalogue%any_position)) batch%sections(lane) = 0
-    batch%budget(lane) = real(ensemble%moving%options%event_budget - trajectory%tally%events, wp)
+    options = ensemble%moving%options()
+    batch%budget(lane) = real(options%event_budget - trajectory%tally%events, wp)
     batch%leaves(lane) = merge(1, 0, ends_converged(ensemble%span, trajectory))
     batch%elapsed(lane) = trajectory%elapsed
     batch%reached(lane) = trajectory%converged
@@ -344,14 +346,16 @@ contains
     type(lane_batch_t), intent(inout) :: batch
     type(structure_batch_t), allocatable, intent(inout) :: structures
     type(outcome_t), intent(inout) :: outcome
+    type(options_t) :: options
     logical :: slipped, left, taken
+    options = ensemble%moving%options()
     left = batch%status(lane) > 0.5_wp*(lane_stopped + lane_left)
     associate (trajectory => slot%trajectory)
       trajectory%elapsed = batch%elapsed(lane)
       trajectory%converged = nint(batch%reached(lane))
       outcome%settle_time = batch%settled(lane)
       call take_from_lane(ensemble%moving, lane, batch, structures, trajectory%section_state_t, trajectory%tally)
-      if (.not. (left .or. abs(trajectory%state%x) <= ensemble%moving%options%domain)) trajectory%reason = reason_left_domain
+      if (.not. (left .or. abs(trajectory%state%x) <= options%domain)) trajectory%reason = reason_left_domain
       taken = .false.
       if (left .and. trajectory%reason == 0) then
         if (ensemble%flow%resumes) call go_past_events(ensemble, trajectory, taken)

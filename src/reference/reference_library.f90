@@ -10,7 +10,7 @@ module reference_library
   use errors, only: error_t
   use kinds, only: wp
   use law_table, only: law_choice, law_choice_t, laws
-  use motion, only: motion_t
+  use machine_type, only: machine_t
   use motion_state, only: options_t
   use single_trajectory, only: outcome_t, run_trajectory, span_t
   implicit none
@@ -36,7 +36,7 @@ contains
     real(c_double), intent(in) :: packed(*), starts(3, points)
     real(c_double), intent(out) :: results(6, points)
     type(law_choice_t) :: choices(law_count)
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     type(attractor_t), allocatable :: catalogue(:)
     type(error_t), allocatable :: error
     type(options_t) :: options

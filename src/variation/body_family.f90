@@ -4,7 +4,8 @@
 !> One body over a parameter of its laws, and the stroboscopic map of it with derivatives by the start and by the parameter.
 module body_family
   use body_events, only: events_of_body
-  use build_motion, only: machine_of
+  use body_machine, only: body_machine_t
+  use build_motion, only: body_of
   use errors, only: error_t, fail
   use hybrid_machine, only: event_t
   use kinds, only: real64, wp
@@ -62,15 +63,15 @@ contains
     type(one_body_t), intent(out) :: body
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
-    type(motion_t) :: moving
+    type(body_machine_t) :: machine
     character(len=:), allocatable :: why
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
-    call machine_of(laws, family%options, moving, error)
+    call body_of(laws, family%options, machine, error)
     if (allocated(error)) return
-    why = why_not_varied(moving)
-    associate (contact => moving%machine%contact)
+    why = why_not_varied(machine%body)
+    associate (contact => machine%body%machine%contact)
       if (contact%lower > contact%upper) why = 'contact.lower: found '//to_text(real(contact%lower, real64))// &
         ' m, allowed at most upper = '//to_text(real(contact%upper, real64))//' m'
     end associate
@@ -78,7 +79,7 @@ contains
       call fail(error, exit_bad_case, why)
       return
     end if
-    body = one_body_of(moving, merge(family%sizes(1), size_of_motion(moving), family%sizes(1) > 0))
+    body = one_body_of(machine%body, merge(family%sizes(1), size_of_motion(machine%body), family%sizes(1) > 0))
     if (family%sizes(2) > 0) body%size_of(2) = family%sizes(2)
   end subroutine body_of_family
 

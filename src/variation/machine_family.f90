@@ -5,7 +5,7 @@
 module machine_family
   use body_events, only: events_of_body
   use body_family, only: body_neighbourhood, body_of_family, family_t, fly_periods, map_of_body => map_with_variation
-  use build_multibody, only: is_multibody
+  use build_motion, only: has_several
   use circle, only: point_near
   use errors, only: error_t
   use hybrid_machine, only: event_t, hybrid_t
@@ -14,19 +14,18 @@ module machine_family
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use law_table, only: law_choice_t
-  use motion, only: advance_period, motion_t, start_state
+  use motion, only: advance_period, start_state
   use motion_state, only: log_t, open_log, state_t, tally_t
   use one_body, only: one_body_t
-  use pair, only: is_pair
   use structure, only: coordinates_of, structure_t
-  use section, only: start_section, section_state_t
+  use machine_type, only: machine_t, section_state_t
   use structure_family, only: map_of_structure, state_at_start, structure_neighbourhood, structure_of_family
   use structure_walk, only: advance_section, advance_to_section, fly_structure, start_of_structure
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: has_several, machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, &
+  public :: machine_of_family, machine_neighbourhood, fly_to_section, fly_sections, map_with_variation, &
     section_sizes, nearest_copy, within_stops, watched_rows, starts_of_section, section_of_section, begin_walk, walk_on
 
   !> A motion that goes from section to section.
@@ -36,12 +35,6 @@ module machine_family
   end type walk_t
 
 contains
-
-  !> Whether a machine has several bodies.
-  pure logical function has_several(laws)
-    type(law_choice_t), intent(in) :: laws(:)
-    has_several = is_multibody(laws) .or. is_pair(laws)
-  end function has_several
 
   !> The machine with the parameter at `value`. Code 65 if it cannot be built or its variations are not known.
   subroutine machine_of_family(family, value, machine, error)
@@ -118,7 +111,7 @@ contains
   !> The state of a trajectory of the same machine on the section. `ok` is false for a point beyond a stop.
   pure subroutine section_of_section(machine, moving, point, section, ok)
     class(hybrid_t), intent(in) :: machine
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:)
     type(section_state_t), intent(out) :: section
     logical, intent(out) :: ok
@@ -126,9 +119,9 @@ contains
     select type (machine)
     type is (structure_t)
       call start_of_structure(machine, point, section%multibody, ok)
-      if (ok) section%state = watched_state(moving%multibody%machine, section%multibody)
+      if (ok) section%state = watched_state(machine%frame%moving%machine, section%multibody)
     class default
-      section = start_section(moving, [point, 0.0_wp])
+      section = moving%start([point, 0.0_wp])
     end select
   end subroutine section_of_section
 

@@ -44,9 +44,7 @@ contains
     character(len=:), allocatable :: why
     why = ''
     associate (machine => moving%machine, law => moving%machine%friction)
-      if (allocated(moving%multibody)) then
-        why = 'body.law: of several bodies only the variations of structures are known'
-      else if (machine%drive%interval > 0) then
+      if (machine%drive%interval > 0) then
         why = 'drive.law: the variations of a body under a measured force are not known'
       else if (.not. machine%drive%ratio > 0) then
         why = 'drive.law: one body without a drive has no section; in parts, as [body.NAME], it has one where it turns round'

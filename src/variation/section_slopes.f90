@@ -4,11 +4,13 @@
 !> Derivatives of the map from section to section by the point, from the variations of the motion, where those are known: of one
 !> body between sections of its drive, and of a structure from one time to a later one.
 module section_slopes
+  use body_machine, only: body_machine_t
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: map_with_variation
-  use motion, only: motion_t
+  use machine_type, only: machine_t
   use motion_state, only: tally_t
+  use multibody_machine, only: multibody_machine_t
   use one_body, only: one_body_of, why_not_varied
   use structure, only: structure_of, structure_t
   use structure_family, only: why_structure_not_varied => why_not_varied
@@ -23,7 +25,7 @@ contains
   !> Derivative of the map over `periods` at a section point (SI), point and image in units of `scale`; `ok` is false where it is
   !> not known, or there is none.
   pure subroutine slopes_of(moving, point, periods, scale, slopes, ok)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: point(:), scale(:)
     integer, intent(in) :: periods
     real(wp), intent(out) :: slopes(:, :)
@@ -45,21 +47,23 @@ contains
   !> The machine whose variations are those of a motion; nothing where they are not known. `sizes`: of a position [m] and of a speed
   !> [m/s].
   pure subroutine varied_machine(moving, sizes, machines)
-    type(motion_t), intent(in) :: moving
+    class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: sizes(2)
     type(neighbourhood_t), intent(out) :: machines
     class(hybrid_t), allocatable :: machine
     type(structure_t) :: structure
     if (moving%by_event) return
-    if (.not. allocated(moving%multibody)) then
-      if (len(why_not_varied(moving)) == 0) allocate (machine, source=one_body_of(moving, sizes(1)))
-    else if (len(why_structure_not_varied(moving%multibody)) == 0) then
-      structure = structure_of(moving%multibody, sizes)
+    select type (moving)
+    type is (body_machine_t)
+      if (len(why_not_varied(moving%body)) == 0) allocate (machine, source=one_body_of(moving%body, sizes(1)))
+    type is (multibody_machine_t)
+      if (len(why_structure_not_varied(moving%bodies)) > 0) return
+      structure = structure_of(moving%bodies, sizes)
       ! The sections are times here, of a machine without a clock too.
       structure%has_clock = .true.
       structure%frame%moving%section = 0
       allocate (machine, source=structure)
-    end if
+    end select
     if (allocated(machine)) call move_alloc(machine, machines%centre)
   end subroutine varied_machine
 

@@ -5,7 +5,7 @@
 !> parameter. Of a machine without a clock the section is an event, and the time to it changes with both.
 module structure_family
   use body_family, only: family_t, likeness, position_neighbour, share, sides_tried
-  use build_motion, only: machine_of
+  use build_motion, only: bodies_of
   use errors, only: error_t, fail
   use guarded_march, only: most_equations
   use guards, only: meets_lower, meets_upper
@@ -17,8 +17,7 @@ module structure_family
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
-  use machine_facts, only: has_driver
-  use motion, only: motion_t
+  use multibody_machine, only: multibody_machine_t
   use motion_state, only: flight_adaptive, tally_t
   use status, only: exit_bad_case
   use structure, only: count_joints, phases_in, structure_of, structure_t
@@ -68,26 +67,26 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
     character(len=:), allocatable :: why
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: machine
     real(wp) :: sizes(2)
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
-    call machine_of(laws, family%options, moving, error)
+    call bodies_of(laws, family%options, machine, error)
     if (allocated(error)) return
-    if (has_driver(moving)) call refuse_two_bodies(moving%multibody%machine, error)
+    if (machine%has_driver) call refuse_two_bodies(machine%bodies%machine, error)
     if (allocated(error)) return
-    why = why_not_varied(moving%multibody)
+    why = why_not_varied(machine%bodies)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, 'body: the variations of this machine are not known: '//why)
       return
     end if
-    associate (scales => moving%multibody%machine)
+    associate (scales => machine%bodies%machine)
       sizes(1) = merge(scales%length_scale, 1.0_wp, scales%length_scale > 0)
       sizes(2) = sizes(1)*scales%frequency
     end associate
     if (family%sizes(1) > 0) sizes = family%sizes
-    structure = structure_of(moving%multibody, sizes)
+    structure = structure_of(machine%bodies, sizes)
   end subroutine structure_of_family
 
   !> What two bodies have in their own tables and no variations; code 65.

@@ -3,10 +3,10 @@
 
 !> Machines of every kind that lanes know, by number.
 module lane_machines
+  use body_machine, only: body_machine_t
   use kinds, only: wp
   use law_table, only: law_choice_t
-  use machines, only: build, laws_from, set_parameter, uniform
-  use motion, only: motion_t
+  use machines, only: build_machine, laws_from, set_parameter, uniform
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
   implicit none
   private
@@ -29,7 +29,7 @@ contains
   !> resonance.
   function machine_number(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(body_machine_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
     character(len=*), parameter :: frictions(0:3) = [character(len=51) :: 'none', 'coulomb kinetic_coefficient=0.2', &
       'viscous damping=0.4', 'coulomb_viscous kinetic_coefficient=0.1 damping=0.3']
@@ -43,14 +43,14 @@ contains
     if (modulo(i, 5) < 2) call set_parameter(laws, 'contact.restitution', uniform(0.2_wp, 1.0_wp))
     if (modulo(i, 3) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
     if (modulo(i, 15) == 5) laws = [laws, laws_from('effect restitution_curve speed=0,0.5,1,2,4 change=0,-0.1,0.05,-0.2,0.1')]
-    moving = build(laws)
+    moving = build_machine(laws)
   end function machine_number
 
   !> Machine number i with an equation of its own in each mode: soft barriers that may pull or not, one or two, friction that
   !> depends on the direction or the position.
   function machine_of_modes(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(body_machine_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
     character(len=*), parameter :: contacts(0:3) = [character(len=60) :: 'kelvin_voigt stiffness=1e4 damping=20', &
       'kelvin_voigt stiffness=1e5 damping=100 tension=1', 'newton restitution=0.7', 'kelvin_voigt stiffness=500 damping=0']
@@ -61,13 +61,13 @@ contains
       'drive fourier ratio=1 mean=0.31 cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 3))))
     call set_parameter(laws, 'drive.ratio', uniform(0.4_wp, 2.3_wp))
     if (modulo(i, 5) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
-    moving = build(laws)
+    moving = build_machine(laws)
   end function machine_of_modes
 
   !> Machine number i without a closed form: springs, drag and friction that lanes expand in series.
   function machine_of_series(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(body_machine_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
     character(len=*), parameter :: effects(0:6) = [character(len=90) :: 'cubic_spring stiffness=20', &
       'quadratic_drag coefficient=0.05', 'dahl stiffness=300', 'stribeck excess=1 velocity=0.2 exponent=2', &
@@ -80,14 +80,14 @@ contains
       'sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 7))))
     call set_parameter(laws, 'drive.ratio', uniform(0.4_wp, 2.3_wp))
     if (modulo(i, 5) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
-    moving = build(laws)
+    moving = build_machine(laws)
   end function machine_of_series
 
   !> Machine number i with a force that a table gives, or two, or free play, or damping by the cube of the speed, or friction that
   !> falls to zero on the way.
   function machine_of_tables(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(body_machine_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
     character(len=*), parameter :: effects(0:9) = [character(len=130) :: &
       'friction_curve speed=0,0.5,2,5 upwards=0.4,0,0.1,0.4 downwards=0.1,0.3,0.2,0.3', &
@@ -102,14 +102,14 @@ contains
       'cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 10))))
     call set_parameter(laws, 'drive.ratio', uniform(0.4_wp, 2.3_wp))
     if (modulo(i, 5) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
-    moving = build(laws)
+    moving = build_machine(laws)
   end function machine_of_tables
 
   !> Machine number i whose contacts are expanded in series: exponents that lanes know, damping of every impact, free flights in
   !> closed form and in series.
   function machine_of_contacts(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(body_machine_t) :: moving
     type(law_choice_t), allocatable :: laws(:)
     character(len=*), parameter :: contacts(0:5) = [character(len=60) :: 'hunt_crossley stiffness=1e6 damping=0.1', &
       'hunt_crossley stiffness=2e4 damping=0.1 exponent=1', 'flores stiffness=1e6 restitution=0.6', &
@@ -126,7 +126,7 @@ contains
       'mean=0.31 cosine=0.095,0.01,-0.02 sine=0,0.028,-0.027; effect '//trim(effects(modulo(i, 11))))
     call set_parameter(laws, 'drive.ratio', uniform(0.4_wp, 2.3_wp))
     if (modulo(i, 3) == 0) call set_parameter(laws, 'contact.lower', -0.1_wp)
-    moving = build(laws)
+    moving = build_machine(laws)
   end function machine_of_contacts
 
   !> The host does what a GPU would do; not with $SEPARATRIX_TEST_GPU, which has a GPU tested.

@@ -3,13 +3,13 @@
 
 !> Multibody structures that lanes fly.
 module lane_structures
+  use multibody_machine, only: multibody_machine_t
   use contact_law, only: contact_kelvin_voigt, contact_linear, contact_power, contact_t, contact_viscoelastic
   use multibody, only: joint_contact, joint_soft, joint_t, multibody_t
-  use multibody_machines, only: barrier, body, fit, push, ready, rub, spring
+  use multibody_machines, only: barrier, body, fit, on_section, push, rub, spring
   use kinds, only: wp
   use lane_types, only: widest_lanes
   use machines, only: uniform
-  use motion, only: motion_t
   implicit none
   private
 
@@ -25,7 +25,7 @@ contains
   !> at rest is that of sliding or more, and one wall or two, fixed or a body's.
   function structure_number(kind, i) result(moving)
     integer, intent(in) :: kind, i
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: moving
     if (kind == drifting) then
       moving = drifting_structure(i)
     else if (kind == pressing) then
@@ -38,7 +38,7 @@ contains
   function oscillating_structure(i, restituting) result(moving)
     integer, intent(in) :: i
     logical, intent(in) :: restituting
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: moving
     type(multibody_t) :: machine
     character(len=2) :: name
     character(len=2), parameter :: last(0:2) = ['b2', 'b4', 'b8']
@@ -72,7 +72,7 @@ contains
   !> beside rigid ones.
   function pressing_structure(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: moving
     type(multibody_t) :: machine
     type(joint_t) :: stop
     character(len=2) :: name
@@ -125,7 +125,7 @@ contains
   !> on a belt.
   function drifting_structure(i) result(moving)
     integer, intent(in) :: i
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: moving
     type(multibody_t) :: machine
     character(len=2) :: name
     integer :: n, k
@@ -151,7 +151,7 @@ contains
     integer, intent(in) :: n
     real(wp), intent(in) :: restitution
     real(wp), intent(in), optional :: load, amplitude
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: moving
     type(multibody_t) :: machine
     character(len=2) :: name, before
     real(wp) :: mean, cosine
@@ -178,11 +178,8 @@ contains
   !> The machine ready to move, in the widest lanes.
   function made_ready(machine) result(moving)
     type(multibody_t), intent(in) :: machine
-    type(motion_t) :: moving
-    moving%options%lane_width = widest_lanes()
-    allocate (moving%multibody)
-    moving%multibody = ready(machine)
-    moving%machine%period = moving%multibody%machine%period
+    type(multibody_machine_t) :: moving
+    moving = on_section(machine, lane_width=widest_lanes())
   end function made_ready
 
 end module lane_structures

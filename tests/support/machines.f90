@@ -4,17 +4,19 @@
 !> Machines for the tests of the numerics, written as text:
 !>   'body point_mass mass=1; restoring linear stiffness=4 free_length=0.4; friction none'
 module machines
+  use body_machine, only: body_machine_t, prepare_body
   use constants, only: pi
   use errors, only: error_t
   use kinds, only: int64, wp
   use law_table, only: law_choice, law_choice_t, set_value
-  use motion, only: advance, advance_period, motion_t, prepare_motion
+  use motion, only: advance, advance_period, motion_t
   use motion_state, only: flight_auto, log_t, options_t, state_t, tally_t
   use oscillator, only: build_oscillator, oscillator_t
   implicit none
   private
 
-  public :: laws_from, set_parameter, build, build_from, published_laws, move_on, seed_random, uniform
+  public :: laws_from, set_parameter, build, build_from, build_machine, build_machine_from, &
+    published_laws, move_on, seed_random, uniform
 
 contains
 
@@ -78,24 +80,44 @@ contains
     end do
   end subroutine set_parameter
 
-  !> A machine ready to move; ends the test program if it is refused.
-  function build(laws, flight, tolerance, event_budget) result(moving)
+  !> A machine on its section; ends the test program if it is refused.
+  function build_machine(laws, flight, tolerance, event_budget) result(machine)
     type(law_choice_t), intent(in) :: laws(:)
     integer, intent(in), optional :: flight
     real(wp), intent(in), optional :: tolerance
     integer(int64), intent(in), optional :: event_budget
-    type(motion_t) :: moving
-    type(oscillator_t) :: machine
+    type(body_machine_t) :: machine
+    type(oscillator_t) :: oscillator
     type(options_t) :: options
     type(error_t), allocatable :: error
     options%flight = flight_auto
     if (present(flight)) options%flight = flight
     if (present(tolerance)) options%tolerance = tolerance
     if (present(event_budget)) options%event_budget = event_budget
-    call build_oscillator(laws, machine, error)
+    call build_oscillator(laws, oscillator, error)
     if (allocated(error)) error stop 'machines: '//error%message
-    call prepare_motion(machine, options, moving, error)
+    call prepare_body(oscillator, options, machine, error)
     if (allocated(error)) error stop 'machines: '//error%message
+  end function build_machine
+
+  function build_machine_from(text, flight, tolerance) result(machine)
+    character(len=*), intent(in) :: text
+    integer, intent(in), optional :: flight
+    real(wp), intent(in), optional :: tolerance
+    type(body_machine_t) :: machine
+    machine = build_machine(laws_from(text), flight, tolerance)
+  end function build_machine_from
+
+  !> Its body alone, ready to move.
+  function build(laws, flight, tolerance, event_budget) result(moving)
+    type(law_choice_t), intent(in) :: laws(:)
+    integer, intent(in), optional :: flight
+    real(wp), intent(in), optional :: tolerance
+    integer(int64), intent(in), optional :: event_budget
+    type(motion_t) :: moving
+    type(body_machine_t) :: machine
+    machine = build_machine(laws, flight, tolerance, event_budget)
+    moving = machine%body
   end function build
 
   function build_from(text, flight, tolerance) result(moving)

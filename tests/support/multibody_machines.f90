@@ -6,15 +6,16 @@ module multibody_machines
   use assembly, only: add_body, add_force, add_joint, add_link, finish, move_surface, row_between
   use contact_law, only: contact_kelvin_voigt
   use errors, only: error_t
+  use multibody_machine, only: multibody_machine_t, set_structure
   use multibody, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_t, multibody_t, wave_t
-  use multibody_motion, only: advance_multibody, multibody_motion_t, prepare_multibody, start_multibody
+  use multibody_motion, only: advance_multibody, multibody_motion_t, start_multibody
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use motion_state, only: flight_adaptive, flight_auto, options_t, tally_t
   implicit none
   private
 
-  public :: body, spring, barrier, soft_barrier, rub, elastic_rub, fit, push, ready, go_on, set_off
+  public :: on_section, body, spring, barrier, soft_barrier, rub, elastic_rub, fit, push, ready, go_on, set_off
 
 contains
 
@@ -142,6 +143,17 @@ contains
     type(multibody_t), intent(in) :: machine
     logical, intent(in), optional :: adaptive
     type(multibody_motion_t) :: moving
+    type(multibody_machine_t) :: whole
+    whole = on_section(machine, adaptive)
+    moving = whole%bodies
+  end function ready
+
+  !> The same on its section.
+  function on_section(machine, adaptive, lane_width) result(moving)
+    type(multibody_t), intent(in) :: machine
+    logical, intent(in), optional :: adaptive
+    integer, intent(in), optional :: lane_width
+    type(multibody_machine_t) :: moving
     type(multibody_t) :: whole
     type(options_t) :: options
     type(error_t), allocatable :: error
@@ -150,8 +162,9 @@ contains
     if (allocated(error)) error stop 'a machine of a test is refused'
     options%step_budget = 10000000
     if (present(adaptive)) options%flight = merge(flight_adaptive, flight_auto, adaptive)
-    call prepare_multibody(whole, options, moving)
-  end function ready
+    if (present(lane_width)) options%lane_width = lane_width
+    call set_structure(whole, options, moving)
+  end function on_section
 
   !> A state; the drive begins at its phase 0.
   function set_off(moving, q, v) result(state)

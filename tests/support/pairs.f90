@@ -4,17 +4,17 @@
 !> Two bodies coupled by dry friction for the tests, written as text: the structure that they are, and the names that theory has
 !> for their motion.
 module pairs
-  use build_motion, only: machine_of
+  use multibody_machine, only: multibody_machine_t
+  use build_motion, only: bodies_of
   use errors, only: error_t
+  use machine_type, only: section_state_t
   use multibody, only: joint_soft
   use multibody_log, only: watched_state
   use multibody_motion, only: start_multibody
   use multibody_state, only: joint_motion, turning_at
   use kinds, only: int64, wp
   use machines, only: laws_from
-  use motion, only: motion_t
   use motion_state, only: log_t, options_t, tally_t
-  use section, only: advance_section, advance_section_period, driver_now, energy_now, section_state_t
   use two_bodies, only: contact_at
   implicit none
   private
@@ -35,27 +35,27 @@ contains
   function build_pair_from(text, event_budget) result(moving)
     character(len=*), intent(in) :: text
     integer(int64), intent(in), optional :: event_budget
-    type(motion_t) :: moving
+    type(multibody_machine_t) :: moving
     type(options_t) :: options
     type(error_t), allocatable :: error
     if (present(event_budget)) options%event_budget = event_budget
-    call machine_of(laws_from(text), options, moving, error)
+    call bodies_of(laws_from(text), options, moving, error)
     if (allocated(error)) error stop 'pairs: '//error%message
   end function build_pair_from
 
   !> m2 at `x`, `v` and m1 at `driver` (position, velocity), with the drive at `angle` [rad]. `driver` is not looked at where the
   !> motion of m1 is given.
   function start_pair(moving, x, v, driver, angle) result(state)
-    type(motion_t), intent(in) :: moving
+    type(multibody_machine_t), intent(in) :: moving
     real(wp), intent(in) :: x, v, driver(2), angle
     type(pair_state_t) :: state
-    real(wp) :: start(2, moving%multibody%machine%n)
+    real(wp) :: start(2, moving%bodies%machine%n)
     logical :: ok
-    associate (machine => moving%multibody%machine)
+    associate (machine => moving%bodies%machine)
       start = 0
       if (machine%driver%at > 0) start(:, machine%driver%at) = driver
       start(:, machine%watched) = [x, v]
-      call start_multibody(moving%multibody, start(1, :), start(2, :), angle, state%multibody, ok)
+      call start_multibody(moving%bodies, start(1, :), start(2, :), angle, state%multibody, ok)
     end associate
     if (.not. ok) error stop 'pairs: no mode to start in'
     call look(moving, state)
@@ -63,7 +63,7 @@ contains
 
   !> Moves on by `duration` [s] over any number of sections.
   subroutine move_pair(moving, state, duration, tally, reason, log)
-    type(motion_t), intent(in) :: moving
+    type(multibody_machine_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
     real(wp), intent(in) :: duration
     type(tally_t), intent(inout) :: tally
@@ -72,8 +72,8 @@ contains
     real(wp) :: left
     left = duration
     reason = 0
-    do while (left >= moving%machine%period - state%multibody%time)
-      left = left - (moving%machine%period - state%multibody%time)
+    do while (left >= moving%period - state%multibody%time)
+      left = left - (moving%period - state%multibody%time)
       call advance_pair_period(moving, state, tally, reason, log)
       if (reason /= 0) return
     end do
@@ -82,42 +82,42 @@ contains
 
   !> To a time within the period.
   subroutine advance_pair(moving, state, time_end, tally, reason, log)
-    type(motion_t), intent(in) :: moving
+    type(multibody_machine_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
     real(wp), intent(in) :: time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    call advance_section(moving, state, time_end, tally, reason, log)
+    call moving%advance(state, time_end, tally, reason, log)
     call look(moving, state)
   end subroutine advance_pair
 
   subroutine advance_pair_period(moving, state, tally, reason, log)
-    type(motion_t), intent(in) :: moving
+    type(multibody_machine_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    call advance_section_period(moving, state, tally, reason, log)
+    call moving%advance_to_section(state, tally, reason, log)
     call look(moving, state)
   end subroutine advance_pair_period
 
   real(wp) function energy_of(moving, state)
-    type(motion_t), intent(in) :: moving
+    type(multibody_machine_t), intent(in) :: moving
     type(pair_state_t), intent(in) :: state
-    energy_of = energy_now(moving, state)
+    energy_of = moving%energy(state)
   end function energy_of
 
   !> What the state is called.
   subroutine look(moving, state)
-    type(motion_t), intent(in) :: moving
+    type(multibody_machine_t), intent(in) :: moving
     type(pair_state_t), intent(inout) :: state
-    complex(wp) :: turning(moving%multibody%harmonics)
+    complex(wp) :: turning(moving%bodies%harmonics)
     real(wp) :: s, u
     integer :: stop
-    associate (machine => moving%multibody%machine, now => state%multibody)
+    associate (machine => moving%bodies%machine, now => state%multibody)
       state%state = watched_state(machine, now)
-      state%y = [driver_now(moving, state), state%state%x, state%state%v]
+      state%y = [moving%driver(state), state%state%x, state%state%v]
       state%mode = state%state%mode
       state%pressed = 0
       state%penetration = 0

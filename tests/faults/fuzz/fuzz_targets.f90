@@ -16,9 +16,9 @@ module fuzz_targets
   use info_driver, only: run_info
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
+  use machine_type, only: machine_t
   use map_file, only: create_working, map_file_t, open_working
   use map_schema, only: schema_t, type_float32, type_int8
-  use motion, only: motion_t
   use point_list, only: point_list_t, read_point_list
   use serial_team, only: serial_team_t
   use status, only: exit_bad_case
@@ -87,7 +87,7 @@ contains
     type(case_t), intent(in) :: the_case
     type(error_t), allocatable, intent(out) :: error
     type(grid_t) :: grid
-    type(motion_t) :: moving
+    class(machine_t), allocatable :: moving
     grid = grid_of(the_case, the_case%axes)
     call slice_motion(grid, 0_int64, moving, error)
   end subroutine build_machine

@@ -1,67 +1,25 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What is written down of a motion beside time, position and velocity of the body looked at, by the machine: the foot of the
-!> spring, the driving body, all coordinates of a structure and the joint of each event.
-module motion_columns
+!> Columns of the log of several bodies: the driving body, all coordinates of a structure, the joint of each event.
+module multibody_columns
   use angle_units, only: unit_of
-  use multibody, only: joint_section, multibody_t
   use kinds, only: wp
-  use machine_facts, only: has_driver
-  use motion, only: motion_t
-  use motion_history, only: foot_positions
+  use machine_columns, only: machine_column_t, set_column
   use motion_state, only: log_t
+  use multibody, only: joint_section, multibody_t
   use text, only: replace_all
   implicit none
   private
 
-  public :: sample_columns, event_columns
-
-  !> A quantity at the samples, or at the events.
-  type, public :: motion_column_t
-    character(len=:), allocatable :: name, units, text
-    real(wp), allocatable :: values(:)
-    !> Meanings of the numbers 1, 2, ..., parted by spaces; '' of a quantity.
-    character(len=:), allocatable :: meanings
-  end type motion_column_t
+  public :: coordinate_columns, driver_columns, joint_columns
 
 contains
-
-  !> At the samples of a motion that began with the crank at `crank_angle` [rad].
-  pure function sample_columns(moving, crank_angle, log) result(columns)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: crank_angle
-    type(log_t), intent(in) :: log
-    type(motion_column_t), allocatable :: columns(:)
-    if (has_driver(moving)) then
-      columns = driver_columns(log%sample_driver(:, :log%samples))
-    else if (allocated(moving%multibody)) then
-      columns = coordinate_columns(moving%multibody%machine, log)
-    else
-      allocate (columns(1))
-      call set_column(columns(1), 'drive', unit_of('m', moving%machine%restoring%turn > 0), 'position of the foot of the spring', &
-                      foot_positions(moving, crank_angle, log))
-    end if
-  end function sample_columns
-
-  !> At the events.
-  pure function event_columns(moving, log) result(columns)
-    type(motion_t), intent(in) :: moving
-    type(log_t), intent(in) :: log
-    type(motion_column_t), allocatable :: columns(:)
-    if (has_driver(moving)) then
-      columns = driver_columns(log%event_driver(:, :log%events))
-    else if (allocated(moving%multibody)) then
-      columns = joint_columns(moving%multibody%machine, log)
-    else
-      allocate (columns(0))
-    end if
-  end function event_columns
 
   !> Position and velocity of the driving body.
   pure function driver_columns(driver) result(columns)
     real(wp), intent(in) :: driver(:, :)
-    type(motion_column_t), allocatable :: columns(:)
+    type(machine_column_t), allocatable :: columns(:)
     allocate (columns(2))
     call set_column(columns(1), 'driver_x', 'm', 'position of the driving body', driver(1, :))
     call set_column(columns(2), 'driver_v', 'm/s', 'velocity of the driving body', driver(2, :))
@@ -71,7 +29,7 @@ contains
   pure function coordinate_columns(machine, log) result(columns)
     type(multibody_t), intent(in) :: machine
     type(log_t), intent(in) :: log
-    type(motion_column_t), allocatable :: columns(:)
+    type(machine_column_t), allocatable :: columns(:)
     character(len=:), allocatable :: name, column
     real(wp), allocatable :: samples(:, :)
     character(len=5) :: units(2)
@@ -96,7 +54,7 @@ contains
   pure function joint_columns(machine, log) result(columns)
     type(multibody_t), intent(in) :: machine
     type(log_t), intent(in) :: log
-    type(motion_column_t), allocatable :: columns(:)
+    type(machine_column_t), allocatable :: columns(:)
     character(len=:), allocatable :: names
     real(wp), allocatable :: joints(:, :)
     integer :: i, count_joints
@@ -137,15 +95,4 @@ contains
     joins_angles = any([(is_angle(machine, i) .and. abs(machine%joints(j)%row(i)) > 0, i=1, machine%n)])
   end function joins_angles
 
-  pure subroutine set_column(column, name, units, text, values)
-    type(motion_column_t), intent(out) :: column
-    character(len=*), intent(in) :: name, units, text
-    real(wp), intent(in) :: values(:)
-    column%name = name
-    column%units = units
-    column%text = text
-    column%values = values
-    column%meanings = ''
-  end subroutine set_column
-
-end module motion_columns
+end module multibody_columns

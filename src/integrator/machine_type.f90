@@ -1,0 +1,414 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> A machine on its section: all that the layers above the event loops need. Another kind of machine is another extension of
+!> `machine_t`: it implements the deferred procedures, and its builder sets the facts. The layers above never ask which it is.
+!> The section is that of a drive period or, with `by_event`, where the motion of a machine without a clock turns round
+!> (`turn_section`).
+module machine_type
+  use contact_law, only: contact_t
+  use effect_law, only: sensor_t
+  use kinds, only: int64, wp
+  use machine_columns, only: machine_column_t
+  use motion_state, only: log_t, options_t, reset_tally, state_t, tally_t
+  use multibody_state, only: multibody_state_t
+  use section_size, only: most_coordinates
+  implicit none
+  private
+
+  public :: copy_of
+
+  !> `state` is that of the body, or of the watched one of several.
+  type, public :: section_state_t
+    type(state_t) :: state
+    type(multibody_state_t) :: multibody
+    !> Time from the last section to this one [s].
+    real(wp) :: lasted = 0
+  end type section_state_t
+
+  !> Length [m], time [s] and mass [kg] that a machine itself sets.
+  type, public :: scales_t
+    real(wp) :: length = 1, time = 1, mass = 1
+  end type scales_t
+
+  type, abstract, public :: machine_t
+    !> Time from section to section [s], and its circular frequency [rad/s].
+    real(wp) :: period = 0, drive_frequency = 0
+    !> The section is where the motion turns round, not at a given time.
+    logical :: by_event = .false.
+    !> An angle repeats after this [rad]; 0 of a position.
+    real(wp) :: turn = 0
+    !> Rigid stops that bound the first coordinate of the section [m].
+    real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
+    !> The stops of the watched body, where they belong to no joint; whether there is anything to hit.
+    type(contact_t) :: stops
+    logical :: has_stops = .false.
+    !> Whether a body that leans on a soft stop uses up steps.
+    logical :: presses_by_steps = .false.
+    !> Frequency ratio of the drive, and distance of the samples of a measured force [s]; 0 without.
+    real(wp) :: drive_ratio = 0, sample_interval = 0
+    integer :: force_samples = 0
+    !> Whether a drive repeats, so that its period is the time between two sections.
+    logical :: has_drive_period = .false.
+    !> Whether the motion depends on the time at all, and whether a drive gives a time: without one the section may be an event.
+    logical :: undriven = .false., has_clock = .true.
+    !> Whether the state on the section determines what follows.
+    logical :: has_section = .true.
+    !> Whether a driving body moves beside the watched one: what does not slip may then well move.
+    logical :: has_driver = .false.
+    !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move as one
+    !> in a way that is given.
+    logical :: rest_lasts = .true.
+    !> Whether all positions of rest are one set: friction and stops with linear springs make it convex; two bodies rest by moving
+    !> as one.
+    logical :: one_rest_set = .false.
+    !> Whether slips of one body are flown on a closed form; whether that is so in every mode.
+    logical :: exact = .false., closed_form = .false.
+    !> Whether the motion between the stops is that of a linear, damped oscillator with a closed form: then it has one motion
+    !> without impact, which attracts.
+    logical :: linear = .false.
+    !> Number of a coordinate of the section that is a velocity.
+    integer :: speed_number = 2
+    !> Amplitude [m] of a motion below which it is rounding: a thousandth of what the forces do.
+    real(wp) :: smallest_motion = 1e-3_wp
+    type(scales_t) :: sizes
+    type(sensor_t) :: sensor
+  contains
+    procedure(count_of_machine), deferred :: coordinates
+    procedure(text_of_machine), deferred :: section_obstacle
+    procedure(start_interface), deferred :: start
+    procedure(allows_interface), deferred :: allows
+    procedure(resume_interface), deferred :: resume
+    procedure(at_interface), deferred :: state_at
+    procedure(point_interface), deferred :: point_of
+    procedure(point_interface), deferred :: turn_point
+    procedure(scales_interface), deferred :: scales
+    procedure(advance_interface), deferred :: advance
+    procedure(past_event_interface), deferred :: advance_past_event
+    procedure(to_section_interface), deferred :: advance_to_section
+    procedure(to_turn_interface), deferred :: advance_to_turn
+    procedure(energy_interface), deferred :: energy
+    procedure(sample_interface), deferred :: sample
+    procedure(without_stops_interface), deferred :: without_stops
+    procedure(stays_clear_interface), deferred :: stays_clear
+    procedure(sample_columns_interface), deferred :: sample_columns
+    procedure(event_columns_interface), deferred :: event_columns
+    procedure(samples_interface), deferred :: contact_forces
+    procedure(samples_interface), deferred :: kinetic_energies
+    procedure(rests_interface), deferred :: rests_at_end
+    procedure(fact_of_machine), deferred :: has_mode
+    procedure(driver_interface), deferred :: driver
+    procedure(row_interface), deferred :: contacts_in_row
+    procedure(sizes_interface), deferred :: contact_sizes
+    procedure(multipliers_interface), deferred :: free_multipliers
+    procedure(force_interface), deferred :: measured_force
+    procedure(force_at_interface), deferred :: force_at
+    procedure(options_interface), deferred :: options
+    procedure(set_options_interface), deferred :: set_options
+    procedure :: limit_budgets
+    procedure :: turn_on_section
+    procedure :: watched_at
+    procedure :: begin_tally
+    procedure :: record_end
+  end type machine_t
+
+  abstract interface
+    !> Number of coordinates on the section.
+    pure integer function count_of_machine(self) result(n)
+      import :: machine_t
+      class(machine_t), intent(in) :: self
+    end function count_of_machine
+
+    !> Why the state on the section does not determine what follows; '' if it does.
+    pure function text_of_machine(self) result(text)
+      import :: machine_t
+      class(machine_t), intent(in) :: self
+      character(len=:), allocatable :: text
+    end function text_of_machine
+
+    !> Whether the section of a machine without a drive is a period of its slowest mode; else it is only a unit of time.
+    pure logical function fact_of_machine(self) result(fact)
+      import :: machine_t
+      class(machine_t), intent(in) :: self
+    end function fact_of_machine
+
+    !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as in its machine. What follows in `values` are
+    !> positions and velocities of the coordinates of several bodies, in place of those of the machine.
+    pure function start_interface(self, values) result(section)
+      import :: machine_t, section_state_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: values(:)
+      type(section_state_t) :: section
+    end function start_interface
+
+    !> Whether no body starts beyond a rigid stop: values as in `start`.
+    pure logical function allows_interface(self, values) result(allowed)
+      import :: machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: values(:)
+    end function allows_interface
+
+    !> The state of another machine given to this one, on the section with the crank at an angle [rad]; a driving body whose
+    !> motion is given has that of the new machine. What was never moved starts as in the new machine.
+    pure function resume_interface(self, before, angle) result(section)
+      import :: machine_t, section_state_t, wp
+      class(machine_t), intent(in) :: self
+      type(section_state_t), intent(in) :: before
+      real(wp), intent(in) :: angle
+      type(section_state_t) :: section
+    end function resume_interface
+
+    !> The state on the section with the coordinates `point`; what they leave open is zero.
+    pure function at_interface(self, point) result(section)
+      import :: machine_t, section_state_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)
+      type(section_state_t) :: section
+    end function at_interface
+
+    !> Coordinates of a state on the section, zeros after the last.
+    pure function point_interface(self, section) result(point)
+      import :: machine_t, most_coordinates, section_state_t, wp
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(in) :: section
+      real(wp) :: point(most_coordinates)
+    end function point_interface
+
+    !> Sizes of the coordinates in a motion over `half_range` [m] of the position, ones after the last.
+    pure function scales_interface(self, half_range) result(scales)
+      import :: machine_t, most_coordinates, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: half_range
+      real(wp) :: scales(most_coordinates)
+    end function scales_interface
+
+    !> Moves to `time_end` [s after the section, at most one period]. `reason` stays 0 unless the trajectory had to be given up
+    !> (codes of module `status`).
+    pure subroutine advance_interface(self, section, time_end, tally, reason, log)
+      import :: log_t, machine_t, section_state_t, tally_t, wp
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(inout) :: section
+      real(wp), intent(in) :: time_end
+      type(tally_t), intent(inout) :: tally
+      integer, intent(out) :: reason
+      type(log_t), intent(inout), optional :: log
+    end subroutine advance_interface
+
+    !> Moves past one event, if that comes before `time_end`; one body past a turn to a slip at `speed` [m/s] or faster.
+    pure subroutine past_event_interface(self, section, speed, time_end, tally, reason)
+      import :: machine_t, section_state_t, tally_t, wp
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(inout) :: section
+      real(wp), intent(in) :: speed, time_end
+      type(tally_t), intent(inout) :: tally
+      integer, intent(out) :: reason
+    end subroutine past_event_interface
+
+    !> Moves to the next section and starts the clock anew.
+    pure subroutine to_section_interface(self, section, tally, reason, log)
+      import :: log_t, machine_t, section_state_t, tally_t
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(inout) :: section
+      type(tally_t), intent(inout) :: tally
+      integer, intent(out) :: reason
+      type(log_t), intent(inout), optional :: log
+    end subroutine to_section_interface
+
+    !> Moves a machine without a clock to where it turns round; `reason` is `reason_time_over` if it does not.
+    pure subroutine to_turn_interface(self, section, tally, reason)
+      import :: machine_t, section_state_t, tally_t
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(inout) :: section
+      type(tally_t), intent(inout) :: tally
+      integer, intent(out) :: reason
+    end subroutine to_turn_interface
+
+    !> Energy of the machine [J].
+    pure real(wp) function energy_interface(self, section) result(energy)
+      import :: machine_t, section_state_t, wp
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(in) :: section
+    end function energy_interface
+
+    !> Adds a sample of a state to a log.
+    pure subroutine sample_interface(self, section, log)
+      import :: log_t, machine_t, section_state_t
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(in) :: section
+      type(log_t), intent(inout) :: log
+    end subroutine sample_interface
+
+    !> The same machine without stops, not allocated on entry, and how many first coordinates, positions, this takes away; -1 if it
+    !> takes away others.
+    pure subroutine without_stops_interface(self, free, positions)
+      import :: machine_t
+      class(machine_t), intent(in) :: self
+      class(machine_t), allocatable, intent(inout) :: free
+      integer, intent(out) :: positions
+    end subroutine without_stops_interface
+
+    !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of one body the tally
+    !> has by how much it missed them.
+    pure logical function stays_clear_interface(self, section, tally, periods, distance) result(clear)
+      import :: machine_t, section_state_t, tally_t, wp
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(in) :: section
+      type(tally_t), intent(in) :: tally
+      integer, intent(in) :: periods
+      real(wp), intent(in) :: distance
+    end function stays_clear_interface
+
+    !> What a log holds beside time, position and velocity, at the samples of a motion that began with the crank at `crank_angle`
+    !> [rad].
+    pure function sample_columns_interface(self, crank_angle, log) result(columns)
+      import :: log_t, machine_column_t, machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: crank_angle
+      type(log_t), intent(in) :: log
+      type(machine_column_t), allocatable :: columns(:)
+    end function sample_columns_interface
+
+    !> The same at the events.
+    pure function event_columns_interface(self, log) result(columns)
+      import :: log_t, machine_column_t, machine_t
+      class(machine_t), intent(in) :: self
+      type(log_t), intent(in) :: log
+      type(machine_column_t), allocatable :: columns(:)
+    end function event_columns_interface
+
+    !> Forces of soft stops [N], kinetic energy [J], at the samples of a log.
+    pure function samples_interface(self, log) result(values)
+      import :: log_t, machine_t, wp
+      class(machine_t), intent(in) :: self
+      type(log_t), intent(in) :: log
+      real(wp) :: values(log%samples)
+    end function samples_interface
+
+    !> Whether a machine that nothing drives has come to rest over the samples of a log after `since` [s], in a motion of this
+    !> `amplitude` [m].
+    pure logical function rests_interface(self, amplitude, since, log) result(rests)
+      import :: log_t, machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: amplitude, since
+      type(log_t), intent(in) :: log
+    end function rests_interface
+
+    !> Position and velocity of the driving body of two [m, m/s], zeros without one.
+    pure function driver_interface(self, section) result(motion)
+      import :: machine_t, section_state_t, wp
+      class(machine_t), intent(in) :: self
+      class(section_state_t), intent(in) :: section
+      real(wp) :: motion(2)
+    end function driver_interface
+
+    !> Names of the rigid contacts that are closed at the `start` (x [m], v [m/s], crank angle [rad] of the watched body) and whose
+    !> impacts change the speed of another one, as 'ab, bc'; '' if there are none, or if impacts come one after the other.
+    pure function row_interface(self, values) result(names)
+      import :: machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: values(3)
+      character(len=:), allocatable :: names
+    end function row_interface
+
+    !> What presses a soft stop: the mass that an impact feels [kg], the size of the forces [N], and whether the contact is flown
+    !> in closed form.
+    pure subroutine sizes_interface(self, mass, force, closed_form)
+      import :: machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(out) :: mass, force
+      logical, intent(out) :: closed_form
+    end subroutine sizes_interface
+
+    !> Multipliers of the motion of a machine that is `linear` over some drive periods.
+    pure function multipliers_interface(self, periods) result(multipliers)
+      import :: machine_t, wp
+      class(machine_t), intent(in) :: self
+      integer, intent(in) :: periods
+      complex(wp) :: multipliers(2)
+    end function multipliers_interface
+
+    !> The samples of a measured force [N].
+    pure function force_interface(self) result(force)
+      import :: machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp) :: force(self%force_samples)
+    end function force_interface
+
+    !> The measured force [N] that drives a machine, at `times` [s since the start at `crank_angle` [rad]].
+    pure function force_at_interface(self, crank_angle, times) result(force)
+      import :: machine_t, wp
+      class(machine_t), intent(in) :: self
+      real(wp), intent(in) :: crank_angle, times(:)
+      real(wp) :: force(size(times))
+    end function force_at_interface
+
+    !> How the machine is flown.
+    pure type(options_t) function options_interface(self) result(options)
+      import :: machine_t, options_t
+      class(machine_t), intent(in) :: self
+    end function options_interface
+
+    !> Other budgets, domain or lanes; the flight stays that of the prepared machine.
+    pure subroutine set_options_interface(self, options)
+      import :: machine_t, options_t
+      class(machine_t), intent(inout) :: self
+      type(options_t), intent(in) :: options
+    end subroutine set_options_interface
+  end interface
+
+contains
+
+  !> A copy of a state, to be moved on its own.
+  pure type(section_state_t) function copy_of(section) result(copy)
+    class(section_state_t), intent(in) :: section
+    copy%state = section%state
+    copy%multibody = section%multibody
+    copy%lasted = section%lasted
+  end function copy_of
+
+  !> So many events and steps a trajectory may take at most, or fewer where it may take fewer already.
+  pure subroutine limit_budgets(self, events, steps)
+    class(machine_t), intent(inout) :: self
+    integer(int64), intent(in) :: events, steps
+    type(options_t) :: options
+    options = self%options()
+    options%event_budget = min(options%event_budget, events)
+    options%step_budget = min(options%step_budget, steps)
+    call self%set_options(options)
+  end subroutine limit_budgets
+
+  !> What the first coordinate repeats after on the section.
+  pure real(wp) function turn_on_section(self) result(turn)
+    class(machine_t), intent(in) :: self
+    turn = merge(0.0_wp, self%turn, self%by_event)
+  end function turn_on_section
+
+  !> x, v at a point of the section, and those of the driving body of two (0 of one).
+  pure function watched_at(self, point) result(state)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(in) :: point(:)
+    real(wp) :: state(4)
+    type(section_state_t) :: section
+    section = self%state_at(point)
+    state = [section%state%x, section%state%v, self%driver(section)]
+  end function watched_at
+
+  !> Begins the counts of a motion anew where it is now.
+  pure subroutine begin_tally(self, section, tally)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    type(tally_t), intent(inout) :: tally
+    call reset_tally(tally, section%state, self%has_driver)
+  end subroutine begin_tally
+
+  !> Closes the balance of a log, with a last sample if it has any.
+  pure subroutine record_end(self, section, sampled, log)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    logical, intent(in) :: sampled
+    type(log_t), intent(inout) :: log
+    log%balance%at_end = self%energy(section)
+    if (sampled) call self%sample(section, log)
+  end subroutine record_end
+
+end module machine_type
