@@ -9,7 +9,8 @@ module beside_saddle
   use errors, only: error_t
   use exponents, only: spectrum_t
   use kinds, only: wp
-  use machine_family, only: begin_walk, machine_neighbourhood, walk_on, walk_t
+  use machine_family, only: machine_neighbourhood
+  use machine_type, only: section_state_t
   use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance
   use structure_exponents, only: exponents_from_section
   use variations, only: neighbourhood_t
@@ -91,15 +92,15 @@ contains
     type(beside_t), intent(in) :: beside
     integer, intent(in) :: side
     type(cycle_points_t), intent(out) :: settles
-    type(walk_t) :: walk
+    type(section_state_t) :: walk
     real(wp) :: y(size(beside%direction)), points(size(y), 0:2*longest_period)
     integer :: k, n
     logical :: ok
     allocate (settles%points(size(y), 0))
-    call begin_walk(beside%machines%centre, start_beside(beside, side, 0.37_wp), walk, ok)
+    call beside%machines%centre%begin(start_beside(beside, side, 0.37_wp), walk, ok)
     if (.not. ok) return
     do k = 1, beside%turns*beside%saddle%periods + 2*longest_period
-      call walk_on(beside%machines%centre, walk, y, ok)
+      call beside%machines%centre%go_on(walk, y, ok)
       if (.not. ok) return
       n = k - beside%turns*beside%saddle%periods
       if (n >= 0) points(:, n) = y
@@ -119,15 +120,15 @@ contains
     integer, intent(in) :: side, turns
     type(cycle_points_t), intent(in) :: settles
     real(wp), intent(in) :: offset
-    type(walk_t) :: walk
+    type(section_state_t) :: walk
     real(wp) :: y(size(beside%direction))
     integer :: j, k
     logical :: ok
     arrives = .false.
-    call begin_walk(beside%machines%centre, start_beside(beside, side, offset), walk, ok)
+    call beside%machines%centre%begin(start_beside(beside, side, offset), walk, ok)
     if (.not. ok) return
     do k = 1, turns*beside%saddle%periods
-      call walk_on(beside%machines%centre, walk, y, ok)
+      call beside%machines%centre%go_on(walk, y, ok)
       if (.not. ok) return
       do j = 1, size(settles%points, 2)
         arrives = section_distance(beside%machines%centre, y, settles%points(:, j)) < capture

@@ -14,7 +14,7 @@ module branch
   use errors, only: error_t
   use graze_passage, only: at_graze, leave_by_graze
   use kinds, only: wp
-  use machine_family, only: machine_neighbourhood, nearest_copy
+  use machine_family, only: machine_neighbourhood
   use margin_passage, only: begins_chatter, pass_margin
   use motion_state, only: event_chatter_lower, event_chatter_upper
   use orbit_margins, only: margin_t, of_impact
@@ -208,7 +208,7 @@ contains
             return
           end if
           difference = [difference, (other%time - one%time - closing_time(machine, orbit)/2)/machine%size_of_time(), &
-                        (nearest_copy(machine, other%arrival(:n), one%arrival(:n)) - one%arrival(:n))/machine%size_of]
+                        (machine%nearest_copy(other%arrival(:n), one%arrival(:n)) - one%arrival(:n))/machine%size_of]
         end associate
       end do
     end associate

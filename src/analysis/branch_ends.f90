@@ -7,7 +7,7 @@ module branch_ends
   use branch_point, only: branch_t, label_bp, label_not_known, label_pd
   use errors, only: error_t
   use kinds, only: wp
-  use machine_family, only: machine_neighbourhood, nearest_copy
+  use machine_family, only: machine_neighbourhood
   use orbit_sections, only: section_points
   use periodic_orbit, only: orbit_t
   use variations, only: neighbourhood_t
@@ -102,7 +102,7 @@ contains
     if (allocated(error)) return
     points = section_points(machines, orbit)
     do k = 1, orbit%periods
-      points(:, k) = nearest_copy(machines%centre, points(:, k), y)
+      points(:, k) = machines%centre%nearest_copy(points(:, k), y)
       there = norm2((points(:, k) - y)/machines%centre%size_of)
       if (there >= distance) cycle
       distance = there

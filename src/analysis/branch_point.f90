@@ -7,7 +7,7 @@ module branch_point
   use errors, only: error_t
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
-  use machine_family, only: machine_neighbourhood, machine_of_family, section_sizes
+  use machine_family, only: machine_neighbourhood, machine_of_family
   use multipliers, only: nearly_neutral
   use orbit_margins, only: margins_t
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
@@ -88,10 +88,10 @@ contains
     sizes = 0
     call machine_of_family(family, plan%lowest, machine, error)
     if (allocated(error)) return
-    sizes = section_sizes(machine)
+    sizes = machine%section_sizes()
     call machine_of_family(family, plan%highest, machine, error)
     if (allocated(error)) return
-    family%sizes = max(sizes, section_sizes(machine))
+    family%sizes = max(sizes, machine%section_sizes())
   end subroutine set_sizes
 
   !> Tangent, margins and extremes of the orbit where the trace is.

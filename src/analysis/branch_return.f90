@@ -6,7 +6,6 @@ module branch_return
   use body_family, only: family_t
   use branch_point, only: label_closed, label_not_known, no_label, point_t, step_to, trace_t
   use kinds, only: wp
-  use machine_family, only: nearest_copy
   use orbit_motion, only: same_sequence
   use orbit_sections, only: begun_at
   use periodic_orbit, only: orbit_t, scales_of_orbit
@@ -86,7 +85,7 @@ contains
     type(trace_t), intent(in) :: trace
     type(orbit_t), intent(in) :: from, to
     real(wp) :: way(size(from%y) + size(from%events) + 1)
-    way = [nearest_copy(trace%machines%centre, to%y, from%y) - from%y, to%events%time - from%events%time, &
+    way = [trace%machines%centre%nearest_copy(to%y, from%y) - from%y, to%events%time - from%events%time, &
            to%parameter - from%parameter]
     way = way/scales_of_orbit(trace%machines, from, family%parameter_size)
   end function difference

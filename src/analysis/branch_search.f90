@@ -13,7 +13,7 @@ module branch_search
   use hopf_cycles, only: begin_cycle, mark_births
   use kinds, only: wp
   use hybrid_machine, only: hybrid_t
-  use machine_family, only: machine_neighbourhood, machine_of_family, watched_rows
+  use machine_family, only: machine_neighbourhood, machine_of_family
   use matrices, only: solve
   use multipliers, only: is_neutral
   use orbit_search, only: find_orbits, found_t
@@ -73,7 +73,7 @@ contains
     if (allocated(error)) return
     call machine_of_family(search%family, (search%plan%lowest + search%plan%highest)/2, machine, error)
     if (allocated(error)) return
-    search%watch = watched_rows(machine)
+    search%watch = machine%watched
     search%has_clock = machine%has_clock
     associate (low => search%plan%lowest, high => search%plan%highest)
       search%values = [(low + (high - low)*(i - 0.5_wp)/values, i=1, values)]

@@ -7,7 +7,6 @@ module branch_vanishing
   use body_family, only: family_t
   use branch_point, only: label_hb, point_t, step_to, trace_t
   use kinds, only: wp
-  use machine_family, only: watched_rows
   implicit none
   private
 
@@ -23,7 +22,7 @@ contains
   pure real(wp) function amplitude_of(trace) result(amplitude)
     type(trace_t), intent(in) :: trace
     real(wp) :: rows(2, size(trace%now%orbit%y))
-    rows = watched_rows(trace%machines%centre)
+    rows = trace%machines%centre%watched
     amplitude = (sum(rows(1, :)*trace%now%orbit%y) - (trace%now%x_max + trace%now%x_min)/2)/trace%machines%centre%size_of(1)
   end function amplitude_of
 

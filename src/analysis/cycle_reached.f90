@@ -7,7 +7,6 @@ module cycle_reached
   use exponents, only: period_of_section, spectrum_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use machine_family, only: fly_sections, map_with_variation, nearest_copy
   use matrices, only: solve
   use motion_state, only: tally_t
   use multipliers, only: multipliers_of
@@ -90,7 +89,7 @@ contains
     here = start
     farthest = 0
     do i = 1, rounds
-      call fly_sections(machines%centre, here, period, .false., image, events, mode, tally, approaches)
+      call machines%centre%fly_sections(here, period, .false., image, events, mode, tally, approaches)
       if (.not. approaches) return
       here = image
       if (i <= block) farthest(1) = max(farthest(1), distance(machines%centre, point, here))
@@ -113,13 +112,13 @@ contains
     allocate (matrix(size(start), size(start)))
     associate (machine => machines%centre)
       do i = 1, most_newton
-        call map_with_variation(machines, point, sections, image, matrix, tally, ok)
+        call machines%centre%map(machines, point, sections, image, matrix, tally, ok)
         if (.not. ok) return
         slopes = matrix
         do k = 1, size(start)
           slopes(k, k) = slopes(k, k) - 1
         end do
-        call solve(slopes, point - nearest_copy(machine, image, point), step, ok)
+        call solve(slopes, point - machine%nearest_copy(image, point), step, ok)
         if (.not. ok) return
         point = point + step
         ok = distance(machine, point, start) <= beside_cycle
@@ -136,7 +135,7 @@ contains
     integer, intent(in) :: sections
     type(tally_t) :: tally
     real(wp) :: image(size(point)), matrix(size(point), size(point))
-    call map_with_variation(machines, point, sections, image, matrix, tally, back)
+    call machines%centre%map(machines, point, sections, image, matrix, tally, back)
     if (back) back = distance(machines%centre, image, point) <= same
   end function comes_back
 
@@ -144,7 +143,7 @@ contains
   pure real(wp) function distance(machine, one, other)
     class(hybrid_t), intent(in) :: machine
     real(wp), intent(in) :: one(:), other(:)
-    distance = norm2((nearest_copy(machine, one, other) - other)/machine%size_of)
+    distance = norm2((machine%nearest_copy(one, other) - other)/machine%size_of)
   end function distance
 
 end module cycle_reached

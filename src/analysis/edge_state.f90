@@ -8,10 +8,9 @@ module edge_state
   use attractors, only: attractor_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use machine_family, only: fly_sections, fly_to_section, nearest_copy, section_of_section
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_stick, &
-    event_touch_lower, event_touch_upper, tally_t
+    event_touch_lower, event_touch_upper, tally_t, take_turns
   use saddle_search, only: distance_to_saddle, find_saddle, saddle_t, section_distance, sides_of_saddle
   use start_label, only: label_from, label_not_known, label_of
   use single_trajectory, only: outcome_t, run_trajectory, span_t
@@ -102,7 +101,7 @@ contains
         if (ok .or. gap_of(machines%centre, pair) > parted) return
         ok = .true.
       end if
-      past(:, n) = pair%points(:, 1) + (nearest_copy(machines%centre, pair%points(:, 2), pair%points(:, 1)) - pair%points(:, 1))/2
+      past(:, n) = pair%points(:, 1) + (machines%centre%nearest_copy(pair%points(:, 2), pair%points(:, 1)) - pair%points(:, 1))/2
       if (waiting == 0) then
         call try_returns(machines, past(:, :n), candidate, ok)
         if (ok) then
@@ -220,7 +219,8 @@ contains
     type(section_state_t) :: section
     logical :: ok
     if (on_section) then
-      call section_of_section(machine, labeller%moving, point, section, ok)
+      call machine%begin(point, section, ok)
+      call take_turns(machine%turn, section%state)
       label = label_not_known
       if (ok) label = label_from(labeller%moving, labeller%catalogue, labeller%span, section)
     else
@@ -300,9 +300,9 @@ contains
     type(tally_t) :: tally
     integer :: mode
     if (pair%on_section) then
-      call fly_sections(machine, pair%points(:, side), 1, .true., image, events, mode, tally, ok)
+      call machine%fly_sections(pair%points(:, side), 1, .true., image, events, mode, tally, ok)
     else
-      call fly_to_section(machine, pair%points(:, side), image, events, ok)
+      call machine%fly_to_section(pair%points(:, side), image, events, ok)
     end if
   end subroutine advance_one
 

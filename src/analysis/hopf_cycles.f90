@@ -11,7 +11,7 @@ module hopf_cycles
   use equilibrium_branch, only: equilibria_t
   use errors, only: error_t
   use kinds, only: wp
-  use machine_family, only: machine_neighbourhood, watched_rows
+  use machine_family, only: machine_neighbourhood
   use orbit_motion, only: is_admissible, orbit_of_motion
   use periodic_orbit, only: closing_time, correct_orbit, orbit_t
   use structure, only: structure_t
@@ -72,7 +72,7 @@ contains
     integer :: k
     call eigen_of(structure, point, values, vectors)
     k = minloc(abs(real(values)), 1)
-    rows = watched_rows(structure)
+    rows = structure%watched
     position = sum(rows(1, :)*structure%size_of*vectors(:, k))
     along = 0
     if (.not. abs(position) > 0) return

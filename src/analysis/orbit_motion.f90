@@ -5,7 +5,6 @@
 !> that orbit.
 module orbit_motion
   use kinds, only: wp
-  use machine_family, only: fly_sections
   use motion_state, only: tally_t
   use periodic_orbit, only: orbit_t
   use variations, only: neighbourhood_t
@@ -36,7 +35,7 @@ contains
     orbit%y = y
     orbit%multipliers = [(cmplx(0.0_wp, 0.0_wp, wp), i=1, size(y))]
     allocate (orbit%matrix(size(y), size(y)), source=0.0_wp)
-    call fly_sections(machines%centre, y, periods, .true., image, orbit%events, orbit%mode, tally, ok)
+    call machines%centre%fly_sections(y, periods, .true., image, orbit%events, orbit%mode, tally, ok)
     if (ok) ok = size(orbit%events) <= most_events
   end subroutine orbit_of_motion
 

@@ -7,7 +7,6 @@ module orbit_search
   use body_family, only: family_t
   use hybrid_machine, only: event_t
   use kinds, only: wp
-  use machine_family, only: fly_sections, map_with_variation, nearest_copy, within_stops
   use matrices, only: solve
   use motion_state, only: tally_t
   use multipliers, only: is_neutral
@@ -153,7 +152,7 @@ contains
     type(event_t), allocatable :: events(:)
     type(tally_t) :: tally
     integer :: mode
-    call fly_sections(machines%centre, point, 1, .false., image, events, mode, tally, ok)
+    call machines%centre%fly_sections(point, 1, .false., image, events, mode, tally, ok)
     ok = ok .and. all(abs(image) < huge(1.0_wp))
   end subroutine image_of
 
@@ -161,7 +160,7 @@ contains
   pure real(wp) function distance(machines, one, other)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: one(:), other(:)
-    distance = norm2((nearest_copy(machines%centre, one, other) - other)/machines%centre%size_of)
+    distance = norm2((machines%centre%nearest_copy(one, other) - other)/machines%centre%size_of)
   end function distance
 
   !> Newton's method on the map over `periods`, each step with the events of the motion then; what it comes to is added.
@@ -179,7 +178,7 @@ contains
     point = start
     sizes = machines%centre%size_of
     do i = 1, most_newton
-      call map_with_variation(machines, point, periods, image, slopes, tally, ok)
+      call machines%centre%map(machines, point, periods, image, slopes, tally, ok)
       if (.not. ok) return
       do k = 1, size(start)
         slopes(k, k) = slopes(k, k) - 1
@@ -188,7 +187,7 @@ contains
       if (.not. ok) return
       if (norm2(step/sizes) > 0.3_wp) step = 0.3_wp*step/norm2(step/sizes)
       point = point + step
-      point = within_stops(machines%centre, point)
+      point = machines%centre%within_stops(point)
       if (norm2(step/sizes) < 1e-8_wp) exit
     end do
     if (.not. norm2(step/sizes) < 1e-6_wp) return

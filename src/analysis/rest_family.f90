@@ -10,7 +10,7 @@ module rest_family
   use multibody, only: joint_elastic, joint_friction, most_joints
   use multibody_state, only: joint_motion, turning_at
   use kinds, only: wp
-  use machine_family, only: machine_neighbourhood, watched_rows
+  use machine_family, only: machine_neighbourhood
   use structure, only: count_joints, mode_number, structure_t
   use text, only: join
   use variations, only: neighbourhood_t
@@ -92,7 +92,7 @@ contains
       along = 0
       along(structure%n + 1) = 1
       call correct_equilibrium(family, own, point, along, ok)
-      rows = watched_rows(structure)
+      rows = structure%watched
       position = sum(rows(1, :)*point%y)
     end subroutine position_of
 

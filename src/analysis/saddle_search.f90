@@ -7,7 +7,6 @@ module saddle_search
   use event_words, only: canonical_word
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: int64, wp
-  use machine_family, only: fly_sections, map_with_variation, nearest_copy, watched_rows, within_stops
   use matrices, only: solve
   use motion_state, only: tally_t
   use multipliers, only: multipliers_of
@@ -50,7 +49,7 @@ contains
   pure real(wp) function section_distance(machine, one, other) result(distance)
     class(hybrid_t), intent(in) :: machine
     real(wp), intent(in) :: one(:), other(:)
-    distance = norm2((nearest_copy(machine, one, other) - other)/machine%size_of)
+    distance = norm2((machine%nearest_copy(one, other) - other)/machine%size_of)
   end function section_distance
 
   !> Distance of a section point to the nearest of an orbit.
@@ -79,7 +78,7 @@ contains
     sides = 0
     do k = 1, saddle%periods
       do i = 1, 2
-        away(:, i) = nearest_copy(machine, points(:, i), saddle%points(:, k)) - saddle%points(:, k)
+        away(:, i) = machine%nearest_copy(points(:, i), saddle%points(:, k)) - saddle%points(:, k)
       end do
       associate (middle => norm2((away(:, 1) + away(:, 2))/machine%size_of))
         if (middle >= nearest) cycle
@@ -105,12 +104,12 @@ contains
     point = start
     length = huge(length)
     do i = 1, most_newton
-      call map_with_variation(machines, point, periods, image, slopes, tally, ok)
+      call machines%centre%map(machines, point, periods, image, slopes, tally, ok)
       if (.not. ok) return
       do k = 1, size(start)
         slopes(k, k) = slopes(k, k) - 1
       end do
-      image = nearest_copy(machines%centre, image, point)
+      image = machines%centre%nearest_copy(image, point)
       call solve(slopes, point - image, step, ok)
       if (.not. ok) return
       before = length
@@ -120,11 +119,11 @@ contains
         return
       end if
       if (length > longest_step) step = step*(longest_step/length)
-      point = within_stops(machines%centre, point + step)
+      point = machines%centre%within_stops(point + step)
       if (length < converged*1e-2_wp .or. (length < converged*1e2_wp .and. length >= 0.1_wp*before)) exit
     end do
     ok = length < converged*1e2_wp
-    if (ok) call saddle_at(machines, nearest_copy(machines%centre, point, 0*point), periods, saddle, ok)
+    if (ok) call saddle_at(machines, machines%centre%nearest_copy(point, 0*point), periods, saddle, ok)
   end subroutine find_saddle
 
   !> Points, multipliers and word of the orbit through a fixed point; not `ok` if it is no saddle, or of a shorter period.
@@ -141,7 +140,7 @@ contains
     n = size(point)
     allocate (saddle%points(n, periods), saddle%matrix(n, n), saddle%unstable(n, periods))
     saddle%periods = periods
-    call map_with_variation(machines, point, periods, image, saddle%matrix, tally, ok)
+    call machines%centre%map(machines, point, periods, image, saddle%matrix, tally, ok)
     if (.not. ok) return
     saddle%multipliers = multipliers_of(saddle%matrix)
     associate (values => saddle%multipliers)
@@ -151,11 +150,11 @@ contains
     if (.not. ok) return
     saddle%points(:, 1) = point
     do k = 1, periods
-      call map_with_variation(machines, saddle%points(:, k), 1, image, slopes(:, :, k), tally, ok)
+      call machines%centre%map(machines, saddle%points(:, k), 1, image, slopes(:, :, k), tally, ok)
       if (.not. ok) return
       words(k) = tally%word
       if (k == periods) exit
-      saddle%points(:, k + 1) = nearest_copy(machines%centre, image, 0*image)
+      saddle%points(:, k + 1) = machines%centre%nearest_copy(image, 0*image)
       ok = section_distance(machines%centre, image, point) > same_orbit
       if (.not. ok) return
     end do
@@ -164,7 +163,7 @@ contains
       saddle%unstable(:, k) = matmul(saddle%unstable(:, 1 + modulo(k, periods)), slopes(:, :, k))
     end do
     saddle%word = canonical_word(words)
-    saddle%watched = matmul(watched_rows(machines%centre), saddle%points)
+    saddle%watched = matmul(machines%centre%watched, saddle%points)
   end subroutine saddle_at
 
   !> Left eigenvector of the one multiplier outside of the unit circle, by a high power of the matrix, all rows of which are along
@@ -192,7 +191,7 @@ contains
     type(tally_t) :: tally
     real(wp) :: image(size(point))
     integer :: mode
-    call fly_sections(machine, point, 1, .true., image, events, mode, tally, moves)
+    call machine%fly_sections(point, 1, .true., image, events, mode, tally, moves)
     if (moves) moves = norm2(machine%slope(mode, 0.0_wp, point)/machine%size_of)*machine%size_of_time() > all_but_at_rest
   end function moves
 

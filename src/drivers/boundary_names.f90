@@ -13,7 +13,7 @@ module boundary_names
   use grid, only: grid_t, point_slice, slice_laws, slice_starts
   use invariant_sets, only: set_t
   use kinds, only: int64, wp
-  use machine_family, only: machine_neighbourhood, starts_of_section
+  use machine_family, only: machine_neighbourhood
   use saddle_search, only: add_saddle, find_saddle, saddle_at, saddle_t
   use session, only: session_t
   use start_label, only: label_not_known
@@ -236,7 +236,7 @@ contains
     integer :: first, i, k, number, width
     logical :: ok, found
     associate (plane_starts => slice_starts(grid, sought_starts, 0))
-      starts = starts_of_section(machines%centre, plane_starts(:2, :))
+      starts = machines%centre%starts_of_section(plane_starts(:2, :))
     end associate
     width = 2 + machines%centre%n
     call session%journal%begin('starts to seek saddles from', int(sought_starts, int64), 0_int64)

@@ -13,7 +13,7 @@ module branches_setup
   use errors, only: error_t, fail
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
-  use machine_family, only: fly_to_section, machine_of_family, starts_of_section
+  use machine_family, only: machine_of_family
   use status, only: exit_bad_case
   use text, only: parse_number, to_text
   use units, only: allowed_units, read_quantity
@@ -144,13 +144,13 @@ contains
       watched(:, i) = spread(i)*(low + (high - low)*modulo(0.5_wp + i*irrational, 1.0_wp))
     end do
     watched(:, starts + near_starts + 1) = [the_case%start%x0, the_case%start%v0]
-    search%starts = starts_of_section(machine, watched(:, :last), spread(:last))
+    search%starts = machine%starts_of_section(watched(:, :last), spread(:last))
     if (last == starts) return
     ! By itself, so that the other coordinates are those of the machine.
-    search%starts(:, last:) = starts_of_section(machine, watched(:, last:))
+    search%starts(:, last:) = machine%starts_of_section(watched(:, last:))
     if (.not. (machine%has_clock .and. modulo(the_case%start%crank_angle, two_pi) > 0)) return
     allocate (own(machine%n))
-    call fly_to_section(machine, [the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], own, events, ok)
+    call machine%fly_to_section([the_case%start%x0, the_case%start%v0, the_case%start%crank_angle], own, events, ok)
     if (ok) search%starts(:, last) = own
   end subroutine set_starts
 

@@ -8,12 +8,13 @@ module one_body
   use contact_flight, only: contact_side
   use contact_law, only: contact_force_slopes, force_on_body, velocity_after_impact
   use effect_law, only: break_away_level
-  use hybrid_machine, only: event_t, hybrid_t
+  use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
   use kinds, only: wp
+  use machine_type, only: section_state_t
   use motion, only: motion_t
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, &
-    event_turning_point, mode_lower_barrier, mode_stick, mode_upper_barrier, state_t
+    event_turning_point, mode_lower_barrier, mode_stick, mode_upper_barrier, state_t, tally_t
   use oscillator, only: holding_force
   implicit none
   private
@@ -33,7 +34,68 @@ module one_body
     procedure :: slope => slope_of_body
     procedure :: guard => guard_of_body
     procedure :: jump => jump_of_body
+    procedure :: begin => begin_body
+    procedure :: go_on => go_on_with_body
+    procedure :: fly_to_section => fly_body_to_section
+    procedure :: fly_sections => fly_body_over_sections
+    procedure :: map => map_of_body
+    procedure :: starts_of_section => starts_of_body
   end type one_body_t
+
+  ! In the submodule `body_sections`: it uses modules that use this one.
+  interface
+    module pure subroutine begin_body(self, point, section, ok)
+      class(one_body_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)
+      type(section_state_t), intent(out) :: section
+      logical, intent(out) :: ok
+    end subroutine begin_body
+
+    module pure subroutine go_on_with_body(self, section, point, ok)
+      class(one_body_t), intent(in) :: self
+      type(section_state_t), intent(inout) :: section
+      real(wp), intent(out) :: point(:)
+      logical, intent(out) :: ok
+    end subroutine go_on_with_body
+
+    module pure subroutine fly_body_to_section(self, start, point, events, ok)
+      class(one_body_t), intent(in) :: self
+      real(wp), intent(in) :: start(:)
+      real(wp), intent(out) :: point(:)
+      type(event_t), allocatable, intent(out) :: events(:)
+      logical, intent(out) :: ok
+    end subroutine fly_body_to_section
+
+    module pure subroutine fly_body_over_sections(self, point, sections, collapsed, image, events, mode, tally, ok)
+      class(one_body_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)
+      integer, intent(in) :: sections
+      logical, intent(in) :: collapsed
+      real(wp), intent(out) :: image(:)
+      type(event_t), allocatable, intent(out) :: events(:)
+      integer, intent(out) :: mode
+      type(tally_t), intent(out) :: tally
+      logical, intent(out) :: ok
+    end subroutine fly_body_over_sections
+
+    module pure subroutine map_of_body(self, machines, point, sections, image, by_start, tally, ok, by_parameter)
+      class(one_body_t), intent(in) :: self
+      type(neighbourhood_t), intent(in) :: machines
+      real(wp), intent(in) :: point(:)
+      integer, intent(in) :: sections
+      real(wp), intent(out) :: image(:), by_start(:, :)
+      type(tally_t), intent(out) :: tally
+      logical, intent(out) :: ok
+      real(wp), intent(out), optional :: by_parameter(:)
+    end subroutine map_of_body
+
+    module pure function starts_of_body(self, watched, spread) result(points)
+      class(one_body_t), intent(in) :: self
+      real(wp), intent(in) :: watched(:, :)
+      real(wp), intent(in), optional :: spread(:)
+      real(wp) :: points(self%n, size(watched, 2))
+    end function starts_of_body
+  end interface
 
 contains
 
@@ -66,6 +128,10 @@ contains
     body%moving = moving
     body%n = 2
     body%period = moving%machine%period
+    body%turn = moving%machine%turn
+    body%lower = moving%machine%contact%lower
+    body%upper = moving%machine%contact%upper
+    body%watched = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
     body%size_of = size_of_x*[1.0_wp, moving%machine%drive_frequency]
     body%step_of = body%size_of
     associate (law => moving%machine%friction)

@@ -7,7 +7,6 @@ module section_slopes
   use body_machine, only: body_machine_t
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
-  use machine_family, only: map_with_variation
   use machine_type, only: machine_t
   use motion_state, only: tally_t
   use multibody_machine, only: multibody_machine_t
@@ -38,7 +37,7 @@ contains
     call varied_machine(moving, scale([1, (size(point) + 2)/2]), machines)
     ok = allocated(machines%centre)
     if (ok) ok = machines%centre%n == size(point)
-    if (ok) call map_with_variation(machines, point, periods, image, slopes, tally, ok)
+    if (ok) call machines%centre%map(machines, point, periods, image, slopes, tally, ok)
     do k = 1, size(point)
       slopes(:, k) = slopes(:, k)*scale(k)/scale(:size(point))
     end do

@@ -5,7 +5,9 @@
 !> `section_directions`), and the extensions of the springs of elastic friction, which are constant while those slide.
 module structure
   use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
-  use hybrid_machine, only: event_t, hybrid_t
+  use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
+  use machine_type, only: section_state_t
+  use motion_state, only: tally_t
   use multibody, only: joint_contact, joint_elastic, joint_section, multibody_t, most_joints
   use multibody_flows, only: multibody_motion_t
   use multibody_section, only: lay_out
@@ -22,18 +24,77 @@ module structure
 
   type, extends(hybrid_t), public :: structure_t
     type(frame_t) :: frame
-    !> Rows that give position [m] and speed [m/s] of what is watched.
-    real(wp), allocatable :: watched(:, :)
   contains
     procedure :: rests => structure_rests
     procedure :: fly => fly_structure
     procedure :: slope => slope_of_structure
     procedure :: guard => guard_of_structure
     procedure :: jump => jump_of_structure
+    procedure :: begin => begin_structure
+    procedure :: go_on => go_on_with_structure
+    procedure :: fly_to_section => fly_structure_to_section
+    procedure :: fly_sections => fly_structure_over_sections
+    procedure :: map => map_of_structure
+    procedure :: starts_of_section => starts_of_structure
   end type structure_t
 
   !> Phases run from -2 to 2: digits of the number of a mode.
   integer, parameter :: digits_of_phase = 5
+
+  ! In the submodule `structure_sections`: it uses modules that use this one.
+  interface
+    module pure subroutine begin_structure(self, point, section, ok)
+      class(structure_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)
+      type(section_state_t), intent(out) :: section
+      logical, intent(out) :: ok
+    end subroutine begin_structure
+
+    module pure subroutine go_on_with_structure(self, section, point, ok)
+      class(structure_t), intent(in) :: self
+      type(section_state_t), intent(inout) :: section
+      real(wp), intent(out) :: point(:)
+      logical, intent(out) :: ok
+    end subroutine go_on_with_structure
+
+    module pure subroutine fly_structure_to_section(self, start, point, events, ok)
+      class(structure_t), intent(in) :: self
+      real(wp), intent(in) :: start(:)
+      real(wp), intent(out) :: point(:)
+      type(event_t), allocatable, intent(out) :: events(:)
+      logical, intent(out) :: ok
+    end subroutine fly_structure_to_section
+
+    module pure subroutine fly_structure_over_sections(self, point, sections, collapsed, image, events, mode, tally, ok)
+      class(structure_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)
+      integer, intent(in) :: sections
+      logical, intent(in) :: collapsed
+      real(wp), intent(out) :: image(:)
+      type(event_t), allocatable, intent(out) :: events(:)
+      integer, intent(out) :: mode
+      type(tally_t), intent(out) :: tally
+      logical, intent(out) :: ok
+    end subroutine fly_structure_over_sections
+
+    module pure subroutine map_of_structure(self, machines, point, sections, image, by_start, tally, ok, by_parameter)
+      class(structure_t), intent(in) :: self
+      type(neighbourhood_t), intent(in) :: machines
+      real(wp), intent(in) :: point(:)
+      integer, intent(in) :: sections
+      real(wp), intent(out) :: image(:), by_start(:, :)
+      type(tally_t), intent(out) :: tally
+      logical, intent(out) :: ok
+      real(wp), intent(out), optional :: by_parameter(:)
+    end subroutine map_of_structure
+
+    module pure function starts_of_structure(self, watched, spread) result(points)
+      class(structure_t), intent(in) :: self
+      real(wp), intent(in) :: watched(:, :)
+      real(wp), intent(in), optional :: spread(:)
+      real(wp) :: points(self%n, size(watched, 2))
+    end function starts_of_structure
+  end interface
 
 contains
 

@@ -21,13 +21,13 @@ module structure_family
   use motion_state, only: flight_adaptive, tally_t
   use status, only: exit_bad_case
   use structure, only: count_joints, phases_in, structure_of, structure_t
-  use structure_walk, only: fly_structure
+  use structure_walk, only: fly_structure_on
   use timed_actions, only: acts_on_time
   use variations, only: neighbourhood_t, period_slope, vary
   implicit none
   private
 
-  public :: structure_of_family, structure_neighbourhood, map_of_structure, why_not_varied, vary_section, state_at_start, &
+  public :: structure_of_family, structure_neighbourhood, map_of_family, why_not_varied, vary_section, state_at_start, &
     least_dimension
 
 contains
@@ -141,7 +141,7 @@ contains
   end subroutine structure_neighbourhood
 
   !> Image of a section point after so many sections, its derivatives by the point (and by the parameter).
-  pure subroutine map_of_structure(machines, point, sections, image, by_start, tally, ok, by_parameter)
+  pure subroutine map_of_family(machines, point, sections, image, by_start, tally, ok, by_parameter)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: sections
@@ -158,12 +158,12 @@ contains
     ok = .false.
     select type (structure => machines%centre)
     type is (structure_t)
-      call fly_structure(structure, point, sections, image, events, mode, tally, ok, certain)
+      call fly_structure_on(structure, point, sections, image, events, mode, tally, ok, certain)
       ok = ok .and. certain
       if (.not. ok) return
       call vary_section(machines, structure, mode, point, events, sections, image, by_start, ok, by_parameter)
     end select
-  end subroutine map_of_structure
+  end subroutine map_of_family
 
   !> Directions that a motion leaves of its start: a joint that sticks takes one, a closed contact two, a slider one, an impact
   !> without rebound one, an event section one.

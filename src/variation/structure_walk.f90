@@ -19,7 +19,7 @@ module structure_walk
   implicit none
   private
 
-  public :: start_of_structure, advance_to_section, advance_section, fly_structure
+  public :: start_of_structure, advance_to_section, advance_section, fly_structure_on
 
   !> A section point as near as this, in natural sizes, to what a joint holds is held.
   real(wp), parameter :: held_within = 1e-10_wp
@@ -171,7 +171,7 @@ contains
   !> Flies a structure from a section point over so many sections: where it then is, the mode in which it began, and the events on
   !> the way, those of an event section too. `ok` is false if the trajectory had to be given up; `certain` is false where
   !> transitions were not of one guard alone.
-  pure subroutine fly_structure(structure, point, sections, image, events, mode, tally, ok, certain)
+  pure subroutine fly_structure_on(structure, point, sections, image, events, mode, tally, ok, certain)
     type(structure_t), intent(in) :: structure
     real(wp), intent(in) :: point(:)
     integer, intent(in) :: sections
@@ -207,6 +207,6 @@ contains
     if (ok) image = coordinates_of(structure, state)
     events = events(:count_events)
     if (present(certain)) certain = smooth
-  end subroutine fly_structure
+  end subroutine fly_structure_on
 
 end module structure_walk

@@ -6,14 +6,14 @@
 !> how much later it comes, and behind it dy+ = R_y (dy + f dt) + R_t dt + R_p - f+ dt (Aizerman and Gantmakher 1958; di
 !> Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, section 2.5).
 module variations
-  use hybrid_machine, only: event_t, hybrid_t
+  use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
   use kinds, only: wp
   use matrices, only: determinant_of
   use motion_state, only: event_stick
   implicit none
   private
 
-  public :: vary, vary_beside_graze, join_parts, by_difference, period_slope, stencil_offset
+  public :: neighbourhood_t, vary, vary_beside_graze, join_parts, by_difference, period_slope, stencil_offset
 
   !> Where the machines next to one are, in steps of the parameter, and what their results weigh in the derivative, times the
   !> step: central, or one-sided where the parameter can go no further. Of fourth order.
@@ -25,14 +25,6 @@ module variations
 
   !> Rates of a state that differ by no more, in natural sizes, do so by rounding.
   real(wp), parameter :: nothing = 1e-11_wp
-
-  !> A machine and, for derivatives by a parameter, its four neighbours.
-  type, public :: neighbourhood_t
-    class(hybrid_t), allocatable :: centre, near(:)
-    !> Distance of the neighbours in the parameter; `side` -1, 0 or 1: which stencil they make.
-    real(wp) :: step = 1
-    integer :: side = 0
-  end type neighbourhood_t
 
   !> Derivative of a map one of whose events is met all but tangentially, at the `rate` of its guard: base - column row/rate.
   type, public :: split_t
