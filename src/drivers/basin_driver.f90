@@ -14,7 +14,7 @@ module basin_driver
   use endings, only: assess_reasons, report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
-  use point_columns, only: marks_of_attractor, point_values
+  use point_columns, only: bytes_of_point, marks_of_attractor, point_values
   use sample_shares, only: add_sample_shares, add_samples, share_with_interval
   use grid, only: grid_t, two_axes
   use journal, only: json_text
@@ -38,9 +38,8 @@ module basin_driver
 
   public :: run_basin, prepare_basin, describe_basin, end_basin
 
-  !> Bytes of a point in the working file.
-  integer, parameter, public :: bytes_per_point = 1 + 4 + 1 + 2 + 8 + 8*4
-  integer, parameter :: bytes_per_refined_point = 1 + 4 + 1 + 2 + 8 + 1
+  !> Bytes of the origin of a point of a refined map.
+  integer, parameter :: bytes_of_origin = 1
   !> Slices up to which a dry run builds the catalogues.
   integer, parameter :: most_dry_slices = 16
 
@@ -187,15 +186,17 @@ contains
     integer, intent(in) :: tile(:)
     type(error_t), allocatable :: error
     real(wp) :: seconds, share
+    integer :: bytes
     if (work%refine%active) then
       call pilot_share(work, work%grid%shape, seconds, share, error)
       call session%stop_if(error)
-      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_refined_point, seconds))
+      bytes = bytes_of_point(marks_of_attractor) + bytes_of_origin
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes, seconds))
       call session%journal%line('plan', 'about '//to_text(100*share, 2)//' % of the points computed (from a few blocks)')
     else
       call pilot_seconds(work, work%grid%shape, seconds, error)
       call session%stop_if(error)
-      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_per_point, seconds))
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_of_point(point_values), seconds))
     end if
     call session%end_with(exit_done)
   end subroutine report_plan

@@ -8,7 +8,7 @@ module basin_work
   use errors, only: error_t
   use grid, only: grid_t, point_slice, slice_period
   use kinds, only: int64, wp
-  use point_columns, only: marks_of_attractor, settling_value
+  use point_columns, only: at_attractor, at_origin, at_reason, at_regime, at_settle_time, marks_of_attractor
   use point_work, only: point_work_t, watch_t
   use refinement, only: last_origin
   use session, only: session_t
@@ -95,12 +95,12 @@ contains
     marks = values(:, :marks_of_attractor)
     settling = 0
     do i = 1, size(settling)
-      if (nint(values(i, 3)) /= reason_settled) cycle
+      if (nint(values(i, at_reason)) /= reason_settled) cycle
       slice = point_slice(self%grid, index(:, i))
       if (slice /= self%period_slice) call slice_period(self%grid, slice, self%period, error)
       if (allocated(error)) return
       self%period_slice = slice
-      settling(i) = values(i, settling_value)/self%period
+      settling(i) = values(i, at_settle_time)/self%period
     end do
   end subroutine distinguish_basin_points
 
@@ -110,12 +110,12 @@ contains
     real(wp), intent(in) :: values(:)
     integer(int64) :: slice
     integer :: k
-    associate (regime => nint(values(1)), label => nint(values(2)), reason => nint(values(3)))
+    associate (regime => nint(values(at_regime)), label => nint(values(at_attractor)), reason => nint(values(at_reason)))
       self%regimes(regime) = self%regimes(regime) + 1
       self%reasons(reason) = self%reasons(reason) + 1
       if (needs_label(values)) self%unlabelled = self%unlabelled + 1
       if (self%refine%active) then
-        associate (origin => nint(values(marks_of_attractor + 1)))
+        associate (origin => nint(values(at_origin)))
           self%origins(origin) = self%origins(origin) + 1
         end associate
       end if
@@ -135,13 +135,13 @@ contains
     real(wp), intent(in) :: values(:)
     associate (unused => self)
     end associate
-    basin_point_stands = nint(values(3)) /= reason_time_over
+    basin_point_stands = nint(values(at_reason)) /= reason_time_over
   end function basin_point_stands
 
   !> Whether a point of these values ran to its end and no attractor is known for it.
   pure logical function needs_label(values)
     real(wp), intent(in) :: values(:)
-    needs_label = nint(values(2)) == 0 .and. nint(values(3)) == reason_time_over
+    needs_label = nint(values(at_attractor)) == 0 .and. nint(values(at_reason)) == reason_time_over
   end function needs_label
 
   subroutine sum_counts(session, work)

@@ -8,6 +8,8 @@ module map_invariants
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use map_reader, only: reader_t
+  use point_columns, only: at_amplitude, at_attractor, at_impacts, at_reason, at_regime, at_x_max, at_x_min, point_table, &
+    point_values
   use slabs, only: slab, slab_count
   use status, only: last_reason, exit_io, reason_names, reason_not_run, reason_settled, reason_time_over
   use text, only: to_text
@@ -44,8 +46,7 @@ contains
     character(len=*), intent(in) :: prefix
     integer(int64), intent(inout) :: points
     type(error_t), allocatable, intent(out) :: error
-    character(len=*), parameter :: names(7) = [character(len=18) :: 'regime', 'reason', 'attractor', &
-      'impacts_per_period', 'amplitude', 'x_max', 'x_min']
+    integer, parameter :: needed(7) = [at_regime, at_reason, at_attractor, at_impacts, at_amplitude, at_x_max, at_x_min]
     integer :: known
     integer(int64), allocatable :: lengths(:), lower(:), extent(:)
     real(wp), allocatable :: column(:), block(:, :)
@@ -62,20 +63,20 @@ contains
     if (allocated(error)) return
     allocate (lower(size(lengths)), extent(size(lengths)))
     ! A refined map has no more.
-    known = merge(3, size(names), reader%has('/origin'))
+    known = merge(3, size(needed), reader%has('/origin'))
     do k = 1, slab_count(lengths)
       call slab(lengths, k, lower, extent)
       if (allocated(block)) deallocate (block)
-      allocate (block(product(extent), known))
+      allocate (block(product(extent), point_values))
       do i = 1, known
-        call reader%read_block('/'//prefix//trim(names(i)), lower, extent, column, error)
+        call reader%read_block('/'//prefix//trim(point_table(needed(i))%name), lower, extent, column, error)
         if (allocated(error)) return
-        block(:, i) = column
+        block(:, needed(i)) = column
       end do
       do i = 1, size(block, 1)
-        call check_point(reader%path, points + i - 1, block(i, :), error)
-        if (.not. allocated(error)) call check_label(reader%path, points + i - 1, nint(block(i, 1)), nint(block(i, 3)), &
-                                                     catalogue, error)
+        call check_point(reader%path, points + i - 1, block(i, :), known == size(needed), error)
+        if (.not. allocated(error)) call check_label(reader%path, points + i - 1, nint(block(i, at_regime)), &
+                                                     nint(block(i, at_attractor)), catalogue, error)
         if (allocated(error)) return
       end do
       points = points + size(block, 1)
@@ -95,15 +96,16 @@ contains
               ' with the label of attractor '//to_text(label)//', which has no such regime in the catalogue')
   end subroutine check_label
 
-  !> One point: regime, reason, attractor, and unless the map is refined impacts per period, amplitude, x_max, x_min.
-  subroutine check_point(path, number, values, error)
+  !> One point: regime, reason, attractor, and with `described` impacts per period, amplitude, x_max, x_min.
+  subroutine check_point(path, number, values, described, error)
     character(len=*), intent(in) :: path
     integer(int64), intent(in) :: number
     real(wp), intent(in) :: values(:)
+    logical, intent(in) :: described
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: problem
     problem = ''
-    associate (regime => nint(values(1)), reason => nint(values(2)), attractor => nint(values(3)))
+    associate (regime => nint(values(at_regime)), reason => nint(values(at_reason)), attractor => nint(values(at_attractor)))
       if (reason <= reason_not_run .or. reason > last_reason) then
         problem = 'reason code '//to_text(reason)
       else if (regime < 0 .or. regime > last_regime) then
@@ -112,8 +114,8 @@ contains
         problem = 'regime '//trim(regime_names(regime))//' with reason '//trim(reason_names(reason))
       else if (attractor /= 0 .and. regime == regime_unresolved) then
         problem = 'an attractor without a regime'
-      else if (size(values) == 7) then
-        problem = problem_of_motion(regime, values(4), values(5), values(6), values(7))
+      else if (described) then
+        problem = problem_of_motion(regime, values(at_impacts), values(at_amplitude), values(at_x_max), values(at_x_min))
       end if
     end associate
     if (len(problem) > 0) call fail(error, exit_io, "'"//path//"', point "//to_text(number)//': '//problem)

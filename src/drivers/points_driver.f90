@@ -35,10 +35,8 @@ module points_driver
   public :: run_points, open_list_ensemble, read_list, read_further, describe_list, end_points
 
   integer, parameter, public :: points_per_tile = 256
-  !> Starts, final state, impacts, last impact speed, regime, reason.
-  integer, parameter :: bytes_per_point = 6*8 + 4 + 2
-  !> x, v, impacts, last impact speed, regime, reason.
-  integer, parameter :: point_variables = 6
+  !> Columns of a point.
+  integer, parameter :: at_x = 1, at_v = 2, at_impacts = 3, at_impact_speed = 4, at_regime = 5, at_reason = 6, point_variables = 6
   !> Attribute that names the starts of further bodies.
   character(len=*), parameter :: further_starts = 'further_starts'
 
@@ -66,7 +64,7 @@ contains
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
     real(wp) :: seconds
-    integer :: points
+    integer :: points, bytes
     logical :: complete
     call open_session(command, session)
     work%variables = point_variables
@@ -88,7 +86,9 @@ contains
     if (command%dry_run) then
       call pilot_seconds(work, [size(work%list%x0)], seconds, error)
       call session%stop_if(error)
-      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], bytes_per_point, seconds))
+      call describe_points(work%list, schema)
+      bytes = int(schema%bytes()/size(work%list%x0) + schema%bytes_of_point())
+      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], bytes, seconds))
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.true.)
@@ -314,8 +314,12 @@ contains
     if (allocated(error) .or. .not. whole) return
     do i = 1, size(points)
       associate (outcome => outcomes(i))
-        values(i, :) = [outcome%x, outcome%v, real(outcome%impacts, wp), outcome%last_impact_speed, &
-                        real(outcome%features%regime, wp), real(outcome%reason, wp)]
+        values(i, at_x) = outcome%x
+        values(i, at_v) = outcome%v
+        values(i, at_impacts) = real(outcome%impacts, wp)
+        values(i, at_impact_speed) = outcome%last_impact_speed
+        values(i, at_regime) = outcome%features%regime
+        values(i, at_reason) = outcome%reason
       end associate
     end do
   end subroutine run_block
@@ -324,7 +328,7 @@ contains
     class(list_work_t), intent(inout) :: self
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    associate (unused => index, reason => nint(values(6)))
+    associate (unused => index, reason => nint(values(at_reason)))
       self%reasons(reason) = self%reasons(reason) + 1
     end associate
   end subroutine note_list_point

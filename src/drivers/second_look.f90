@@ -20,6 +20,7 @@ module second_look
   use map_record, only: add_record, read_record, rows_of, write_row
   use map_schema, only: schema_t
   use match, only: carry_labels, number_new
+  use point_columns, only: at_reason
   use random, only: uniform
   use restoring_law, only: position_is_angle
   use session, only: session_t
@@ -310,7 +311,7 @@ contains
     do tile = 1 + session%team%rank(), file%tile_count(), session%team%size()
       call file%read_tile(tile, values, error)
       call session%abort_if(error)
-      open_points(tile) = count(nint(values(:, 3)) == reason_time_over)
+      open_points(tile) = count(nint(values(:, at_reason)) == reason_time_over)
     end do
     call session%team%sum(open_points)
     file%done = open_points == 0

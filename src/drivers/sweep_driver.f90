@@ -5,7 +5,6 @@
 module sweep_driver
   use attractors, only: longest_period
   use axis, only: axis_t, linear_values
-  use basin_driver, only: bytes_per_point
   use basin, only: basin_points, catalogue_t, points_at_a_time, slice_cache_t
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of
@@ -22,7 +21,7 @@ module sweep_driver
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
-  use point_columns, only: point_values
+  use point_columns, only: at_impacts, at_reason, bytes_of_point, point_values
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use sweep, only: hold_parameter, hold_t
@@ -149,7 +148,7 @@ contains
         call pilot_seconds(work, [size(values), product(sweep%starts)], seconds, error)
         call session%stop_if(error)
         plan = plan//'; many starts: '//plan_text([size(values), product(sweep%starts)], [1, product(sweep%starts)], &
-                                                  bytes_per_point, seconds)
+                                                  bytes_of_point(point_values), seconds)
       else
         plan = plan//'; no many starts'
       end if
@@ -279,10 +278,10 @@ contains
     class(branch_work_t), intent(inout) :: self
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    associate (reason => nint(values(3)), subscripts => index(1))
+    associate (reason => nint(values(at_reason)), subscripts => index(1))
       self%reasons(reason) = self%reasons(reason) + 1
       if (reason /= reason_settled .and. reason /= reason_time_over) return
-      if (values(6) > 0) then
+      if (values(at_impacts) > 0) then
         self%impacting(subscripts) = self%impacting(subscripts) + 1
       else
         self%free(subscripts) = self%free(subscripts) + 1

@@ -23,7 +23,7 @@ module verify_driver
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
-  use point_columns, only: point_table, point_values
+  use point_columns, only: at_attractor, at_reason, at_regime, marks_of_attractor, point_table, point_values
   use reference, only: run_reference
   use refinement, only: origin_contradicted
   use restoring_law, only: position_is_angle
@@ -217,8 +217,8 @@ contains
       call reader%read_block('/'//prefix//trim(point_table(k)%name), subscripts, spread(1_int64, 1, size(subscripts)), stored, &
         error)
       if (allocated(error)) return
-      if (k <= 5) same = nint(stored(1), int64) == nint(values(k), int64)
-      if (k > 5) same = real(stored(1), real32) == real(values(k), real32) &
+      if (k <= marks_of_attractor) same = nint(stored(1), int64) == nint(values(k), int64)
+      if (k > marks_of_attractor) same = real(stored(1), real32) == real(values(k), real32) &
                         .or. (stored(1) /= stored(1) .and. values(k) /= values(k))
       if (same) cycle
       if (inferred) then
@@ -267,11 +267,11 @@ contains
     call run_reference(point_laws(grid, index), grid%options, whole%span, own%attractors, start(:3, :), results, error)
     if (allocated(error)) return
     if (size(catalogues) > 0) then
-      if (nint(results(2, 1)) /= nint(values(2))) audit%flips = audit%flips + 1
-    else if (nint(results(3, 1)) /= nint(values(1))) then
+      if (nint(results(2, 1)) /= nint(values(at_attractor))) audit%flips = audit%flips + 1
+    else if (nint(results(3, 1)) /= nint(values(at_regime))) then
       audit%flips = audit%flips + 1
     end if
-    if (nint(values(3)) == reason_settled) call note_deviation(outcome(1), results(:, 1), audit)
+    if (nint(values(at_reason)) == reason_settled) call note_deviation(outcome(1), results(:, 1), audit)
   end subroutine compare_with_reference
 
   subroutine report(command, kind, datasets, points, audit)

@@ -68,6 +68,7 @@ module map_schema
     procedure :: append
     procedure :: length_of
     procedure :: bytes
+    procedure :: bytes_of_point
     procedure :: lengths_of
     procedure :: find_text_attribute
   end type schema_t
@@ -194,6 +195,16 @@ contains
       end associate
     end do
   end function bytes
+
+  !> Bytes of one point of the variables that are written tile by tile.
+  pure integer(int64) function bytes_of_point(self) result(bytes)
+    class(schema_t), intent(in) :: self
+    integer :: i
+    bytes = 0
+    do i = 1, size(self%variables)
+      if (self%variables(i)%tiled) bytes = bytes + bytes_of(self%variables(i)%type)
+    end do
+  end function bytes_of_point
 
   !> The length of a dimension; -1 if there is none of this name.
   pure integer(int64) function length_of(self, name)

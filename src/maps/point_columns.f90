@@ -10,7 +10,7 @@ module point_columns
   implicit none
   private
 
-  public :: outcome_values, margin_or_infinite
+  public :: outcome_values, margin_or_infinite, bytes_of_point
 
   type, public :: point_column_t
     character(len=18) :: name
@@ -36,8 +36,12 @@ module point_columns
     point_column_t('settle_time', 'float32', 's', 'time from the start to capture by the attractor'), &
     point_column_t('grazing_margin', 'float32', 'm', 'smallest distance to a barrier at a turning point that missed it')]
 
-  !> How many there are; how many of them are marks of the attractor, which distinguish points; where the settling time is.
-  integer, parameter, public :: point_values = size(point_table), marks_of_attractor = 5, settling_value = 12
+  !> How many there are; how many of them are marks of the attractor, which distinguish points.
+  integer, parameter, public :: point_values = size(point_table), marks_of_attractor = 5
+  !> Their columns. In a refined map the marks are followed by the origin of a point.
+  integer, parameter, public :: at_regime = 1, at_attractor = 2, at_reason = 3, at_period = 4, at_event_word = 5, &
+    at_impacts = 6, at_impact_speed = 7, at_amplitude = 8, at_x_max = 9, at_x_min = 10, at_v_max = 11, at_settle_time = 12, &
+    at_margin = 13, at_origin = marks_of_attractor + 1
 
 contains
 
@@ -45,16 +49,38 @@ contains
   !> infinite where no barrier was missed.
   pure function outcome_values(outcome) result(values)
     type(outcome_t), intent(in) :: outcome
-    real(wp) :: values(point_values), settled, margin
+    real(wp) :: values(point_values)
     associate (f => outcome%features)
-      settled = outcome%settle_time
-      if (settled < 0) settled = ieee_value(1.0_wp, ieee_quiet_nan)
-      margin = margin_or_infinite(f%grazing_margin)
-      values = [real(f%regime, wp), real(outcome%attractor, wp), real(outcome%reason, wp), real(outcome%period, wp), &
-                real(f%word, wp), f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
-                settled, margin]
+      values(at_regime) = f%regime
+      values(at_attractor) = outcome%attractor
+      values(at_reason) = outcome%reason
+      values(at_period) = outcome%period
+      values(at_event_word) = real(f%word, wp)
+      values(at_impacts) = f%impacts_per_period
+      values(at_impact_speed) = f%mean_impact_speed
+      values(at_amplitude) = f%amplitude
+      values(at_x_max) = f%x_max
+      values(at_x_min) = f%x_min
+      values(at_v_max) = f%v_max
+      values(at_settle_time) = outcome%settle_time
+      if (outcome%settle_time < 0) values(at_settle_time) = ieee_value(1.0_wp, ieee_quiet_nan)
+      values(at_margin) = margin_or_infinite(f%grazing_margin)
     end associate
   end function outcome_values
+
+  !> Bytes in a file of the first `columns` values of a point.
+  pure integer function bytes_of_point(columns) result(bytes)
+    integer, intent(in) :: columns
+    character(len=len(point_table%type)) :: type
+    integer :: k, bits
+    bytes = 0
+    do k = 1, columns
+      type = point_table(k)%type
+      type = type(scan(type, '0123456789'):)
+      read (type, *) bits
+      bytes = bytes + bits/8
+    end do
+  end function bytes_of_point
 
   !> The smallest distance to a barrier; infinite where no turning point missed one.
   elemental real(wp) function margin_or_infinite(margin)
