@@ -56,7 +56,7 @@ module edge_state
   end type labeller_t
 
   !> Two motions, one on either side of a boundary: section points (columns), or, before the first section, starts as
-  !> `start_section` has them.
+  !> `machine_t` has them.
   type :: pair_t
     real(wp), allocatable :: points(:, :)
     logical :: on_section = .false.
@@ -224,8 +224,7 @@ contains
       label = label_not_known
       if (ok) label = label_from(labeller%moving, labeller%catalogue, labeller%span, section)
     else
-      call run_trajectory(labeller%moving, labeller%catalogue, labeller%span, point(1), point(2), point(3), outcome, &
-                          others=point(4:))
+      call run_trajectory(labeller%moving, labeller%catalogue, labeller%span, point, outcome)
       label = label_of(outcome)
     end if
   end function label_at

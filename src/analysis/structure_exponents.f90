@@ -35,7 +35,7 @@ module structure_exponents
 
 contains
 
-  !> Exponents of the motion of a machine, of whatever kind, from `start` (see `start_section`): those of module `exponents` for
+  !> Exponents of the motion of a machine, of whatever kind, from `start` (see `machine_t`): those of module `exponents` for
   !> one body.
   subroutine exponents_of_machine(machines, start, transient, sections, spectrum, series)
     type(neighbourhood_t), intent(in) :: machines

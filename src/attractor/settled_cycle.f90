@@ -42,7 +42,7 @@ contains
     call discover_attractors(searching, patience, reshape(start, [3, 1]), most_periods, own, within_span=.true.)
     if (size(own) == 0) return
     call sort_attractors(own)
-    call run_trajectory(moving, own, span, start(1), start(2), start(3), again)
+    call run_trajectory(moving, own, span, start, again)
     if (again%reason /= reason_settled) return
     cycle = own(again%attractor)
     if (cycle%kind == kind_cycle .or. (cycle%kind == kind_rest .and. .not. cycle%rests)) outcome%window = cycle%features

@@ -68,22 +68,16 @@ module single_trajectory
 
 contains
 
-  !> Runs from `x` [m], `v` [m/s], crank at `crank_angle` [rad]; `others`: see `start_section`. With `log` every event and
-  !> sample of the duration is written down.
-  pure subroutine run_trajectory(moving, catalogue, span, x, v, crank_angle, outcome, log, others)
+  !> Runs from a start, see `machine_t`. With `log` every event and sample of the duration is written down.
+  pure subroutine run_trajectory(moving, catalogue, span, start, outcome, log)
     class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: catalogue(:)
     type(span_t), intent(in) :: span
-    real(wp), intent(in) :: x, v, crank_angle
+    real(wp), intent(in) :: start(:)
     type(outcome_t), intent(out) :: outcome
     type(log_t), intent(inout), optional :: log
-    real(wp), intent(in), optional :: others(:)
     type(trajectory_state_t) :: trajectory
-    if (present(others)) then
-      call begin_trajectory(moving, span, [x, v, crank_angle, others], trajectory)
-    else
-      call begin_trajectory(moving, span, [x, v, crank_angle], trajectory)
-    end if
+    call begin_trajectory(moving, span, start, trajectory)
     call continue_trajectory(moving, catalogue, span, trajectory, outcome, log)
   end subroutine run_trajectory
 
@@ -157,7 +151,7 @@ contains
     call moving%record_end(trajectory, log%sample_interval > 0 .and. trajectory%elapsed >= span%duration, log)
   end subroutine end_record
 
-  !> The trajectory of a body from `start` (see `start_section`).
+  !> The trajectory of a body from `start` (see `machine_t`).
   pure subroutine begin_trajectory(moving, span, start, trajectory)
     class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span

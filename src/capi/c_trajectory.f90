@@ -131,7 +131,7 @@ contains
     span = prepared%ensemble%span
     associate (moving => prepared%ensemble%moving)
       call fit_window(moving%period, span)
-      call run_trajectory(moving, no_catalogue, span, start(1), start(2), start(3), outcome, log)
+      call run_trajectory(moving, no_catalogue, span, start, outcome, log)
       if (.not. another_duration) then
         call describe_cycle(moving, span_of(the_case), span, the_case%attractors%max_period, start, outcome, cycle)
         summary(26) = cycle%period

@@ -117,8 +117,8 @@ contains
     allocate (run%motion(2*n, size(times)))
     if (all(ieee_is_finite(start))) then
       associate (watched => moving%machine%watched)
-        state = start_of_multibody(moving, start(watched), start(n + watched), start(2*n + 1), &
-                                 reshape(transpose(reshape(start(:2*n), [n, 2])), [2*n]))
+        state = start_of_multibody(moving, [start(watched), start(n + watched), start(2*n + 1), &
+                                            reshape(transpose(reshape(start(:2*n), [n, 2])), [2*n])])
       end associate
       if (.not. ieee_is_finite(state%q(1))) run%reason = exit_bad_case
       call let_slide(moving, state)

@@ -140,7 +140,7 @@ contains
     class(multibody_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
     type(section_state_t) :: section
-    section%multibody = start_of_multibody(self%bodies, values(1), values(2), values(3), values(4:))
+    section%multibody = start_of_multibody(self%bodies, values)
     section%state = watched_state(self%bodies%machine, section%multibody)
   end function start
 

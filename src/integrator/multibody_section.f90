@@ -88,25 +88,22 @@ contains
     keeps_clear = .true.
   end function keeps_clear
 
-  !> A state with the watched position at `x` [m], `v` [m/s], what does not follow it as in the machine, and the drive at `angle`
-  !> [rad]. `others`, if it is not empty, has position and velocity of every coordinate in place of those of the machine. A state
-  !> that no mode fits, or that lies beyond a stop, is not a number.
-  pure function start_of_multibody(moving, x, v, angle, others) result(state)
+  !> A state with the watched position [m], its velocity [m/s] and the angle of the drive [rad] in `values`; what does not follow
+  !> it as in the machine, or as the position and velocity of every coordinate that follow in `values`. A state that no mode fits,
+  !> or that lies beyond a stop, is not a number.
+  pure function start_of_multibody(moving, values) result(state)
     type(multibody_motion_t), intent(in) :: moving
-    real(wp), intent(in) :: x, v, angle
-    real(wp), intent(in), optional :: others(:)
+    real(wp), intent(in) :: values(:)
     type(multibody_state_t) :: state
     real(wp) :: start(2, moving%machine%n)
     logical :: ok
     associate (machine => moving%machine)
       start = machine%start
-      if (present(others)) then
-        if (size(others) > 0) start = reshape(others, [2, machine%n])
-      end if
-      start(1, :) = start(1, :) + machine%start_shape(:, 1)*(x - start(1, machine%watched))
-      start(2, :) = start(2, :) + machine%start_shape(:, 2)*(v - start(2, machine%watched))
+      if (size(values) > 3) start = reshape(values(4:), [2, machine%n])
+      start(1, :) = start(1, :) + machine%start_shape(:, 1)*(values(1) - start(1, machine%watched))
+      start(2, :) = start(2, :) + machine%start_shape(:, 2)*(values(2) - start(2, machine%watched))
     end associate
-    call start_multibody(moving, start(1, :), start(2, :), angle, state, ok)
+    call start_multibody(moving, start(1, :), start(2, :), values(3), state, ok)
     if (ok) ok = is_allowed(moving, start(1, :), state%time)
     if (.not. ok) state%q = ieee_value(1.0_wp, ieee_quiet_nan)
   end function start_of_multibody

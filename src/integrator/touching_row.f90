@@ -26,7 +26,7 @@ contains
     names = ''
     associate (machine => moving%machine)
       if (machine%together /= together_newton) return
-      state = start_of_multibody(moving, start(1), start(2), start(3))
+      state = start_of_multibody(moving, start)
       do j = 1, size(machine%joints)
         if (.not. rebounds(machine, j) .or. (state%phase(j) == 0 .and. state%left(j) == 0)) cycle
         if (.not. any([(rebounds(machine, i) .and. i /= j .and. yields_with(machine, j, i), i=1, size(machine%joints))])) cycle

@@ -221,7 +221,7 @@ contains
       start = point_start(grid, index(:, members(i)))
       if (allocated(own)) deallocate (own)
       call discover_attractors(ensemble%moving, ensemble%span, reshape(start, [size(start), 1]), max_period, own)
-      call run_trajectory(ensemble%moving, own, ensemble%span, start(1), start(2), start(3), outcome, others=start(4:))
+      call run_trajectory(ensemble%moving, own, ensemble%span, start, outcome)
       values(members(i), :) = outcome_values(outcome)
     end do
   end subroutine isolated_points

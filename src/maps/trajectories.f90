@@ -80,8 +80,8 @@ contains
     end if
   end subroutine run_on_device
 
-  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start_section` takes; one column each), by this
-  !> processor.
+  !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start` of `machine_t` takes; one column each), by
+  !> this processor.
   pure subroutine run_trajectories(ensemble, catalogue, starts, outcomes)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
@@ -92,8 +92,7 @@ contains
     integer :: i, next
     if (.not. ensemble%flow%available) then
       do i = 1, size(starts, 2)
-        call run_trajectory(ensemble%moving, catalogue, ensemble%span, starts(1, i), starts(2, i), starts(3, i), outcomes(i), &
-                            others=starts(4:, i))
+        call run_trajectory(ensemble%moving, catalogue, ensemble%span, starts(:, i), outcomes(i))
       end do
       return
     end if
@@ -409,8 +408,7 @@ contains
       if (trajectory%phase /= phase_over) return
       if (slot%unseen .and. trajectory%reason == 0 .and. trajectory%converged == 0 .and. ensemble%describe == describe_all) then
         ! It was within a capture neighbourhood when its window began, and left: once more, in the event loop.
-        call run_trajectory(ensemble%moving, catalogue, ensemble%span, start(1), start(2), start(3), outcome, &
-                            others=start(4:))
+        call run_trajectory(ensemble%moving, catalogue, ensemble%span, start, outcome)
       else
         call conclude(ensemble%moving, catalogue, trajectory, outcome)
       end if

@@ -70,8 +70,7 @@ contains
       position = position + nint(packed(position + 1))
     end do
     do i = 1, points
-      call run_trajectory(moving, catalogue, span, real(starts(1, i), wp), real(starts(2, i), wp), &
-                          real(starts(3, i), wp), outcome)
+      call run_trajectory(moving, catalogue, span, real(starts(:, i), wp), outcome)
       results(:, i) = real([real(outcome%reason, wp), real(outcome%attractor, wp), &
                             real(outcome%features%regime, wp), outcome%x, outcome%v, &
                             real(outcome%impacts, wp)], c_double)

@@ -104,11 +104,11 @@ contains
     end if
   end subroutine refuse_two_bodies
 
-  !> The state at a start as `start_section` has it.
+  !> The state at a start of `machine_t`.
   pure type(multibody_state_t) function state_at_start(structure, start) result(state)
     type(structure_t), intent(in) :: structure
     real(wp), intent(in) :: start(:)
-    state = start_of_multibody(structure%frame%moving, start(1), start(2), start(3), start(4:))
+    state = start_of_multibody(structure%frame%moving, start)
   end function state_at_start
 
   !> The structure and its neighbours in the parameter.
