@@ -3,7 +3,7 @@
 
 !> From a case to what the numerics take.
 module case_setup
-  use axis, only: axis_t
+  use axis, only: axis_t, linear_values
   use case_type, only: case_t
   use grid, only: grid_t, make_grid, sample_axis, two_axes
   use kinds, only: int64, wp
@@ -16,7 +16,7 @@ module case_setup
   implicit none
   private
 
-  public :: options_of, span_of, grid_of, output_path, points_of_tile, automatic_tile, tile_of_blocks
+  public :: options_of, span_of, grid_of, output_path, points_of_tile, automatic_tile, sweep_axes, tile_of_blocks
 
   !> Doubles per vector, to try a narrower kernel than the processor allows (2, 4, 8). The results are the same.
   character(len=*), parameter :: width_variable = 'SEPARATRIX_LANE_WIDTH'
@@ -152,5 +152,16 @@ contains
     tile(axes) = (tile(axes) + refine%block - 1)/refine%block*refine%block
     tile = min(tile, grid%shape)
   end function tile_of_blocks
+
+  !> The axes of the many starts: the swept parameter, x0, v0.
+  function sweep_axes(the_case) result(axes)
+    type(case_t), intent(in) :: the_case
+    type(axis_t) :: axes(3)
+    associate (sweep => the_case%sweep)
+      axes(1) = sweep%swept
+      axes(2) = axis_t('x0', 'm', linear_values(sweep%x0(1), sweep%x0(2), sweep%starts(1)))
+      axes(3) = axis_t('v0', 'm/s', linear_values(sweep%v0(1), sweep%v0(2), sweep%starts(2)))
+    end associate
+  end function sweep_axes
 
 end module case_setup

@@ -7,30 +7,36 @@ module command_table
   implicit none
   private
 
-  public :: help_text, belonging_to, option_number
+  public :: help_text, belonging_to, command_number, option_number
 
   character(len=*), parameter :: nl = new_line('a')
 
-  type :: command_row_t
+  type, public :: command_row_t
     character(len=10) :: name
     !> What stands behind the name, and what it does, in a line.
     character(len=9) :: reads
     character(len=110) :: summary
     !> Its description in `--help`, before its options.
     character(len=900) :: help
+    !> Stops early on a signal, with what can be resumed; others end at once, as they keep nothing.
+    logical :: stops_early = .false.
+    !> Many trajectories, which a GPU may fly.
+    logical :: uses_device = .false.
   end type command_row_t
 
-  type(command_row_t), parameter :: rows(11) = [ &
+  type(command_row_t), parameter, public :: rows(11) = [ &
     command_row_t('basin', 'CASE', &
       'where every point of a grid of starts or parameters ends up', &
       'separatrix basin CASE [-o FILE]: where every point of a grid ends up'//nl// &
       '  The grid is the [[axis]] tables of the case: two or more of x0, v0, crank_angle, drive.ratio or any'//nl// &
-      '  other parameter. Run it with mpirun to share the work.'//nl), &
+      '  other parameter. Run it with mpirun to share the work.'//nl, &
+      stops_early=.true., uses_device=.true.), &
     command_row_t('sweep', 'CASE', &
       'amplitude-frequency and bifurcation diagram, run up, run down and from many starts', &
       'separatrix sweep CASE [-o FILE]: amplitude-frequency and bifurcation diagram'//nl// &
       '  Runs a parameter up and down with state and crank angle carried over, starts many motions at every'//nl// &
-      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case defines them.'//nl), &
+      '  value, and brackets the limits between which impacts occur. The [sweep] table of the case defines them.'//nl, &
+      stops_early=.true., uses_device=.true.), &
     command_row_t('branches', 'CASE', &
       'periodic orbits over a parameter, stable and unstable, with their bifurcations', &
       'separatrix branches CASE --parameter NAME [--from A] [--to B] [-o FILE]: periodic orbits'//nl// &
@@ -65,7 +71,8 @@ module command_table
       'separatrix points CASE --list ICS.csv [-o FILE] [--csv FILE]: a list of starts'//nl// &
       '  --list FILE     table with the columns x0,v0, optionally ratio and starts of further bodies (body.NAME.x0);'//nl// &
       '                  replaces the grid of the case'//nl// &
-      '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl), &
+      '  --csv FILE      also write x0,v0,ratio,x,v,impacts,last_impact_speed,reason at full precision'//nl, &
+      stops_early=.true., uses_device=.true.), &
     command_row_t('merge', 'OUT SHARD', &
       'one file from the shares of a map', &
       'separatrix merge OUT SHARD...: one result file from the files that --shard I/N has written'//nl// &
@@ -180,7 +187,13 @@ module command_table
 
 contains
 
-  !> Number of the option of this name, long or short; 0 if there is none.
+  !> Row of a command, 0 if there is none.
+  pure integer function command_number(name) result(number)
+    character(len=*), intent(in) :: name
+    number = findloc(commands == name, .true., 1)
+  end function command_number
+
+  !> Row of an option by its long or short name, 0 if there is none.
   pure integer function option_number(name) result(number)
     character(len=*), intent(in) :: name
     number = findloc(options%name == name .or. (options%short == name .and. len_trim(options%short) > 0), .true., 1)

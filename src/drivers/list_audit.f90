@@ -14,7 +14,7 @@ module list_audit
   use law_table, only: change_parameter
   use map_reader, only: reader_t
   use point_list, only: point_list_t
-  use points_driver, only: open_list_ensemble, read_further
+  use list_work, only: open_list_ensemble, read_further
   use reference, only: run_reference
   use span_check, only: check_periods
   use status, only: exit_io

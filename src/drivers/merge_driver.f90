@@ -3,7 +3,7 @@
 
 !> `separatrix merge`: the shares of a map or of a list of starts become the file that one run would have written.
 module merge_driver
-  use basin_driver, only: describe_basin, end_basin, prepare_basin
+  use basin_map, only: describe_basin, end_basin, prepare_basin
   use basin_work, only: basin_work_t, prepare_counts
   use case_reader, only: load_case_text
   use catalogue_search, only: unpack_catalogues
@@ -12,7 +12,7 @@ module merge_driver
   use kinds, only: int64
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
-  use points_driver, only: describe_list, end_points, list_work_t, points_per_tile, read_list
+  use list_work, only: describe_list, end_points, list_work_t, points_per_tile, read_list
   use second_look, only: look_again
   use serial_team, only: serial_team_t
   use session, only: session_t

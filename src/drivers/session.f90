@@ -11,6 +11,7 @@ module session
   use case_type, only: case_t
   use case_warnings, only: warn_about
   use command_line, only: command_t
+  use command_table, only: command_number, command_row_t, rows
   use device_choice, only: choose_device, device_text
   use errors, only: error_t, fail
   use files, only: give_lock, take_lock
@@ -70,6 +71,7 @@ contains
   subroutine open_session(command, session)
     type(command_t), intent(in) :: command
     type(session_t), intent(out) :: session
+    type(command_row_t) :: row
     type(error_t), allocatable :: error
     session%command = command
     session%alone = launched_ranks() == 1
@@ -81,16 +83,15 @@ contains
     call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     call session%stop_if(error)
-    ! A trajectory keeps nothing when it is stopped, so signals end it as usual.
-    ! What has nothing to resume ends at once.
-    if (.not. any(command%name == [character(len=10) :: 'trajectory', 'branches', 'stability'])) call install_signals(error)
+    row = rows(command_number(command%name))
+    if (row%stops_early) call install_signals(error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
                                                    needs_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)
     if (len(command%draw) > 0) call draw_machine(session)
     if (command%validate) call warn_about(command%name, session%the_case, session%journal)
-    if (.not. any(command%name == [character(len=10) :: 'basin', 'sweep', 'points'])) return
+    if (.not. row%uses_device) return
     ! What computes nothing, or a sample on one core, looks for a GPU only to refuse what would be refused.
     if ((command%validate .or. command%dry_run) .and. command%device /= 'gpu') return
     call choose_device(session%team, command, session%the_case, error)

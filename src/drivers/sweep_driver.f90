@@ -7,7 +7,7 @@ module sweep_driver
   use axis, only: axis_t, linear_values
   use basin, only: basin_points, catalogue_t, points_at_a_time, slice_cache_t
   use case_check, only: require_sweep
-  use case_setup, only: grid_of, output_path, span_of
+  use case_setup, only: grid_of, output_path, span_of, sweep_axes
   use case_type, only: case_t
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
@@ -36,7 +36,7 @@ module sweep_driver
   implicit none
   private
 
-  public :: run_sweep, sweep_axes
+  public :: run_sweep
 
   type, extends(point_work_t) :: branch_work_t
     !> Grid over the swept parameter, x0 and v0; the file flattens the starts into one dimension.
@@ -201,17 +201,6 @@ contains
       allocate (work%impacting(size(sweep%swept%values)), work%free(size(sweep%swept%values)), source=0_int64)
     end associate
   end subroutine prepare_branches
-
-  !> The axes of the many starts: the swept parameter, x0, v0.
-  function sweep_axes(the_case) result(axes)
-    type(case_t), intent(in) :: the_case
-    type(axis_t) :: axes(3)
-    associate (sweep => the_case%sweep)
-      axes(1) = sweep%swept
-      axes(2) = axis_t('x0', 'm', linear_values(sweep%x0(1), sweep%x0(2), sweep%starts(1)))
-      axes(3) = axis_t('v0', 'm/s', linear_values(sweep%v0(1), sweep%v0(2), sweep%starts(2)))
-    end associate
-  end function sweep_axes
 
   !> Many starts at every value, tile by tile.
   subroutine run_branches(session, work, schema, path)

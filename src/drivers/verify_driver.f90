@@ -11,7 +11,7 @@ module verify_driver
   use basin, only: basin_points, catalogue_t, slice_cache_t
   use boundary_audit, only: audit_boundary, check_boundary
   use case_reader, only: load_case_text
-  use case_setup, only: grid_of, span_of
+  use case_setup, only: grid_of, span_of, sweep_axes
   use case_type, only: case_t
   use command_line, only: command_t
   use endings, only: assess_file, assess_motion
@@ -31,7 +31,6 @@ module verify_driver
   use statistics, only: share_upper_limit
   use status, only: exit_io, exit_uncertain, reason_code, reason_settled
   use stored_map, only: restore_catalogues
-  use sweep_driver, only: sweep_axes
   use text, only: to_text
   use trajectories, only: ensemble_t, run_trajectories
   use single_trajectory, only: outcome_t
