@@ -49,16 +49,19 @@ def brackets(limits: xr.Dataset, *, in_steps: bool = False) -> np.ndarray:
 
 
 def limit_texts(limits: xr.Dataset) -> list[str]:
-    """Return each limit as text, with how it is known where that is in steps only."""
+    """Return each limit as text, with its run, and whether that of the settled motion is known."""
     known = np.isfinite(limits["lower"].values + limits["upper"].values) if "lower" in limits else []
     shown = f" {unit(limits['lower'])}".rstrip() if "lower" in limits else ""
-    return [
-        f"{'' if settled else 'in steps '}{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}{shown}"
-        for name, (lower, upper), settled in zip(
-            limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
-        )
-        if np.isfinite(lower + upper)
-    ]
+    texts = []
+    for name, (lower, upper), settled in zip(
+        limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
+    ):
+        if not np.isfinite(lower + upper):
+            continue
+        what, _, run = str(name).rpartition("_")
+        about = f"run-{run}" if settled else f"run-{run}, observed in steps"
+        texts.append(f"{what.replace('_', ' ')} at {lower:.6g} to {upper:.6g}{shown} ({about})")
+    return texts
 
 
 def boundaries(limits: xr.Dataset) -> list[Boundary]:

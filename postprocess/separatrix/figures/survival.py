@@ -14,7 +14,7 @@ from separatrix.labels import axis_label, plain
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure by name."""
-    look.require("survival under impulses")
+    look.require("survival under impulses", "units")
     return Figures({"survival": lambda: diagram(result, title, look)})
 
 
@@ -22,6 +22,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the share over the time with its band, and the law with its own."""
     page = Page(look, (style.SINGLE_COLUMN, 55.0))
     (ax,) = page.axes
+    result = look.selected(result)
     time = result["time"].values
     lines = []
     for name, colour, text in (
