@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which variables of a result are frequencies, and what they are in rad/s: a ratio to the natural one, too."""
+"""Which variables of a result are frequencies, ratios to the natural frequency included, and their rad/s."""
 
 import re
 import tomllib

@@ -216,7 +216,13 @@ def test_parts_of_figures_and_lists_are_taken(made: Callable, library: Path) -> 
 @pytest.mark.parametrize(
     ("kind", "name", "number", "more", "message"),
     [
-        ("trajectory", "history", 1, {}, "ax: found 1 axes, this figure needs 2 in a sequence, one for each panel"),
+        (
+            "trajectory",
+            "history",
+            1,
+            {},
+            "ax: found 1 axes, this figure needs 2 in a sequence, one for each panel",
+        ),
         ("trajectory", "phase", 2, {}, "ax: found 2 axes, this figure needs 1"),
         ("stack", "attractor", 2, {}, "ax: found 2 axes, this figure needs 3"),
         ("basin", "attractor", 1, {"inset": {"x0": (-0.5, 0.6), "v0": (-3, 3)}}, "this figure needs 2"),

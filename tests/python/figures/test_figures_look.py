@@ -302,7 +302,11 @@ def test_a_ratio_is_shown_as_a_frequency(library: Path) -> None:
 def test_frequencies_are_not_angular_velocities() -> None:
     """Hz belongs to a frequency in rad/s, deg/s to the velocity of an angle, whatever their order."""
     data = {"v": ("drive_motor_frequency", [np.pi, 2 * np.pi], {"units": "rad/s", "long_name": "velocity"})}
-    frequency = ("drive_motor_frequency", [2 * np.pi, 4 * np.pi], {"units": "rad/s", "long_name": "angular frequency"})
+    frequency = (
+        "drive_motor_frequency",
+        [2 * np.pi, 4 * np.pi],
+        {"units": "rad/s", "long_name": "angular frequency"},
+    )
     result = xr.Dataset(data, {"drive_motor_frequency": frequency})
     for units in (("Hz", "deg/s"), ("deg/s", "Hz")):
         shown = Look(units=units).selected(result)
