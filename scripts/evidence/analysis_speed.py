@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from markdown import table
+from evidence_rows import table
 from separatrix import measures, open_result
 
 SOURCE = Path(__file__).resolve().parents[2]

@@ -5,7 +5,8 @@
 import math
 
 import numpy as np
-from pair_runs import Check, Program, Run, check
+from evidence_rows import Row
+from pair_runs import Program, Run, check
 from separatrix import decode_flags
 
 # time, x1, v1 = v2, x2, energy of the first events of a free pair, computed by another program
@@ -21,7 +22,7 @@ FREE_PAIR = (
 HALF_DIGIT = 5.1e-10
 
 
-def free_bodies(program: Program) -> list[Check]:
+def free_bodies(program: Program) -> list[Row]:
     """Without spring and drive the bodies come together."""
     m1, m2, b, v1, v2 = 2.0, 0.5, 0.7, 1.0, -2.0
     reduced = m1 * m2 / (m1 + m2)
@@ -49,7 +50,7 @@ def free_bodies(program: Program) -> list[Check]:
     ]
 
 
-def carried_off(program: Program) -> list[Check]:
+def carried_off(program: Program) -> list[Row]:
     """A platform at constant velocity carries a body off that was at rest."""
     m2, b, velocity = 0.7, 0.3, 0.5
     run = program.trajectory("pair_platform", 'contact={law="none"}', "start.v0=0")
@@ -60,7 +61,7 @@ def carried_off(program: Program) -> list[Check]:
     ]
 
 
-def shaken(program: Program) -> list[Check]:
+def shaken(program: Program) -> list[Row]:
     """Stick and slip on a shaken platform with kappa = friction."""
     stuck = program.trajectory("sweep_pair_kappa", "body.friction=1", "start.v0=1")
     slipping = program.trajectory("sweep_pair_kappa", "body.friction=0.5")
@@ -104,14 +105,14 @@ def event_energies(run: Run) -> np.ndarray:
     ) / 2
 
 
-def free_pair(program: Program) -> list[Check]:
+def free_pair(program: Program) -> list[Row]:
     """Every event of the free pair as printed, and its book of energy."""
     run = program.trajectory("pair_free", "run.duration=386.9297")
     energies = event_energies(run)
     columns = [run.events[f"event_{name}"] for name in ("time", "driver_x", "driver_v", "x")]
     kinds = {"turning_point": "reversal", "stick": "stick", "release": "slip"}
     checks = [
-        Check(
+        check(
             f"P1 event {i + 1}, {kinds[str(run.kinds[i])]}: t, x1, v, x2, E",
             [*(float(column[i]) for column in columns), float(energies[i])],
             expected,
@@ -132,7 +133,7 @@ def free_pair(program: Program) -> list[Check]:
     ]
 
 
-def algebraic(program: Program) -> list[Check]:
+def algebraic(program: Program) -> list[Row]:
     """The energy above the limit of stick falls like 1/(k n) with the number n of slips."""
     run = program.trajectory("pair_free", "run.duration=40000", "trajectory.samples_per_period=2")
     above = event_energies(run)[run.kinds == "stick"] - 0.045
@@ -149,7 +150,7 @@ def algebraic(program: Program) -> list[Check]:
     ]
 
 
-def bouncing(program: Program) -> list[Check]:
+def bouncing(program: Program) -> list[Row]:
     """A platform at constant velocity carries a body into a stop."""
     m2, b, velocity, e = 0.7, 0.3, 0.5, 0.6
     run = program.trajectory("pair_platform")
@@ -167,22 +168,22 @@ def bouncing(program: Program) -> list[Check]:
     names = decode_flags(run.data["mode"]).values.astype(str)
     worst = {"digits": 4}
     return [
-        Check(
+        check(
             f"B.3 impact speeds V e^k, k = 0 to {count - 1} (m/s)",
             before[:count],
             velocity * e**k,
             1e-10,
             **worst,
         ),
-        Check("B.3 rebound speeds V e^(k+1) (m/s)", -after[:count], velocity * e ** (k + 1), 1e-10, **worst),
-        Check(
+        check("B.3 rebound speeds V e^(k+1) (m/s)", -after[:count], velocity * e ** (k + 1), 1e-10, **worst),
+        check(
             "B.3 return times 2 m2 V e^(k+1)/b (s)",
             np.diff(time)[:count],
             2 * m2 * velocity * e ** (k + 1) / b,
             1e-10,
             **worst,
         ),
-        Check(
+        check(
             "B.3 excursions m2 (V e^(k+1))^2/(2b) (m)",
             1 - np.array(lows),
             m2 * (velocity * e ** (k + 1)) ** 2 / (2 * b),
@@ -207,7 +208,7 @@ def bouncing(program: Program) -> list[Check]:
     ]
 
 
-def hammer(program: Program) -> list[Check]:
+def hammer(program: Program) -> list[Row]:
     """An impulse on a body on a resting platform; two free bodies with a stop between them."""
     m2, b, distance, e, v0 = 0.5, 1.5, 0.2, 0.7, 2.0
     run = program.trajectory("hammer")
@@ -256,7 +257,7 @@ def recovered(record: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(times), np.array(heights)
 
 
-def identified(program: Program) -> list[Check]:
+def identified(program: Program) -> list[Row]:
     """Restitution and friction from records at 2 kHz with 8 micrometres of noise."""
     checks = []
     for seed in (1, 2, 3):
@@ -266,8 +267,8 @@ def identified(program: Program) -> list[Check]:
         friction = 8 * heights / times**2
         name = f"B.3 record, noise seed {seed}: "
         checks += [
-            Check(f"{name}e from successive flight times", e_times, [0.6] * 4, 2e-3, digits=5),
-            Check(f"{name}e from successive heights", e_heights, [0.6] * 4, 1e-3, digits=5),
-            Check(f"{name}b/m2 of each flight (m/s^2)", friction, [0.3 / 0.7] * 5, 5e-3, True, 5),
+            check(f"{name}e from successive flight times", e_times, [0.6] * 4, 2e-3, digits=5),
+            check(f"{name}e from successive heights", e_heights, [0.6] * 4, 1e-3, digits=5),
+            check(f"{name}b/m2 of each flight (m/s^2)", friction, [0.3 / 0.7] * 5, 5e-3, True, 5),
         ]
     return checks

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from analysis_speed import model as processor
-from markdown import table
+from evidence_rows import table
 from separatrix.library import Model, Segments
 
 SOURCE = Path(__file__).resolve().parents[2]

@@ -13,7 +13,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from markdown import table
+from evidence_rows import table
 from ours import FULL, Program
 from rows import ROWS, Row
 

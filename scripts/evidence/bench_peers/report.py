@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import compiled
-from markdown import table
+from evidence_rows import table
 from rows_report import number
 
 from machine import SEED, SOURCE, TOLERANCE, fingerprint, start_points

@@ -16,7 +16,7 @@ import model
 import packing
 import simulation
 from costs import spread_of
-from markdown import table
+from evidence_rows import table
 from runs import POINTS_PER_TILE, X0_COUNT, Run
 
 if TYPE_CHECKING:
