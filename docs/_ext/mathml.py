@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from docutils import nodes
-from docutils.utils.math import latex2mathml
+from math_core import LatexError, LatexToMathML
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util import logging
@@ -32,8 +32,8 @@ def _copy_font(app: Sphinx, error: Exception | None) -> None:
 
 def _mathml(node: nodes.Element, block: bool) -> str:
     try:
-        return latex2mathml.tex2mathml(node.astext(), as_block=block)
-    except latex2mathml.MathError as error:
+        return LatexToMathML().convert_with_local_state(node.astext(), displaystyle=block)
+    except LatexError as error:
         logging.getLogger(__name__).warning(f"{node.astext()}: {error}", location=node)
         return f"<code>{html.escape(node.astext())}</code>"
 
