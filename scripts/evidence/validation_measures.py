@@ -26,7 +26,7 @@ GREBOGI = "C. Grebogi, S. W. McDonald, E. Ott, J. A. Yorke, Phys. Lett. A 99 (19
 def rows() -> list[Row]:
     """All rows, computed."""
     found = [*exponents(), *spheres(), *entropies(), *boxes(), *duffing(), *pendulum()]
-    return [replace(row, digits=10) for row in found]
+    return [replace(row, digits=6) for row in found]
 
 
 def exponents() -> list[Row]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 
-from separatrix.labels import unit
+from separatrix.labels import flag_text, unit
 from separatrix.open import flag_names
 
 _IMPACTING = {"impact", "mixed", "chattering"}
@@ -60,7 +60,9 @@ def limit_texts(limits: xr.Dataset) -> list[str]:
             continue
         what, _, run = str(name).rpartition("_")
         about = f"run-{run}" if settled else f"run-{run}, observed in steps"
-        texts.append(f"{what.replace('_', ' ')} at {lower:.6g} to {upper:.6g}{shown} ({about})")
+        digits = next((n for n in range(6, 15) if f"{lower:.{n}g}" != f"{upper:.{n}g}"), 15)
+        bracket = f"{lower:.{digits}g} to {upper:.{digits}g}" if lower != upper else f"{lower:.6g}"
+        texts.append(f"{flag_text(what)} at {bracket}{shown} ({about})")
     return texts
 
 

@@ -26,7 +26,7 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     time = result["time"].values
     lines = []
     for name, colour, text in (
-        ("survival", style.OKABE_ITO[1], "motions struck again and again"),
+        ("survival", style.OKABE_ITO[1], "simulated motions"),
         ("law", style.OKABE_ITO[0], "law of rare impulses, exp(-rate p t)"),
     ):
         lines += ax.plot(time, result[name].values, color=colour, label=text)
