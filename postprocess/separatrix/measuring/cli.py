@@ -138,8 +138,8 @@ def tipping_dict(matrix: Tipping) -> dict[str, object]:
 def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-measures",
-        description="Measures dynamical integrity, size and fractality of the basins of a map, with intervals "
-        "and limitations.",
+        description="Measures dynamical integrity, size and fractality of the basins of a map, "
+        "with intervals and limitations.",
         epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write, "
         "78 every motion was given up.",
     )
