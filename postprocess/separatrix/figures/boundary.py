@@ -31,11 +31,11 @@ _LINES = {
     "stable_set": ("boundary: stable set of saddle", "-"),
     "recurrent": ("boundary: recurrent edge state", "-"),
     "graze": ("boundary: edge of a graze", "--"),
-    "stick": ("boundary: rim of a stick set", "--"),
+    "stick": ("boundary: edge of a set of sticking states", "--"),
     "chatter": ("boundary: edge of a completed chatter", "--"),
     "other_event": ("boundary: edge at another event", "--"),
-    "not_known": ("boundary: leads to what is not known", "-."),
-    "edge": ("edge of what is not known", ":"),
+    "not_known": ("boundary: edge state not known", "-."),
+    "edge": ("edge of the unlabelled region", ":"),
 }
 _SADDLES = ("black", "#56B4E9", "#F0E442", "#CC79A7", "#009E73", "#D55E00")
 # Lines of the saddles when the colours begin anew.
