@@ -119,6 +119,13 @@ def version_of(program: Path) -> dict[str, str]:
     return dict(line.split(" ", 1) for line in lines.splitlines())
 
 
+def processor() -> dict[str, str]:
+    """What the system reports of the first processor: its model name, flags, ..."""
+    lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
+    found = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    return {"model name": "unknown processor", **found}
+
+
 def arguments(description: str, out: str) -> argparse.ArgumentParser:
     """The options that the scripts share: --build, --out."""
     parser = argparse.ArgumentParser(description=description.split("\n")[0])

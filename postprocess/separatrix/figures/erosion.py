@@ -132,7 +132,8 @@ def _branches(axes: Sequence[Axes], branches: xr.Dataset, dim: str, look: Look) 
     if over != dim:
         raise SeparatrixError(f"branches: found them over {over}, allowed over {dim}", USAGE)
     handles = branch_diagram.draw(axes[0], branches, look)
-    axes[0].set_ylabel(branch_diagram.height(branches, look)[1])
+    # the panel is lower than the label in one line
+    axes[0].set_ylabel(branch_diagram.height(branches, look)[1].replace("amplitude ", "amplitude\n"))
     if "label" not in branches:
         return handles
     labels, factor = decode_flags(branches["label"]).values, look.scale(branches, "parameter")[0]
