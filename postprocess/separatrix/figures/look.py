@@ -127,7 +127,8 @@ class Look:
 
     def factor(self, unit: str) -> float:
         """Return by what a number in an SI unit is multiplied."""
-        return next((1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit), 1.0)
+        found = (1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit)
+        return 1.0 if unit == FREQUENCY else next(found, 1.0)
 
     def unit(self, si: str) -> str:
         """Return the unit that is used instead of an SI unit."""

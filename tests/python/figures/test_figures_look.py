@@ -313,6 +313,8 @@ def test_frequencies_are_not_angular_velocities() -> None:
         np.testing.assert_allclose(shown["drive_motor_frequency"], [1, 2])
         np.testing.assert_allclose(shown["v"], [180, 360])
         assert (shown["v"].units, shown["drive_motor_frequency"].long_name) == ("deg/s", "frequency")
+    # what is no frequency keeps its size
+    assert Look(units=("Hz", "rad/s")).factor("rad/s") == 1.0
 
 
 def test_forces_of_contacts_have_units() -> None:
