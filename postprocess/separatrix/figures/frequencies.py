@@ -14,7 +14,7 @@ FREQUENCY = "frequency"
 _RATIOS = ("drive_ratio", "ratio")
 # brackets of limits, and curves of branches, over the parameter of the file
 _OVER_PARAMETER = re.compile(r"limits_(observed_)?(lower|upper)|(curve_|equilibrium_|rest_)?parameter")
-# label and symbol of what was a ratio
+# label and symbol of the frequency of the drive
 _LABELS = {
     "Hz": ("drive frequency $f$", "$f$"),
     "rpm": ("drive speed $n$", "$n$"),
@@ -33,18 +33,25 @@ def angular(result: xr.Dataset, key: str) -> float | None:
     return 1.0 if si == "rad/s" and re.search(r"frequency(_\d+)?$", name) else None
 
 
-def renamed(attributes: dict, unit: str) -> dict[str, object]:
-    """Return the attributes of a frequency in another unit."""
-    if attributes.get("units") == "1":
+def renamed(result: xr.Dataset, key: str, unit: str) -> dict[str, object]:
+    """Return the attributes of a frequency in another unit; that of the only drive has a symbol."""
+    attributes, name = result[key].attrs, _name(result, key)
+    drives = _case(result).get("drive", {})
+    single = sum(isinstance(one, dict) for one in drives.values()) <= 1
+    if name in _RATIOS or (name.startswith("drive_") and single):
         label, symbol = _LABELS[unit]
         return {**attributes, "units": unit, "long_name": label, "label": label, "symbol": symbol}
     text = str(attributes.get("long_name", "frequency")).replace("angular frequency", "frequency")
     return {**attributes, "units": unit, "long_name": text}
 
 
+def _case(result: xr.Dataset) -> dict:
+    return tomllib.loads(str(result.attrs.get("resolved_case", "")))
+
+
 def _natural_frequency(result: xr.Dataset) -> float:
     """The natural angular frequency that ratios refer to [rad/s]: sqrt(c/m) of the linear spring."""
-    case = tomllib.loads(str(result.attrs.get("resolved_case", "")))
+    case = _case(result)
     stiffness, mass = (case.get(a, {}).get(b) for a, b in (("restoring", "stiffness"), ("body", "mass")))
     reason = "" if stiffness and mass else "there is no linear spring"
     for path in ("restoring.stiffness", "body.mass"):

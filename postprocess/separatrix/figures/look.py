@@ -154,7 +154,7 @@ class Look:
             if name == variable.attrs.get("units") or str(key).startswith("catalogue_"):
                 continue
             frequency = UNITS[name][0] == FREQUENCY
-            about = renamed(variable.attrs, name) if frequency else {**variable.attrs, "units": name}
+            about = renamed(result, str(key), name) if frequency else {**variable.attrs, "units": name}
             changed[key] = (variable.dims, variable.values * factor, about)
         return result.assign(changed)
 

@@ -28,6 +28,7 @@ from separatrix.figures import contact as contacts
 from separatrix.figures.animation import animate, ffmpeg
 from separatrix.figures.difference import differing
 from separatrix.figures.look import Look
+from separatrix.labels import symbol
 from separatrix.open import open_result
 
 RATIOS = np.array([1.1, 1.2, 1.3])
@@ -302,17 +303,21 @@ def test_a_ratio_is_shown_as_a_frequency(library: Path) -> None:
 def test_frequencies_are_not_angular_velocities() -> None:
     """Hz belongs to a frequency in rad/s, deg/s to the velocity of an angle, whatever their order."""
     data = {"v": ("drive_motor_frequency", [np.pi, 2 * np.pi], {"units": "rad/s", "long_name": "velocity"})}
+    two = "[drive.motor]\nfrequency = 1.0\n[drive.shaker]\nfrequency = 2.0\n"
     frequency = (
         "drive_motor_frequency",
         [2 * np.pi, 4 * np.pi],
         {"units": "rad/s", "long_name": "angular frequency"},
     )
-    result = xr.Dataset(data, {"drive_motor_frequency": frequency})
+    result = xr.Dataset(data, {"drive_motor_frequency": frequency}, {"resolved_case": two})
     for units in (("Hz", "deg/s"), ("deg/s", "Hz")):
         shown = Look(units=units).selected(result)
         np.testing.assert_allclose(shown["drive_motor_frequency"], [1, 2])
         np.testing.assert_allclose(shown["v"], [180, 360])
         assert (shown["v"].units, shown["drive_motor_frequency"].long_name) == ("deg/s", "frequency")
+        assert symbol(shown["drive_motor_frequency"]) == "frequency"
+        single = Look(units=units).selected(result.assign_attrs(resolved_case="[drive.motor]\nfrequency = 1"))
+        assert symbol(single["drive_motor_frequency"]) == "$f$"
     # what is no frequency keeps its size
     assert Look(units=("Hz", "rad/s")).factor("rad/s") == 1.0
 
