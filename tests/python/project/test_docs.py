@@ -50,6 +50,7 @@ def test_the_comparison_can_fail() -> None:
     """What differs is seen, what may differ is not."""
     assert matches(["a", "...", "wrote x in 1.5 s"], ["a", "b", "c", "wrote x in 0.02 s"])
     assert not matches(["a", "...", "d"], ["a", "b", "c"])
+    assert matches(["about 11 s on one core"], ["about 1 min 20 s on one core"])
     assert not matches(["share 0.5"], ["share 0.6"])
     assert not matches(["a"], ["a", "b"])
 
