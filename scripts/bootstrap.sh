@@ -33,6 +33,10 @@ if $browser && ! command -v chromium > /dev/null; then
   packages+=(chromium)
 fi
 
+if $docs; then
+  packages+=(fonts-lmodern)
+fi
+
 fail() {
   echo "bootstrap: $*" >&2
   exit 1

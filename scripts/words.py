@@ -23,7 +23,7 @@ EXEMPT = re.compile(
 )
 
 # Names in older results.
-OLD_NAMES = re.compile(r'strobe_[xv]|critical_blow|"blow"|`blow`')
+OLD_NAMES = re.compile(r'strobe_[xv]|critical_blow|body_blow(?:_time)?\b|"blow"|`blow`')
 
 
 def read_list() -> list[tuple[re.Pattern, str]]:

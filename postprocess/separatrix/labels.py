@@ -66,7 +66,11 @@ def axis_label(variable: xr.DataArray) -> str:
 def symbol(variable: xr.DataArray) -> str:
     """Return the symbol of a variable, or its name where it has none."""
     name = str(variable.name)
-    return _SHORT.get(name) or plain(variable.attrs.get("long_name", name.replace("_", " ")))
+    return (
+        variable.attrs.get("symbol")
+        or _SHORT.get(name)
+        or plain(variable.attrs.get("long_name", name.replace("_", " ")))
+    )
 
 
 def value_label(variable: xr.DataArray, value: float) -> str:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`trajectory`: one motion with all its events, computed in this process."""
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,12 @@ import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
 from separatrix.cases import Case, as_case, number
 from separatrix.errors import USAGE, GivenUpError, SeparatrixError
+from separatrix.figures.parts import several_bodies
+from separatrix.given_up import reason_of
+from separatrix.maps import kept_in_memory
+from separatrix.open import open_result
+from separatrix.progress import Progress
+from separatrix.runner import run_at_once
 from separatrix.variables import (
     EVENTS,
     FORMAT_VERSION,
@@ -42,6 +49,7 @@ def trajectory(
 ) -> xr.Dataset:
     """Return one motion, equidistant samples and every event, as a file of `separatrix trajectory` has it.
 
+    Of several bodies it has the variables `NAME_x` and `NAME_v` of each.
     A motion that had to be given up is a GivenUpError, whose `result` is the dataset as far as it went.
 
     Parameters
@@ -73,13 +81,6 @@ def trajectory(
     if samples is not None and not number("samples", samples) >= 2:
         raise SeparatrixError(f"samples: found {samples}, allowed 2 or more", USAGE)
     start = case.start(x0=x0, v0=v0, crank_angle=crank_angle)
-    given_up = None
-    try:
-        motion = simulate.trajectory(
-            case.model, tuple(start.values()), duration=duration or 0.0, samples_per_period=samples or 0
-        )
-    except GivenUpError as error:
-        given_up, motion = str(error), error.result
     asked = {f"start.{name}": value for name, value in start.items()}
     if duration is not None:
         window = min(float(case.resolved["run"]["window"]), duration)
@@ -87,11 +88,33 @@ def trajectory(
     if samples is not None:
         asked["trajectory.samples_per_period"] = int(samples)
     changed = case.with_(asked)
-    result = _dataset(changed, motion, _cycle(changed, motion.summary))
+    result, given_up = (_of_program if several_bodies(changed.resolved) else _of_library)(changed)
     if given_up and not partial:
         message = f"{given_up} after {float(result.time[-1]) if result.time.size else 0.0:.6g} s"
         raise GivenUpError(f"{message} (partial=True returns it as far as it went)", result)
     return result
+
+
+def _of_library(case: Case) -> tuple[xr.Dataset, str]:
+    """The motion of a case, and why it was given up."""
+    start, given_up = case.resolved["start"], ""
+    try:
+        motion = simulate.trajectory(case.model, (start["x0"], start["v0"], start["crank_angle"]))
+    except GivenUpError as error:
+        given_up, motion = str(error), error.result
+    return _dataset(case, motion, _cycle(case, motion.summary)), given_up
+
+
+def _of_program(case: Case) -> tuple[xr.Dataset, str]:
+    """The same by the program, which alone has every body and joint."""
+    with tempfile.TemporaryDirectory(prefix="separatrix-") as folder, Progress(False) as report:
+        named, path = case.on_command_line(Path(folder)), Path(folder) / "motion.h5"
+        command = ["trajectory", *named, "-o", str(path), "--partial", "--json"]
+        run_at_once(command, report, rename={named[0]: case.name})
+        with open_result(path) as file:
+            result = kept_in_memory(file)
+    reason = reason_of(result)
+    return result, f"the motion was given up: {reason}" if reason else ""
 
 
 def _cycle(case: Case, summary: dict[str, float]) -> dict[str, float] | None:

@@ -49,7 +49,7 @@ def open_result(path: str | Path) -> xr.Dataset:
             parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
             parts += [_open_table(path, name) for name in groups]
             result = xr.merge(parts, join="exact", compat="no_conflicts")
-            result = result.rename({old: new for old, new in RENAMED.items() if old in result})
+            result = result.rename({old: new for old, new in RENAMED.items() if old in result.variables})
         except Exception:
             _close(parts)
             raise

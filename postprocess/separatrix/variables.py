@@ -11,10 +11,13 @@ import numpy as np
 
 #: The version of the files that are written; older ones are read too (docs/file-format.md).
 FORMAT_VERSION = 2
-# names in older files
-RENAMED = {"strobe_x": "section_x", "strobe_v": "section_v"} | {
+# names in older files, of variables and of axes over parameters
+RENAMED = {
+    "strobe_x": "section_x", "strobe_v": "section_v",
+    "body_blow": "body_impulse", "body_blow_time": "body_impulse_time",
+} | {
     f"critical_blow{end}": f"critical_impulse{end}" for end in ("", "_lower", "_upper")
-}
+}  # fmt: skip
 # events in older files
 RENAMED_EVENTS = {"blow": "impulse"}
 

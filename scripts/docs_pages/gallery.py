@@ -34,8 +34,7 @@ def write(folder: Path) -> None:
         (folder / f"{name}.md").write_text(MADE + _page(folder, name, title, explanation, code))
         tiles.append(f"* [![]({name}.png) {title}]({name}.md)")
     (folder / "index.md").write_text(
-        MADE
-        + "# Gallery\n\nEach picture is the work of the script that stands below it, on one or two cores.\n\n"
+        MADE + "# Gallery\n\nEach picture is drawn by the script on its page, on one or two cores.\n\n"
         "{.gallery}\n" + "\n".join(tiles) + "\n\n```{toctree}\n:hidden:\n" + "\n".join(ORDER) + "\n```\n"
     )
 

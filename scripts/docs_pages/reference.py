@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import xarray as xr
-from evidence.markdown import table
+from evidence.evidence_rows import table
 
 MADE = "<!-- made by scripts/docs -->\n\n"
 

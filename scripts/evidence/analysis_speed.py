@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from markdown import table
+from evidence_rows import processor, table
 from separatrix import measures, open_result
 
 SOURCE = Path(__file__).resolve().parents[2]
@@ -146,13 +146,6 @@ together in vectors; its transient is computed event by event.
 """
 
 
-def model() -> str:
-    """The processor's name."""
-    lines = Path("/proc/cpuinfo").read_text().splitlines()
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else "unknown processor"
-
-
 def main() -> None:
     """Measure, write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -178,7 +171,7 @@ def main() -> None:
     if options.print:
         sys.stdout.write(rows + "\n")
         return
-    page = PAGE.format(machine=f"Processor: {model()}.", rows=rows)
+    page = PAGE.format(machine=f"Processor: {processor()['model name']}.", rows=rows)
     (SOURCE / "docs" / "performance_analysis.md").write_text(page)
 
 

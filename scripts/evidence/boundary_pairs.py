@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import separatrix as sx
-from markdown import table
+from evidence_rows import table
 from separatrix.cases import linspace
 from separatrix.library import Model
 from separatrix.open import decode_flags, open_result

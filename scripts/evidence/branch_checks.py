@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from markdown import table
+from evidence_rows import table
 from separatrix import open_result
 from separatrix import table as rows_of
 from separatrix.open import decode_flags

@@ -5,7 +5,8 @@
 import math
 
 import numpy as np
-from pair_runs import Check, Program, Run, check, restitution_of
+from evidence_rows import Row
+from pair_runs import Program, Run, check, restitution_of
 
 FORMULAS = {
     "hunt_crossley_1975": (0.952, 0.909, 0.833, 0.768, 0.712, 0.663, 0.620, 0.581, 0.547, 0.516),
@@ -43,7 +44,7 @@ def exact_restitution(d: float) -> float:
     return (low + high) / 2
 
 
-def hunt_crossley(program: Program) -> list[Check]:
+def hunt_crossley(program: Program) -> list[Row]:
     """Restitution, loss and peaks of K p^n (1 + a p')."""
     checks = []
     dampings = (0.1, 0.5, 1.43275, 5.0, 20.0)
@@ -52,7 +53,7 @@ def hunt_crossley(program: Program) -> list[Check]:
         runs = [impact(program, f"{law}{d}") for d in dampings]
         expected = [exact_restitution(d) for d in dampings]
         checks.append(
-            Check(
+            check(
                 f"C.2 e, n = {n}, d = {', '.join(f'{d:g}' for d in dampings)}",
                 [restitution_of(run) for run in runs],
                 expected,
@@ -61,7 +62,7 @@ def hunt_crossley(program: Program) -> list[Check]:
             )
         )
         checks.append(
-            Check(
+            check(
                 f"C.2 area of the loop, n = {n} (J) = energy loss of the body",
                 [run.number("contact_work") for run in runs],
                 [(1 - restitution_of(run) ** 2) / 2 for run in runs],
@@ -71,7 +72,7 @@ def hunt_crossley(program: Program) -> list[Check]:
         )
     law = 'law="hunt_crossley_exact", stiffness=1e6, speed=1, restitution='
     checks.append(
-        Check(
+        check(
             "C.2 e of hunt_crossley_exact for nominal e",
             [restitution_of(impact(program, f"{law}{e}")) for e in ASKED],
             ASKED,
@@ -89,11 +90,11 @@ def hunt_crossley(program: Program) -> list[Check]:
         lasted = run.of("event_time", "separation")[0] - run.of("event_time", "touch_upper")[0]
         found = (run.number("peak_penetration"), lasted, run.number("peak_force"))
         name = f"C.2 n = {n}, d = {damping:g}: largest p (m), duration (s), largest force (N)"
-        checks.append(Check(name, found, expected, 5e-5, True, 6))
+        checks.append(check(name, found, expected, 5e-5, True, 6))
     return checks
 
 
-def formulas(program: Program) -> list[Check]:
+def formulas(program: Program) -> list[Row]:
     """What the published formulas return for the restitution that they are asked for."""
     checks = []
     for law, printed in FORMULAS.items():
@@ -102,17 +103,17 @@ def formulas(program: Program) -> list[Check]:
             for e in ASKED
         ]
         checks.append(
-            Check(f"C.3 {law}, nominal e = 0.95, 0.9, 0.8 ... 0.1", found, printed, 5.1e-4, digits=3)
+            check(f"C.3 {law}, nominal e = 0.95, 0.9, 0.8 ... 0.1", found, printed, 5.1e-4, digits=3)
         )
     found = [
         restitution_of(impact(program, f'law="hunt_crossley", stiffness=1e6, damping={d}'))
         for d in EXACT_DAMPING
     ]
-    checks.append(Check("C.3 exact d as printed", found, ASKED, 1e-5, digits=5))
+    checks.append(check("C.3 exact d as printed", found, ASKED, 1e-5, digits=5))
     return checks
 
 
-def kelvin_voigt(program: Program) -> list[Check]:
+def kelvin_voigt(program: Program) -> list[Row]:
     """The linear damper: restitution with and without tension, and the jump of the force."""
     ratios = (0.05, 0.1, 0.2, 0.3, 0.5)
     damping = [2 * zeta * 1e3 for zeta in ratios]
@@ -125,9 +126,9 @@ def kelvin_voigt(program: Program) -> list[Check]:
         found = [restitution_of(impact(program, law)) for law in laws]
         closed = [released(zeta, tension == 1) for zeta in ratios]
         checks.append(
-            Check(f"C.4 e released at {what}, zeta = 0.05, 0.1, 0.2, 0.3, 0.5", found, closed, 1e-8, digits=6)
+            check(f"C.4 e released at {what}, zeta = 0.05, 0.1, 0.2, 0.3, 0.5", found, closed, 1e-8, digits=6)
         )
-        checks.append(Check(f"C.4 e as printed, released at {what}", found, printed, 5.1e-5, digits=4))
+        checks.append(check(f"C.4 e as printed, released at {what}", found, printed, 5.1e-5, digits=4))
     jumps = [
         impact(program, f'law="kelvin_voigt", stiffness=1e6, damping={d}', 1e-12, "start.x0=0").number(
             "peak_force"
@@ -136,7 +137,7 @@ def kelvin_voigt(program: Program) -> list[Check]:
         for d in damping
     ]
     checks.append(
-        Check("C.4 jump F(0+)/(v sqrt(K m)) = 2 zeta", jumps, [2 * zeta for zeta in ratios], 1e-8, digits=6)
+        check("C.4 jump F(0+)/(v sqrt(K m)) = 2 zeta", jumps, [2 * zeta for zeta in ratios], 1e-8, digits=6)
     )
     return checks
 
@@ -148,7 +149,7 @@ def released(zeta: float, tension: bool) -> float:
     return math.exp(-zeta / root * angle)
 
 
-def books(program: Program) -> list[Check]:
+def books(program: Program) -> list[Row]:
     """What is missing in the book of energy, relative to what was turned over."""
     soft = 'contact={law="hunt_crossley_exact", stiffness=1e6, restitution=0.6, upper=1}'
     linear = 'contact={law="kelvin_voigt_restitution", stiffness=1e4, restitution=0.6, upper=1}'
@@ -181,7 +182,7 @@ def books(program: Program) -> list[Check]:
     ]
 
 
-def hard(program: Program) -> list[Check]:
+def hard(program: Program) -> list[Row]:
     """Cases where something is nil, infinite or exactly at a limit: they end, with sense or with a reason."""
     stop = 'contact={{law="newton", restitution={}, upper={}}}'
     shake = 'drive={law="sine", amplitude=0.3, frequency=2}'

@@ -21,7 +21,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
-from markdown import table  # noqa: E402
+from evidence_rows import table  # noqa: E402
 
 SOURCE = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(SOURCE / "tests" / "generator"), str(SOURCE / "scripts/evidence/campaign")]

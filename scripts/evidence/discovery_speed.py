@@ -17,8 +17,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis_speed import model as processor
-from markdown import table
+from evidence_rows import processor, table
 
 SOURCE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(SOURCE / "tests" / "generator"))
@@ -131,7 +130,7 @@ def main() -> None:
     )
     page = PAGE.format(
         seed=SEED,
-        processor=f"Processor: {processor()}, {os.cpu_count()} cores.",
+        processor=f"Processor: {processor()['model name']}, {os.cpu_count()} cores.",
         load=f"Load of the machine at the end: {os.getloadavg()[1]:.1f}.",
         rows=text,
         bar_wall=BAR_WALL,

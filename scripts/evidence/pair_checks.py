@@ -5,7 +5,8 @@
 import math
 
 import numpy as np
-from pair_runs import Check, Program, Run, check
+from evidence_rows import Row
+from pair_runs import Program, Run, check
 from separatrix import decode_flags
 
 # time, x1, v1 = v2, x2, energy of the first events of a free pair, computed by another program
@@ -21,7 +22,7 @@ FREE_PAIR = (
 HALF_DIGIT = 5.1e-10
 
 
-def free_bodies(program: Program) -> list[Check]:
+def free_bodies(program: Program) -> list[Row]:
     """Without spring and drive the bodies come together."""
     m1, m2, b, v1, v2 = 2.0, 0.5, 0.7, 1.0, -2.0
     reduced = m1 * m2 / (m1 + m2)
@@ -31,25 +32,16 @@ def free_bodies(program: Program) -> list[Check]:
     )
     slid = float(run.data["driver_x"][-1] - run.data["x"][-1]) - 0.3
     loss = reduced * (v1 - v2) ** 2 / 2
-    return [
-        check(
-            "A-V1 time until sticking (s)",
-            run.of("event_time", "stick")[0],
-            (v1 - v2) * reduced / b,
-            1e-12,
-        ),
-        check(
-            "A-V1 common velocity (m/s)",
-            run.events["event_v_after"][0],
-            (m1 * v1 + m2 * v2) / (m1 + m2),
-            1e-12,
-        ),
-        check("A-V1 energy loss (J)", run.number("energy_lost_to_friction"), loss, 1e-12),
-        check("A-V1 slip length (m)", slid, loss / b, 1e-12),
-    ]
+    found = (
+        ("time until sticking (s)", run.of("event_time", "stick")[0], (v1 - v2) * reduced / b),
+        ("common velocity (m/s)", run.events["event_v_after"][0], (m1 * v1 + m2 * v2) / (m1 + m2)),
+        ("energy loss (J)", run.number("energy_lost_to_friction"), loss),
+        ("slip length (m)", slid, loss / b),
+    )
+    return [check(f"A-V1 {what}", ours, expected, 1e-12) for what, ours, expected in found]
 
 
-def carried_off(program: Program) -> list[Check]:
+def carried_off(program: Program) -> list[Row]:
     """A platform at constant velocity carries a body off that was at rest."""
     m2, b, velocity = 0.7, 0.3, 0.5
     run = program.trajectory("pair_platform", 'contact={law="none"}', "start.v0=0")
@@ -60,7 +52,7 @@ def carried_off(program: Program) -> list[Check]:
     ]
 
 
-def shaken(program: Program) -> list[Check]:
+def shaken(program: Program) -> list[Row]:
     """Stick and slip on a shaken platform with kappa = friction."""
     stuck = program.trajectory("sweep_pair_kappa", "body.friction=1", "start.v0=1")
     slipping = program.trajectory("sweep_pair_kappa", "body.friction=0.5")
@@ -70,27 +62,14 @@ def shaken(program: Program) -> list[Check]:
         check("A-V3 events at kappa = 1, equal initial velocities", stuck.kinds.size, 0, 0),
         check("A-V3 stick phases at kappa = 0.5", slipping.of("event_time", "stick").size, 0, 0),
         check("A-V3 peak of v2 at kappa = 0.5 (m/s)", slipping.number("v_max"), math.pi * 0.5 / 2, 1e-9),
-        check(
-            "A-V3 kappa at the onset of stick, run-up",
-            limits["non_impact_to_sticking_up"],
-            slip,
-            5e-5,
-            digits=7,
-        ),
-        check(
-            "A-V3 kappa at the end of stick, run-down",
-            limits["sticking_to_non_impact_down"],
-            slip,
-            5e-5,
-            digits=7,
-        ),
-        check("A-V3 kappa at the end of slip, run-up", limits["sticking_to_stuck_up"], stick, 5e-5, digits=7),
-        check(
-            "A-V3 kappa at the onset of slip, run-down",
-            limits["stuck_to_sticking_down"],
-            stick,
-            5e-5,
-            digits=7,
+        *(
+            check(f"A-V3 kappa at the {what}", limits[name], expected, 5e-5, digits=7)
+            for what, name, expected in (
+                ("onset of stick, run-up", "non_impact_to_sticking_up", slip),
+                ("end of stick, run-down", "sticking_to_non_impact_down", slip),
+                ("end of slip, run-up", "sticking_to_stuck_up", stick),
+                ("onset of slip, run-down", "stuck_to_sticking_down", stick),
+            )
         ),
     ]
 
@@ -104,14 +83,14 @@ def event_energies(run: Run) -> np.ndarray:
     ) / 2
 
 
-def free_pair(program: Program) -> list[Check]:
+def free_pair(program: Program) -> list[Row]:
     """Every event of the free pair as printed, and its book of energy."""
     run = program.trajectory("pair_free", "run.duration=386.9297")
     energies = event_energies(run)
     columns = [run.events[f"event_{name}"] for name in ("time", "driver_x", "driver_v", "x")]
     kinds = {"turning_point": "reversal", "stick": "stick", "release": "slip"}
     checks = [
-        Check(
+        check(
             f"P1 event {i + 1}, {kinds[str(run.kinds[i])]}: t, x1, v, x2, E",
             [*(float(column[i]) for column in columns), float(energies[i])],
             expected,
@@ -132,7 +111,7 @@ def free_pair(program: Program) -> list[Check]:
     ]
 
 
-def algebraic(program: Program) -> list[Check]:
+def algebraic(program: Program) -> list[Row]:
     """The energy above the limit of stick falls like 1/(k n) with the number n of slips."""
     run = program.trajectory("pair_free", "run.duration=40000", "trajectory.samples_per_period=2")
     above = event_energies(run)[run.kinds == "stick"] - 0.045
@@ -149,7 +128,7 @@ def algebraic(program: Program) -> list[Check]:
     ]
 
 
-def bouncing(program: Program) -> list[Check]:
+def bouncing(program: Program) -> list[Row]:
     """A platform at constant velocity carries a body into a stop."""
     m2, b, velocity, e = 0.7, 0.3, 0.5, 0.6
     run = program.trajectory("pair_platform")
@@ -165,49 +144,25 @@ def bouncing(program: Program) -> list[Check]:
         lows.append(flight.number("x_min"))
     chatter = run.of("event_time", "chatter_upper")
     names = decode_flags(run.data["mode"]).values.astype(str)
-    worst = {"digits": 4}
+    speeds = velocity * e**k
+    found = (
+        (f"impact speeds V e^k, k = 0 to {count - 1} (m/s)", before[:count], speeds),
+        ("rebound speeds V e^(k+1) (m/s)", -after[:count], e * speeds),
+        ("return times 2 m2 V e^(k+1)/b (s)", np.diff(time)[:count], 2 * m2 * e * speeds / b),
+        ("excursions m2 (V e^(k+1))^2/(2b) (m)", 1 - np.array(lows), m2 * (e * speeds) ** 2 / (2 * b)),
+    )
+    power, passed = (np.diff(run.data[name].values[-2:])[0] for name in ("friction_loss", "time"))
+    ending = 2 + 2 * m2 * velocity * e / (b * (1 - e))
     return [
-        Check(
-            f"B.3 impact speeds V e^k, k = 0 to {count - 1} (m/s)",
-            before[:count],
-            velocity * e**k,
-            1e-10,
-            **worst,
-        ),
-        Check("B.3 rebound speeds V e^(k+1) (m/s)", -after[:count], velocity * e ** (k + 1), 1e-10, **worst),
-        Check(
-            "B.3 return times 2 m2 V e^(k+1)/b (s)",
-            np.diff(time)[:count],
-            2 * m2 * velocity * e ** (k + 1) / b,
-            1e-10,
-            **worst,
-        ),
-        Check(
-            "B.3 excursions m2 (V e^(k+1))^2/(2b) (m)",
-            1 - np.array(lows),
-            m2 * (velocity * e ** (k + 1)) ** 2 / (2 * b),
-            1e-10,
-            **worst,
-        ),
-        check(
-            "B.3 accumulation of the impacts (s)",
-            chatter[0],
-            2 + 2 * m2 * velocity * e / (b * (1 - e)),
-            1e-10,
-        ),
+        *(check(f"B.3 {what}", ours, expected, 1e-10, digits=4) for what, ours, expected in found),
+        check("B.3 accumulation of the impacts (s)", chatter[0], ending, 1e-10),
         check("B.3 last sample: distance from the stop (m)", 1 - float(run.data["x"][-1]), 0, 0),
         check("B.3 last sample in contact with the stop (1 = yes)", names[-1] == "upper_barrier", 1, 0),
-        check(
-            "B.3 friction power in contact (W) = b V",
-            float(np.diff(run.data["friction_loss"].values[-2:])[0])
-            / float(np.diff(run.data["time"].values[-2:])[0]),
-            b * velocity,
-            1e-10,
-        ),
+        check("B.3 friction power in contact (W) = b V", float(power / passed), b * velocity, 1e-10),
     ]
 
 
-def hammer(program: Program) -> list[Check]:
+def hammer(program: Program) -> list[Row]:
     """An impulse on a body on a resting platform; two free bodies with a stop between them."""
     m2, b, distance, e, v0 = 0.5, 1.5, 0.2, 0.7, 2.0
     run = program.trajectory("hammer")
@@ -218,23 +173,15 @@ def hammer(program: Program) -> list[Check]:
     w, v2 = (both.of(name, "impact_upper")[0] for name in ("event_v_before", "event_v_after"))
     # the driving body was at rest, and keeps its velocity up to the next impact
     v1 = both.data["driver_v"].values[both.data["time"].values > both.of("event_time", "impact_upper")[0]][0]
-    return [
-        check(
-            "B.3 hammer: velocity before the impact (m/s)",
-            run.of("event_v_before", "impact_upper")[0],
-            arrival,
-            1e-12,
-        ),
-        check(
-            "B.3 hammer: velocity after the impact (m/s)",
-            run.of("event_v_after", "impact_upper")[0],
-            -e * arrival,
-            1e-12,
-        ),
-        check("B.3 hammer: rest position (m)", run.of("event_x", "stick")[0], rest, 1e-12),
-        check("B.2 stop on m1: relative velocity after an impact (m/s)", v2 - v1, -0.85 * w, 1e-12),
-        check("B.2 stop on m1: momentum after an impact (N s)", v1 + 0.5 * v2, 0.5 * w, 1e-12),
-    ]
+    hit = [run.of(name, "impact_upper")[0] for name in ("event_v_before", "event_v_after")]
+    found = (
+        ("B.3 hammer: velocity before the impact (m/s)", hit[0], arrival),
+        ("B.3 hammer: velocity after the impact (m/s)", hit[1], -e * arrival),
+        ("B.3 hammer: rest position (m)", run.of("event_x", "stick")[0], rest),
+        ("B.2 stop on m1: relative velocity after an impact (m/s)", v2 - v1, -0.85 * w),
+        ("B.2 stop on m1: momentum after an impact (N s)", v1 + 0.5 * v2, 0.5 * w),
+    )
+    return [check(what, ours, expected, 1e-12) for what, ours, expected in found]
 
 
 def recovered(record: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -256,7 +203,7 @@ def recovered(record: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(times), np.array(heights)
 
 
-def identified(program: Program) -> list[Check]:
+def identified(program: Program) -> list[Row]:
     """Restitution and friction from records at 2 kHz with 8 micrometres of noise."""
     checks = []
     for seed in (1, 2, 3):
@@ -266,8 +213,8 @@ def identified(program: Program) -> list[Check]:
         friction = 8 * heights / times**2
         name = f"B.3 record, noise seed {seed}: "
         checks += [
-            Check(f"{name}e from successive flight times", e_times, [0.6] * 4, 2e-3, digits=5),
-            Check(f"{name}e from successive heights", e_heights, [0.6] * 4, 1e-3, digits=5),
-            Check(f"{name}b/m2 of each flight (m/s^2)", friction, [0.3 / 0.7] * 5, 5e-3, True, 5),
+            check(f"{name}e from successive flight times", e_times, [0.6] * 4, 2e-3, digits=5),
+            check(f"{name}e from successive heights", e_heights, [0.6] * 4, 1e-3, digits=5),
+            check(f"{name}b/m2 of each flight (m/s^2)", friction, [0.3 / 0.7] * 5, 5e-3, True, 5),
         ]
     return checks

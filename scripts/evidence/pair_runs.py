@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs of cases of examples/, and checks: what a run found, what is expected, and the bar."""
+"""Runs of cases of examples/, and rows of what they found beside what is expected."""
 
 import os
 import subprocess
@@ -11,40 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from evidence_rows import SOURCE, Row
 from separatrix import decode_flags, open_result, table
-
-SOURCE = Path(__file__).resolve().parents[2]
-
-
-@dataclass(frozen=True)
-class Check:
-    """One line of a table; `bar` is for the largest difference, relative to `expected` where `relative`."""
-
-    name: str
-    found: Sequence[float]
-    expected: Sequence[float]
-    bar: float
-    relative: bool = False
-    digits: int = 10
-
-    @property
-    def difference(self) -> float:
-        """The largest one."""
-        found, expected = np.asarray(self.found, float), np.asarray(self.expected, float)
-        apart = np.abs(found - expected)
-        return float((apart / np.abs(expected) if self.relative else apart).max())
-
-    @property
-    def met(self) -> bool:
-        """Whether the difference is within the bar."""
-        return self.difference <= self.bar
 
 
 def check(
-    name: str, found: float, expected: float, bar: float, relative: bool = False, digits: int = 10
-) -> Check:
-    """Return a check of one number."""
-    return Check(name, (found,), (expected,), bar, relative, digits)
+    name: str,
+    found: float | Sequence[float],
+    expected: float | Sequence[float],
+    bar: float,
+    relative: bool = False,
+    digits: int = 10,
+) -> Row:
+    """Return a row for one number, or for as many as expected; the difference is the largest one."""
+    return Row("", name, np.atleast_1d(expected), np.atleast_1d(found), bar, relative, digits)
 
 
 @dataclass

@@ -7,7 +7,6 @@ A file in the output folder that is newer than the program and its case is kept,
 goes on where it was. The prose of the page is in published.md.in, its tables come from published_tables.py.
 """
 
-import argparse
 import math
 import os
 import re
@@ -18,7 +17,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import published_tables as tables
-from markdown import table
+from evidence_rows import arguments, page, table, version_of
 from published_tables import LAWS, MOTIONS, SOURCE, case_of, resolved, run_of
 from separatrix import cli, open_result
 
@@ -31,10 +30,7 @@ class Runner:
 
     def __init__(self, build: Path, out: Path, ranks: int) -> None:
         self.program, self.out = build / "bin" / "separatrix", out
-        if not self.program.is_file():
-            sys.exit(f"published: {self.program} has not been built")
-        lines = subprocess.run([self.program, "--version"], capture_output=True, text=True, check=True).stdout
-        self.version = dict(line.split(" ", 1) for line in lines.splitlines())
+        self.version = version_of(self.program)
         self.start = [] if self.version["mpi"] == "none" else ["mpirun", "-n", str(ranks)]
         out.mkdir(parents=True, exist_ok=True)
         for line in (SOURCE / "scripts" / "environment.sh").read_text().splitlines():
@@ -115,7 +111,7 @@ def pictures(stem: str, text: str, laws: Iterable[str] = LAWS) -> str:
     return "\n\n".join(f"![{text.format(LAWS[law])}](figures/{stem.format(law)}.png)" for law in laws)
 
 
-def page(files: dict[str, Path], version: dict[str, str]) -> str:
+def text_of(files: dict[str, Path], version: dict[str, str]) -> str:
     """Return the text of docs/published.md."""
     run = run_of(files["trajectory_coulomb_0.8"])
     rate = resolved(files["trajectory_viscous_0.8"])["friction"]["damping"] / 2
@@ -150,21 +146,17 @@ def page(files: dict[str, Path], version: dict[str, str]) -> str:
     }
     for name, (head, make) in tables.TABLES.items():
         fields[name] = table(head.split(", "), make(files))
-    return (SOURCE / "scripts/evidence/published.md.in").read_text().format(**fields, **run)
+    return page("published", **fields, **run)
 
 
 def main() -> int:
     """Run everything; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--build", type=Path, default=SOURCE / "build", help="build folder [build]")
-    parser.add_argument(
-        "--out", type=Path, default=SOURCE / "out" / "published", help="files [out/published]"
-    )
+    parser = arguments(__doc__, "published")
     parser.add_argument("--ranks", type=int, default=2, help="ranks under mpirun [2]")
     options = parser.parse_args()
     runner = Runner(options.build.resolve(), options.out.resolve(), options.ranks)
     files = run_all(runner)
-    text = page(files, runner.version)
+    text = text_of(files, runner.version)
     (SOURCE / "docs" / "published.md").write_text(text)
     shown = SOURCE / "docs" / "figures"
     drawn = options.out / "figures"

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import contact_checks as contacts
 import pair_checks as pair
-from markdown import table
-from pair_runs import SOURCE, Check, Program
+from evidence_rows import SOURCE, Row, page, table, table_of, version_of
+from pair_runs import Program
 from separatrix import cli
 
 SECTIONS = {
@@ -45,28 +45,22 @@ DRAWN = ("pair_free", "pair_platform", "hammer", "pair_backlash")
 BESIDE = ("contact_hunt_crossley", "contact_kelvin_voigt")
 
 
-def cell(values: object, digits: int) -> str:
-    """Numbers of a check as text."""
-    return ", ".join(f"{float(value):.{digits}g}" for value in values)
+def rows_of(items: list[Row]) -> str:
+    """The table of a section."""
+    columns = ("quantity", "ours", "theirs", "difference", "tolerance", "verdict")
+    return table_of(items, columns, ("quantity", "computed", "expected", *columns[3:]))
 
 
-def row(item: Check) -> list[str]:
-    """A line of a table."""
-    unit = " (relative)" if item.relative else ""
-    found, expected = cell(item.found, item.digits), cell(item.expected, item.digits)
-    apart = f"{item.difference:.1e}" if item.difference else "0"
-    bar = f"{item.bar:g}{unit}" if item.bar else "equal"
-    return [item.name, found, expected, apart, bar, "met" if item.met else "NOT met"]
-
-
-def run_sections(program: Program) -> dict[str, tuple[list[Check], list[str]]]:
+def run_sections(program: Program) -> dict[str, tuple[list[Row], list[str]]]:
     """Return the checks of every section and the commands that they took."""
     done = {}
     for name, functions in SECTIONS.items():
         program.commands.clear()
         items = [item for function in functions for item in function(program)]
         done[name] = items, list(dict.fromkeys(program.commands))
-        print(f"published: {name}: {sum(item.met for item in items)} of {len(items)} met", flush=True)
+        print(
+            f"published: {name}: {sum(not item.differs for item in items)} of {len(items)} agree", flush=True
+        )
     return done
 
 
@@ -115,29 +109,22 @@ def main() -> int:
     parser.add_argument("--build", type=Path, default=SOURCE / "build", help="build folder [build]")
     build = parser.parse_args().build.resolve()
     path = build / "bin" / "separatrix"
-    if not path.is_file():
-        sys.exit(f"published: {path} has not been built")
-    version = subprocess.run(
-        [path, "--version"], capture_output=True, text=True, check=True
-    ).stdout.splitlines()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         program = Program(path, folder)
         sections = run_sections(program)
         tests = run_tests(build)
         draw(program, folder)
-    head = ["quantity", "computed", "expected", "difference", "tolerance", ""]
-    fields = dict(line.split(" ", 1) for line in version)
+    fields = version_of(path)
     for name, (items, commands) in sections.items():
-        fields[name] = table(head, [row(item) for item in items])
+        fields[name] = rows_of(items)
         fields[f"{name}_runs"] = commands_of(commands)
     fields["tests"] = table(["property", "test", ""], tests)
-    missed = [item.name for items, _ in sections.values() for item in items if not item.met]
+    missed = [item.what for items, _ in sections.values() for item in items if item.differs]
     missed += [line[1] for line in tests if line[-1] != "passed"]
     fields["count"] = sum(len(items) for items, _ in sections.values())
     fields["missed"] = "\n".join(f"* {name}" for name in missed) or "None."
-    text = (SOURCE / "scripts/evidence/published_pair.md.in").read_text().format(**fields)
-    (SOURCE / "docs" / "published_pair.md").write_text(text)
+    (SOURCE / "docs" / "published_pair.md").write_text(page("published_pair", **fields))
     print("published: wrote docs/published_pair.md and its figures", flush=True)
     return 1 if missed else 0
 

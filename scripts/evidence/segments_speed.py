@@ -12,8 +12,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from analysis_speed import model as processor
-from markdown import table
+from evidence_rows import processor, table
 from separatrix.library import Model, Segments
 
 SOURCE = Path(__file__).resolve().parents[2]
@@ -110,7 +109,7 @@ def main() -> None:
         samples=SAMPLES,
         directions=len(BASE),
         rounds=ROUNDS,
-        processor=f"Processor: {processor()}.",
+        processor=f"Processor: {processor()['model name']}.",
         rows=rows,
     )
     (SOURCE / "docs" / "performance_segments.md").write_text(page)

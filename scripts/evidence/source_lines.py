@@ -10,7 +10,7 @@ import tarfile
 from collections import Counter
 from pathlib import Path
 
-from markdown import table
+from evidence_rows import table
 
 SOURCE = Path(__file__).resolve().parents[2]
 COMMENTS = {

@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rows of docs/validation.md: points of codimension two, by `separatrix branches --free`."""
 
-import subprocess
-
+from evidence_rows import Row
 from separatrix import open_result
 from separatrix.open import decode_flags
-from validation_program import CASES, Program, Row
+from validation_program import Program, row
 
 
 def resonant_grazes(program: Program) -> list[Row]:
@@ -20,20 +19,17 @@ def resonant_grazes(program: Program) -> list[Row]:
 def _fold_on_graze(
     program: Program, key: str, range_: tuple[float, float], ratio: float, free: tuple[float, float]
 ) -> Row:
-    asked = [
+    asked = (
         *("--parameter", "drive.amplitude", "--from", repr(range_[0]), "--to", repr(range_[1])),
         *("--set", f"drive.ratio={ratio}", "--searches", "4"),
         *("--free", "drive.ratio", "--free-from", repr(free[0]), "--free-to", repr(free[1])),
-    ]
-    output = program.folder / "curves.h5"
-    case = CASES / "impact_coco.toml"
-    subprocess.run([program.path, "branches", case, "-q", "--force", "-o", output, *asked], check=True)
-    with open_result(output) as result:
+    )
+    with open_result(program.run("branches", "impact_coco", options=asked)) as result:
         fold = decode_flags(result["curve_label"]).values == "SN"
         graze = decode_flags(result["curve_second"]).values == "GR"
         (crossing,) = result["curve_free"].values[fold & graze]
     how = f"`separatrix branches examples/validation/impact_coco.toml {' '.join(asked)}`"
-    return Row(f"{key}.branches", float(crossing), how)
+    return row(f"{key}.branches", crossing, how)
 
 
 COMPUTED = (resonant_grazes,)

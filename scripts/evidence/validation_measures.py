@@ -5,12 +5,12 @@
 import math
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import separatrix as sx
-from markdown import table
+from evidence_rows import Row, show
 from separatrix.measuring import balls, entropy, uncertainty, wada
 from separatrix.measuring.maps import slice_of
 from separatrix.measuring.sampling import Region
@@ -23,25 +23,10 @@ PEERS = "Attractors.jl and Basins.jl, tests"
 GREBOGI = "C. Grebogi, S. W. McDonald, E. Ott, J. A. Yorke, Phys. Lett. A 99 (1983)"
 
 
-@dataclass(frozen=True)
-class Row:
-    """One number: of whom, what it is, theirs, the bar, and ours."""
-
-    source: str
-    what: str
-    theirs: float
-    bar: float
-    ours: float
-
-    @property
-    def verdict(self) -> str:
-        """Whether the difference is within the bar."""
-        return "agrees" if abs(self.ours - self.theirs) <= self.bar else "DIFFERS"
-
-
 def rows() -> list[Row]:
     """All rows, computed."""
-    return [*exponents(), *spheres(), *entropies(), *boxes(), *duffing(), *pendulum()]
+    found = [*exponents(), *spheres(), *entropies(), *boxes(), *duffing(), *pendulum()]
+    return [replace(row, digits=6) for row in found]
 
 
 def exponents() -> list[Row]:
@@ -53,13 +38,18 @@ def exponents() -> list[Row]:
     unit, turn = Region.of((0, 0), (1, 1)), Region.of((0.0, -0.5), (2 * math.pi, 0.5))
     third, hole = math.log(3), math.log(8)
     return [
-        Row(KNOWN, "Cantor stripes: exponent", 1 - math.log(2) / third, 5e-3, alpha(sets.cantor, unit)),
-        Row(KNOWN, "Sierpinski carpet: exponent", 2 - hole / third, 5e-3, alpha(sets.carpet, unit)),
-        Row(KNOWN, "straight line: exponent", 1, 0.02, alpha(sets.half_plane((0.6, 0.8), 0.7), unit)),
-        Row(GREBOGI, "their map, J0 = 0.3: exponent", 0.2, 0.05, alpha(sets.grebogi, turn, 1000, 8)),
-        Row(PEERS, "Newton's method for z^3 = 1: exponent, 0.55 to 0.65", 0.6, 0.05,
-            alpha(sets.newton, Region.of((-1, -1), (1, 1)), 1000, 8)),
-    ]  # fmt: skip
+        Row(KNOWN, "Cantor stripes: exponent", 1 - math.log(2) / third, alpha(sets.cantor, unit), 5e-3),
+        Row(KNOWN, "Sierpinski carpet: exponent", 2 - hole / third, alpha(sets.carpet, unit), 5e-3),
+        Row(KNOWN, "straight line: exponent", 1, alpha(sets.half_plane((0.6, 0.8), 0.7), unit), 0.02),
+        Row(GREBOGI, "their map, J0 = 0.3: exponent", 0.2, alpha(sets.grebogi, turn, 1000, 8), 0.05),
+        Row(
+            PEERS,
+            "Newton's method for z^3 = 1: exponent, 0.55 to 0.65",
+            0.6,
+            alpha(sets.newton, Region.of((-1, -1), (1, 1)), 1000, 8),
+            0.05,
+        ),
+    ]
 
 
 def spheres() -> list[Row]:
@@ -73,12 +63,17 @@ def spheres() -> list[Row]:
     grid, axes = sets.grid_of(ring, wide.lower, wide.upper, 121)
     largest, _ = balls.inscribed_ball(ring, grid, axes, 1, wide)
     return [
-        Row(KNOWN, "ellipse: LIM, its minor semi-axis", 0.3, 1e-9, radius(sets.ellipse((0.7, 0.3)), (0, 0))),
-        Row(KNOWN, "half plane: LIM", 0.5, 1e-9, radius(sets.half_plane((0.6, 0.8), 0.5), (0, 0))),
-        Row(KNOWN, "annulus: IF, its half width", 0.3, 1e-5, largest.inner),
-        Row(PEERS, "Newton's method for z^3 = 1: smallest perturbation out of the basin of 1", 0.622, 5e-4,
-            radius(sets.newton, (1, 0))),
-    ]  # fmt: skip
+        Row(KNOWN, "ellipse: LIM, its minor semi-axis", 0.3, radius(sets.ellipse((0.7, 0.3)), (0, 0)), 1e-9),
+        Row(KNOWN, "half plane: LIM", 0.5, radius(sets.half_plane((0.6, 0.8), 0.5), (0, 0)), 1e-9),
+        Row(KNOWN, "annulus: IF, its half width", 0.3, largest.inner, 1e-5),
+        Row(
+            PEERS,
+            "Newton's method for z^3 = 1: smallest perturbation out of the basin of 1",
+            0.622,
+            radius(sets.newton, (1, 0)),
+            5e-4,
+        ),
+    ]
 
 
 def entropies() -> list[Row]:
@@ -88,8 +83,8 @@ def entropies() -> list[Row]:
             KNOWN,
             f"smooth boundary, {d}-D: Sbb",
             value,
-            5e-6,
             entropy.smooth_entropy(None, d),
+            5e-6,
         )
         for d, value in ((1, 0.5), (2, 0.43951), (3, 0.39609))
     ]
@@ -98,7 +93,7 @@ def entropies() -> list[Row]:
     )
     drawn = line.boundary[0] - line.smooth + entropy.smooth_entropy(None, 2)
     found.append(
-        Row(KNOWN, "two dimensions, 100000 discs, corrected for 200 starts in each", 0.43951, 2e-3, drawn)
+        Row(KNOWN, "two dimensions, 100000 discs, corrected for 200 starts in each", 0.43951, drawn, 2e-3)
     )
     random, false = np.random.default_rng(3), 0
     for seed in range(1000):
@@ -111,8 +106,8 @@ def entropies() -> list[Row]:
             KNOWN,
             "1000 smooth boundaries: share classified as rough at the level 0.05",
             0.05,
-            0.0227,
             false / 1000,
+            0.0227,
         )
     )
     return found
@@ -123,8 +118,8 @@ def boxes() -> list[Row]:
     grid, _ = sets.grid_of(sets.grebogi, (0.0, -0.5), (2 * math.pi, 0.5), 300)
     each = _box_entropies(grid, 6)
     return [
-        Row(PEERS, "map of Grebogi, 300^2, boxes of 6: Sb, 0.40 to 0.42", 0.41, 0.01, float(each.mean())),
-        Row(PEERS, "the same: Sbb, 0.60 to 0.61", 0.605, 0.005, float(each[each > 0].mean())),
+        Row(PEERS, "map of Grebogi, 300^2, boxes of 6: Sb, 0.40 to 0.42", 0.41, float(each.mean()), 0.01),
+        Row(PEERS, "the same: Sbb, 0.60 to 0.61", 0.605, float(each[each > 0].mean()), 0.005),
     ]
 
 
@@ -157,11 +152,11 @@ def duffing() -> list[Row]:
             PEERS,
             f"{what}: share of the smaller basin, 0.492 to 0.5",
             0.496,
-            0.004,
             float(min((grid == label).mean() for label in (1, 2))),
+            0.004,
         ),
-        Row(PEERS, "the same, boxes of 20: Sb", 0.663, 0.005, float(each.mean())),
-        Row(PEERS, "the same: Sbb", 0.663, 0.005, float(each[each > 0].mean())),
+        Row(PEERS, "the same, boxes of 20: Sb", 0.663, float(each.mean()), 0.005),
+        Row(PEERS, "the same: Sbb", 0.663, float(each[each > 0].mean()), 0.005),
     ]
 
 
@@ -185,36 +180,19 @@ def pendulum() -> list[Row]:
             PEERS,
             "pendulum, d = 0.2, F = 1.66, 100^2: basins",
             3,
-            0,
             len(np.unique(found.grid[found.grid > 0])),
+            0,
         ),
-        Row(PEERS, "the same: largest distance of merged boundaries", 6, 1, float(distances[-1])),
+        Row(PEERS, "the same: largest distance of merged boundaries", 6, float(distances[-1]), 1),
         Row(
             PEERS,
             "the same: W_3 of 100 cells, at least 0.9",
             1,
-            0.1,
             cells.shares[-1][0],
+            0.1,
         ),
     ]
 
 
-def _cells(row: Row) -> list[str]:
-    """A row as cells."""
-    verdict = row.verdict if row.verdict == "agrees" else f"**{row.verdict}**"
-    apart = f"{row.ours - row.theirs:.1e}"
-    return [row.what, f"{row.theirs:.6g}", f"{row.ours:.10g}", apart, f"{row.bar:g}", verdict]
-
-
-def section(found: list[Row]) -> str:
-    """The tables, by source."""
-    head = ["quantity", "theirs", "ours", "difference", "tolerance", "verdict"]
-    parts = []
-    for source in dict.fromkeys(row.source for row in found):
-        lines = [_cells(row) for row in found if row.source == source]
-        parts.append(f"### {source}\n\n{table(head, lines)}")
-    return "\n\n".join(parts)
-
-
 if __name__ == "__main__":
-    print(section(rows()))
+    sys.exit(show(rows(), "--json" in sys.argv))

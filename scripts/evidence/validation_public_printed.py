@@ -7,56 +7,55 @@ import os
 import h5py
 import numpy as np
 import separatrix as sx
-from validation_public_program import CASES, CLOSED, Settled, ends, events, largest, series, times
-from validation_structures_program import Number, Program
+from evidence_rows import Row
+from validation_public_program import CLOSED, Program, largest, series
 
 
-def modelica(source: str, what: str, theirs: float, ours: float) -> Number:
+def modelica(source: str, what: str, theirs: float, ours: float) -> Row:
     """A number of Modelica's reference results, which are computed with a tolerance of 1e-6."""
-    return Number(source, what, theirs, ours, 2e-5 * max(1.0, abs(theirs)))
+    return Row(source, what, theirs, ours, 2e-5 * max(1.0, abs(theirs)))
 
 
-def reference_fmu(program: Program) -> list[Number]:
+def reference_fmu(program: Program) -> list[Row]:
     """BouncingBall of Reference-FMUs, whose impacts come early by what its integrator loses at each."""
-    found = events(program, "ball", "impact_lower", "contact.ground")
-    rest = events(program, "ball", "chatter_lower", "contact.ground")[0, 0]
+    found = program.events("ball", "impact_lower", "contact.ground")
+    rest = program.events("ball", "chatter_lower", "contact.ground")[0, 0]
     fall = np.sqrt(2 / 9.81)
     closed = [fall * (1 + 2 * sum(0.7**j for j in range(1, k + 1))) for k in range(11)]
     source = "Modelica Association, Reference-FMUs, BouncingBall_ref.csv"
     what = "ball, e = 0.7: impact"
     numbers = [
-        Settled(
+        Row(
             source,
             f"{what} {k + 1} (s)",
             theirs,
             found[k, 0],
             5 * 10.0 ** -len(str(theirs).split(".")[1]) / 10,
-            closed[k],
+            closed=closed[k],
         )
         for k, theirs in ((0, 0.451522), (1, 1.08365), (4, 2.05263), (10, 2.498))
     ]
     speed = np.sqrt(2 * 9.81) * 0.7**4
     numbers.append(
-        Settled(source, "the same: speed before impact 5 (m/s)", 1.06326, abs(found[4, 2]), 5e-6, speed)
+        Row(source, "the same: speed before impact 5 (m/s)", 1.06326, abs(found[4, 2]), 5e-6, closed=speed)
     )
-    return [*numbers, Number(CLOSED, "the same: time of rest (s)", fall * (1 + 2 * 0.7 / 0.3), rest, 1e-9)]
+    return [*numbers, Row(CLOSED, "the same: time of rest (s)", fall * (1 + 2 * 0.7 / 0.3), rest, 1e-9)]
 
 
-def petsc(program: Program) -> list[Number]:
+def petsc(program: Program) -> list[Row]:
     """The bouncing ball of TS tutorial 40, to the three decimals of its test."""
     theirs = [4.082, 7.755, 11.061, 14.037, 16.715, 19.125, 21.294, 23.246, 25.003, 26.585]
     machine = {"body__ball__load": -9.8, "contact__ground__restitution": 0.9, "start__x0": 0, "start__v0": 20}
-    found = events(program, "ball", "impact_lower", "contact.ground", run__duration=27, **machine)
+    found = program.events("ball", "impact_lower", "contact.ground", run__duration=27, **machine)
     source = "PETSc, TS tutorial ex40, its test's output"
     return [largest(source, "ball, e = 0.9: times of impacts (s)", theirs, found[:, 0], 5e-4)]
 
 
-def siconos(program: Program) -> list[Number]:
+def siconos(program: Program) -> list[Row]:
     """The event-driven bouncing balls of Siconos, with rebound and without."""
     source = "Siconos, BouncingBallED.ref"
     theirs = [6.719654906527709, 6.905584333747781, 7.072920818245836, 7.223523654294080]
-    found = events(
-        program,
+    found = program.events(
         "ball",
         "impact_lower",
         "contact.ground",
@@ -65,41 +64,41 @@ def siconos(program: Program) -> list[Number]:
     )
     numbers = series(source, "ball, e = 0.9, at 6.7 s and later: impact (s)", theirs, found[-4:, 0], 1e-11)
     source = "Siconos, BouncingBallEDwithRestingContact.ref"
-    found = events(program, "ball", "impact_lower", "contact.ground", contact__ground__restitution=0)
+    found = program.events("ball", "impact_lower", "contact.ground", contact__ground__restitution=0)
     return [
         *numbers,
-        Number(source, "ball, e = 0: impact (s)", 0.4515236409857311, found[0, 0], 1e-12),
-        Number(source, "the same: its speed (m/s)", 4.429446918070021, abs(found[0, 2]), 1e-12),
-        Number(source, "the same: impacts in 3 s", 1, len(found), 0),
+        Row(source, "ball, e = 0: impact (s)", 0.4515236409857311, found[0, 0], 1e-12),
+        Row(source, "the same: its speed (m/s)", 4.429446918070021, abs(found[0, 2]), 1e-12),
+        Row(source, "the same: impacts in 3 s", 1, len(found), 0),
     ]
 
 
-def scipy_cannon(program: Program) -> list[Number]:
+def scipy_cannon(program: Program) -> list[Row]:
     """The cannon of solve_ivp's documentation, which stays on the ground."""
     source = "SciPy, documentation of solve_ivp"
-    hit = events(program, "cannon", "impact_lower", "contact.ground")
-    at_end = ends(program, "cannon", "x", "v")
+    hit = program.events("cannon", "impact_lower", "contact.ground")
+    at_end = program.ends("cannon", "x", "v")
     return [
-        Number(source, "upward shot: impact on the ground (s)", 40.0, hit[0, 0], 1e-12),
-        Number(CLOSED, "the same, no rebound: speed 10 s later", 0.0, abs(at_end[1]), 0),
+        Row(source, "upward shot: impact on the ground (s)", 40.0, hit[0, 0], 1e-12),
+        Row(CLOSED, "the same, no rebound: speed 10 s later", 0.0, abs(at_end[1]), 0),
     ]
 
 
-def simulink(program: Program) -> list[Number]:
+def simulink(program: Program) -> list[Row]:
     """The ball of the page on Zeno behaviour, whose solver errs or goes on with chatter after 20 s."""
     machine = {"start__x0": 10, "start__v0": 15, "contact__ground__restitution": 0.8, "run__duration": 25}
-    rest = events(program, "ball", "chatter_lower", "contact.ground", **machine)[0, 0]
+    rest = program.events("ball", "chatter_lower", "contact.ground", **machine)[0, 0]
     fall = np.sqrt(15**2 + 2 * 9.81 * 10)
     theirs = (15 + fall) / 9.81 + 2 * 0.8 * fall / 9.81 / (1 - 0.8)
     source = "Simulink, Simulation of a Bouncing Ball; closed form"
-    return [Number(source, "ball, e = 0.8: time of rest (s)", theirs, rest, 1e-9)]
+    return [Row(source, "ball, e = 0.8: time of rest (s)", theirs, rest, 1e-9)]
 
 
-def modelica_force(program: Program) -> list[Number]:
+def modelica_force(program: Program) -> list[Row]:
     """The driven mass with Stribeck friction."""
     source = "Modelica Standard Library 4.0, Translational.Examples.Friction, stop1"
-    happened = [at for _, at in times(program, "stribeck_force")]
-    position, rate = ends(program, "stribeck_force", "x", "v")
+    happened = [at for _, at in program.times("stribeck_force")]
+    position, rate = program.ends("stribeck_force", "x", "v")
     return [
         *(
             modelica(source, f"driven mass with Stribeck friction: {what} (s)", theirs, ours)
@@ -115,7 +114,7 @@ def modelica_force(program: Program) -> list[Number]:
     ]
 
 
-def modelica_stop(program: Program) -> list[Number]:
+def modelica_stop(program: Program) -> list[Row]:
     """The mass on a spring that meets its stop, leaves it, and sticks."""
     source = "Modelica Standard Library 4.0, Translational.Examples.Friction, stop2"
     theirs = (
@@ -128,26 +127,26 @@ def modelica_stop(program: Program) -> list[Number]:
         0.904204209,
         1.045974061,
     )
-    found = sorted({round(at, 12) for _, at in times(program, "stribeck_stop")})
+    found = sorted({round(at, 12) for _, at in program.times("stribeck_stop")})
     return [
         largest(source, "mass on a spring with stops: impact, reversals and stick (s)", theirs, found, 2e-5),
         modelica(
-            source, "the same: position in stick (m)", -0.247515848, ends(program, "stribeck_stop", "x")[0]
+            source, "the same: position in stick (m)", -0.247515848, program.ends("stribeck_stop", "x")[0]
         ),
     ]
 
 
-def modelica_clutch(program: Program) -> list[Number]:
+def modelica_clutch(program: Program) -> list[Row]:
     """The drive train whose clutch closes, slips and closes again."""
     source = "Modelica Standard Library 4.0, Rotational.Examples.Friction"
     theirs = (0.006779709000, 0.059340056359, 0.109289495222)
-    motor, shaft, load, rate = ends(program, "clutch", "motor_x", "shaft_x", "load_x", "motor_v")
+    motor, shaft, load, rate = program.ends("clutch", "motor_x", "shaft_x", "load_x", "motor_v")
     return [
         largest(
             source,
             "clutch: closing, slip, closing (s)",
             theirs,
-            [at for _, at in times(program, "clutch")],
+            [at for _, at in program.times("clutch")],
             2e-6,
         ),
         modelica(source, "the same after 0.5 s: angle of the motor (rad)", 48.115488553, motor),
@@ -157,13 +156,13 @@ def modelica_clutch(program: Program) -> list[Number]:
     ]
 
 
-def galperin(program: Program) -> list[Number]:
+def galperin(program: Program) -> list[Row]:
     """Impacts of two blocks and a wall: digits of pi."""
     numbers = []
     for ratio, theirs in ((1, 3), (100, 31), (10000, 314), (1000000, 3141)):
-        happened = times(program, "blocks_pi", body__heavy__mass=ratio)
+        happened = program.times("blocks_pi", body__heavy__mass=ratio)
         numbers.append(
-            Number(
+            Row(
                 "G. Galperin (2003)",
                 f"two blocks and a wall, {ratio} times the mass: impacts",
                 theirs,
@@ -174,25 +173,25 @@ def galperin(program: Program) -> list[Number]:
     return numbers
 
 
-def rao(program: Program) -> list[Number]:
+def rao(program: Program) -> list[Row]:
     """A mass let go on dry friction."""
     source = "S. S. Rao, Mechanical Vibrations, problem on Coulomb damping"
-    happened = times(program, "rao_coulomb")
+    happened = program.times("rao_coulomb")
     return [
-        Number(source, "20 kg, 50 N of friction: half cycles until stick", 5, len(happened), 0),
-        Number(CLOSED, "the same: onset of stick (s)", 5 * np.pi / np.sqrt(500), happened[-1][1], 1e-12),
-        Number(CLOSED, "the same: rest position (m)", 0.0, ends(program, "rao_coulomb", "x")[0], 1e-14),
+        Row(source, "20 kg, 50 N of friction: half cycles until stick", 5, len(happened), 0),
+        Row(CLOSED, "the same: onset of stick (s)", 5 * np.pi / np.sqrt(500), happened[-1][1], 1e-12),
+        Row(CLOSED, "the same: rest position (m)", 0.0, program.ends("rao_coulomb", "x")[0], 1e-14),
     ]
 
 
-def five_cycles(program: Program) -> list[Number]:
+def five_cycles(program: Program) -> list[Row]:
     """Shares of the five cycles of a Duffing oscillator; two of period 2 are each other's mirror image."""
     source = "M. Stender, N. Hoffmann, bSTAB (2022), by pyBasin's comparison, 10000 starts"
-    with h5py.File(program.run("basin", CASES / "duffing_five.toml")) as file:
+    with h5py.File(program.run("basin", "duffing_five")) as file:
         entries, label = file["catalogue"], file["attractor"][:]
         share = np.array([np.mean(label == k) for k in entries["attractor"][:]])
         period, amplitude = entries["period"][:], entries["amplitude"][:]
-    numbers = [Number(source, "Duffing oscillator: coexisting cycles", 5, len(share), 0)]
+    numbers = [Row(source, "Duffing oscillator: coexisting cycles", 5, len(share), 0)]
     kinds = (
         ("the small cycle of period 1", 0.2027, (period == 1) & (amplitude < 0.5)),
         ("the large cycle of period 1", 0.4950, (period == 1) & (amplitude > 0.5)),
@@ -201,32 +200,32 @@ def five_cycles(program: Program) -> list[Number]:
     )
     for what, theirs, which in kinds:
         bar = 2 * np.sqrt(theirs * (1 - theirs) * (1 / 10000 + 1 / label.size))
-        numbers.append(Number(source, f"the same: share of {what}", theirs, float(np.sum(share[which])), bar))
+        numbers.append(Row(source, f"the same: share of {what}", theirs, float(np.sum(share[which])), bar))
     return numbers
 
 
-def chaos(program: Program) -> list[Number]:
+def chaos(program: Program) -> list[Row]:
     """Exponents of a double well under a force; the sum is minus the damping."""
     os.environ.setdefault("SEPARATRIX_PROGRAM", str(program.path))
-    found = sx.stability(sx.load(CASES / "duffing_chaos.toml"), periods=2000)
+    found = sx.stability(sx.load(program.cases / "duffing_chaos.toml"), periods=2000)
     first, second = found.exponents[:2]
     source = "W. Gilpin, dysts (2021), Duffing, its two estimates 0.0995 and 0.1403"
     return [
-        Number(
+        Row(
             source,
             "forced double well: largest exponent, mean of their estimates (1/s)",
             0.1199,
             first,
             0.0205,
         ),
-        Number(
+        Row(
             "Runge-Kutta method with fixed steps",
             "the same, from 200 pairs of motions",
             pairs_part(),
             first,
             0.015,
         ),
-        Number(CLOSED, "the same: sum of the exponents (1/s)", -0.1, first + second, 1e-8),
+        Row(CLOSED, "the same: sum of the exponents (1/s)", -0.1, first + second, 1e-8),
     ]
 
 

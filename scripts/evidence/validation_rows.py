@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import separatrix as sx
+from evidence_rows import Row
 from scipy.optimize import brentq
 from separatrix import open_result, table
 from separatrix.library import Model
 from stroboscopic import OFFSETS, WEIGHTS, Map, Orbit, doubling, fold, follow
-from validation_program import CASES, Labels, Program, Row
+from validation_program import CASES, Labels, Program, row
 
 CYCLE, FAMILY_OF_CYCLES = 1, 5
 NEWTON = (
@@ -50,9 +51,9 @@ def budd_dux(program: Program) -> list[Row]:
         "dux.resonant": slow.impact_speed[0],
         "dux.resonant_trace": np.trace(slow.matrix),
     }
-    rows = [Row(key, float(value), how) for key, value in numbers.items()]
+    rows = [row(key, value, how) for key, value in numbers.items()]
     rows.append(
-        Row(
+        row(
             "dux.node_catalogue",
             float(abs(map_modulus)),
             "`separatrix basin examples/validation/budd_dux.toml`",
@@ -69,12 +70,12 @@ def chaos(program: Program) -> list[Row]:
     duration = found.periods * 2 * np.pi / program.models["budd_dux"].drive_frequency({})
     lost = 2 * np.log(0.8) * found.impacts / duration
     return [
-        Row(
+        row(
             "dux.exponent",
             exponent,
             "`examples/validation/budd_dux.toml`, 200 pairs of neighbouring motions of the library",
         ),
-        Row("dux.sum", found.sum_found - lost, "`separatrix stability examples/validation/budd_dux.toml`"),
+        row("dux.sum", found.sum_found - lost, "`separatrix stability examples/validation/budd_dux.toml`"),
     ]
 
 
@@ -141,7 +142,7 @@ def coco(program: Program) -> list[Row]:
 
         numbers[f"coco.resonant.{n}"] = brentq(leverage, 2 / n - 0.02, 2 / n + 0.02, xtol=1e-14)
     numbers |= tangency(model, meeting, numbers["coco.resonant.2"])
-    rows = [Row(key, float(value), how) for key, value in numbers.items()]
+    rows = [row(key, value, how) for key, value in numbers.items()]
     return [*rows, *swept(program)]
 
 
@@ -193,30 +194,30 @@ def swept(program: Program) -> list[Row]:
         found = {str(name): (low + high) / 2 for name, low, high in zip(names, lows, highs, strict=True)}
     how = "`separatrix sweep examples/validation/impact_coco.toml`, middle of the bracket"
     names = {"coco.sweep_graze": "impacts_start_up", "coco.sweep_fold": "impacts_stop_down"}
-    return [Row(key, found.get(name, np.nan), how) for key, name in names.items()]
+    return [row(key, found.get(name, np.nan), how) for key, name in names.items()]
 
 
 def den_hartog(program: Program) -> list[Row]:
     """Dry friction: amplitude without stick, and where stick begins."""
     command = "`separatrix basin examples/validation/dry_friction.toml"
     amplitude = program.catalogue("dry_friction")["amplitude"].ravel()[0]
-    rows = [Row("hartog.amplitude", float(amplitude), f"{command}`")]
+    rows, onsets = [row("hartog.amplitude", amplitude, f"{command}`")], {}
     plain = ("friction.static_coefficient=1.0",)
     bare = ('friction={law="coulomb", kinetic_coefficient=1}',)
     for name, settings in {"": (), "plain_": plain, "undamped_": bare}.items():
         for side, ends in {"low": (0.6, 0.9), "high": (1.45, 1.1)}.items():
-            onset = stick_onset(program, ends, settings)
+            onset = onsets[name, side] = stick_onset(program, ends, settings)
             words = "".join(f" --set '{item}'" for item in settings)
             rows.append(
-                Row(
+                row(
                     f"hartog.{name}{side}",
                     onset,
                     f"{command}{words}` over drive ratios, refined to the change of regime",
                 )
             )
-    low = f"drive.ratio={next(row.ours for row in rows if row.key == 'hartog.low')!r}"
+    low = f"drive.ratio={onsets['', 'low']!r}"
     onset = program.catalogue("dry_friction", low)["amplitude"].ravel()[0]
-    return [*rows, Row("hartog.onset_amplitude", float(onset), f"{command} --set {low}`")]
+    return [*rows, row("hartog.onset_amplitude", onset, f"{command} --set {low}`")]
 
 
 def stick_onset(
@@ -247,12 +248,12 @@ def family(program: Program) -> list[Row]:
         here = Map(program.models["dry_friction_family"], {"drive.ratio": ratio})
         along = here.image(np.column_stack([x + 1e-3 * OFFSETS, np.zeros(4)]))
         how = f"`examples/validation/dry_friction_family.toml`, library, along the family at x = {x:.4f}"
-        rows.append(Row(key, float(WEIGHTS @ along[:, 0]) / 1e-3, how))
+        rows.append(row(key, float(WEIGHTS @ along[:, 0]) / 1e-3, how))
     axes = [f"axis[{i}].count=7" for i in (1, 2)]
     kinds = program.catalogue("dry_friction_family", *axes)["kind"].ravel()
     how = "`separatrix basin examples/validation/dry_friction_family.toml`, 7 x 7 starts"
-    rows.append(Row("family.catalogue", float(np.isin(kinds, (CYCLE, FAMILY_OF_CYCLES)).sum()), how))
-    rows.append(Row("family.kind", float((kinds == FAMILY_OF_CYCLES).sum()), how))
+    rows.append(row("family.catalogue", float(np.isin(kinds, (CYCLE, FAMILY_OF_CYCLES)).sum()), how))
+    rows.append(row("family.kind", float((kinds == FAMILY_OF_CYCLES).sum()), how))
     return rows
 
 
@@ -266,9 +267,9 @@ def soft(program: Program) -> list[Row]:
     others = entries["kind"].ravel()[~free]
     model, rig = program.models["soft_impact"], program.models["soft_impact_rig"]
     rows = [
-        Row("soft.amplitude", float(entries["amplitude"].ravel()[free][0]), command),
-        Row("soft.chaos", float(np.sum(others == 3)), command),
-        Row("soft.graze", graze_of(model, "drive.ratio", 0.42, 0.6, 0.63), NEWTON.format("soft_impact")),
+        row("soft.amplitude", float(entries["amplitude"].ravel()[free][0]), command),
+        row("soft.chaos", float(np.sum(others == 3)), command),
+        row("soft.graze", graze_of(model, "drive.ratio", 0.42, 0.6, 0.63), NEWTON.format("soft_impact")),
     ]
     for a in (0.7, 0.9):
 
@@ -278,7 +279,7 @@ def soft(program: Program) -> list[Row]:
             return here.highest(settled_free(here))[1] - 1
 
         w = brentq(excess, 0.6, 0.95, xtol=1e-13)
-        rows.append(Row(f"rig.{a}", float(w), NEWTON.format("soft_impact_rig")))
+        rows.append(row(f"rig.{a}", w, NEWTON.format("soft_impact_rig")))
     return rows
 
 
@@ -332,7 +333,7 @@ def followed(program: Program) -> list[Row]:
         }
         follow_over(keys, "dry_friction", "drive.ratio", (0.62, 1.45), *settings)
     follow_over({"soft.graze": graze}, "soft_impact", "drive.ratio", (0.42, 0.6))
-    return [Row(key, value, how[key]) for key, value in found.items()]
+    return [row(key, value, how[key]) for key, value in found.items()]
 
 
 COMPUTED = (budd_dux, chaos, coco, den_hartog, family, soft, followed)

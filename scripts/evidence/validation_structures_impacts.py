@@ -8,9 +8,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from evidence_program import Program
+from evidence_rows import SOURCE, Row
 from scipy.optimize import brentq
 from validation_structures_orbits import orbits
-from validation_structures_program import SOURCE, Number, Program
 
 sys.path.insert(0, str(SOURCE / "tests" / "referee"))
 from bounces import Bounces, Stop  # noqa: E402
@@ -75,7 +76,7 @@ def beam_bounces(frequency: np.ndarray, tip: np.ndarray) -> Bounces:
     return Bounces(a, [Stop(row, kick, LOSS)], TURN / 40 / frequency[-1])
 
 
-def cantilever(program: Program) -> list[Number]:
+def cantilever(program: Program) -> list[Row]:
     """A cantilever by N modes: from N = 2 the quadratic gives a motion that goes through the stop."""
     found = []
     for n, speed in (
@@ -96,8 +97,8 @@ def cantilever(program: Program) -> list[Number]:
         beam_case(case, lists, tip @ position, tip @ velocity, phase)
         what = f"cantilever by {n} modes, one impact per period"
         ends = last(program.run("trajectory", case), "x", "v")
-        found.append(Number(CLOSED, f"{what}, computed without the stop: speed", speed, ends[1], 5e-10))
-        found.append(Number(CLOSED, "the same: final position, at the stop", GAP, ends[0], 1e-12))
+        found.append(Row(CLOSED, f"{what}, computed without the stop: speed", speed, ends[1], 5e-10))
+        found.append(Row(CLOSED, "the same: final position, at the stop", GAP, ends[0], 1e-12))
         stop = '[contact.stop]\nbetween = ["beam.tip"]\nlaw = "newton"\n'
         case.write_text(f"{case.read_text()}{stop}restitution = {LOSS}\nupper = {GAP}\n")
         machine = beam_bounces(frequency, tip)
@@ -108,7 +109,7 @@ def cantilever(program: Program) -> list[Number]:
         ours = hits[hits[:, 0] > 0, 0][: len(theirs)]
         miss = float(np.max(abs(ours - theirs))) if len(ours) == len(theirs) else np.inf
         name = f"the same with the stop: impact after {theirs[0] / TURN:.3f} periods, {len(theirs)} impacts"
-        found.append(Number(BOUNCES, name, 0, miss, 1e-10))
+        found.append(Row(BOUNCES, name, 0, miss, 1e-10))
     return found
 
 
@@ -126,7 +127,7 @@ def sink(mass: float, loss: float, wave: float) -> tuple[Bounces, np.ndarray]:
     return Bounces(a, stops, 0.3), start
 
 
-def capture(program: Program) -> list[Number]:
+def capture(program: Program) -> list[Row]:
     """How long a light particle in a cavity stays with the motion of its structure, impact by impact."""
     found, scaled = [], []
     for mass, other, bar in ((1e-3, 1330.71, 5e-3), (1e-4, 12921.2, 5e-2)):
@@ -149,15 +150,15 @@ def capture(program: Program) -> list[Number]:
         ours = ours[ours > 0]
         end = float(lost(ours))
         what = f"vibro-impact nonlinear energy sink, mass ratio {mass:g}"
-        found.append(Number("other code", f"{what}: end of the resonance capture (s)", other, end, bar))
+        found.append(Row("other code", f"{what}: end of the resonance capture (s)", other, end, bar))
         machine.run(start, until, touched=0)
         theirs = lost(np.array([time for time, *_ in machine.impacts]))
-        found.append(Number(BOUNCES, "the same (s)", theirs, end, 1e-6))
+        found.append(Row(BOUNCES, "the same (s)", theirs, end, 1e-6))
         scaled.append(end * mass)
     # What is left goes as the mass to the power 2/3: the passage of a fold.
     limit = scaled[1] - (scaled[0] - scaled[1]) / (10 ** (2 / 3) - 1)
     what = "the same times the mass ratio, extrapolated to ratio 0"
-    return [*found, Number("asymptotics", what, 1.28243, limit, 2e-3)]
+    return [*found, Row("asymptotics", what, 1.28243, limit, 2e-3)]
 
 
 def lost(times: np.ndarray) -> float:
@@ -165,7 +166,7 @@ def lost(times: np.ndarray) -> float:
     return times[1:][np.diff(times) > 1.3 * pi][0]
 
 
-def chatter(program: Program) -> list[Number]:
+def chatter(program: Program) -> list[Row]:
     """One of three bodies bounces until it stays: every impact, and one plastic impact instead of them."""
     mass = np.diag([1.0, 2, 1])
     stiffness = np.array([[50.0, -50, 0], [-50, 70, -20], [0, -20, 20]])
@@ -182,7 +183,7 @@ def chatter(program: Program) -> list[Number]:
         stays = last(program.run("trajectory", "chatter", **settings), "x", "v")
         what = f"chatter of one of three bodies from {speed:g} m/s, {len(machine.impacts)} impacts"
         found.append(
-            Number(
+            Row(
                 BOUNCES,
                 f"{what}: state of the others after it",
                 0,
@@ -191,7 +192,7 @@ def chatter(program: Program) -> list[Number]:
             )
         )
         found.append(
-            Number(
+            Row(
                 CLOSED,
                 "the same: position and velocity of the resting body",
                 0,
@@ -205,7 +206,7 @@ def chatter(program: Program) -> list[Number]:
     for k, speed in enumerate((0.01, 0.001)):
         order = float(np.log10(differences[k] / differences[k + 1]))
         what = f"one plastic impact instead of all: order of the error in the speed, at {speed:g} m/s"
-        found.append(Number("theorem (docs/theory.md)", what, 3, order, 0.1))
+        found.append(Row("theorem (docs/theory.md)", what, 3, order, 0.1))
     return found
 
 

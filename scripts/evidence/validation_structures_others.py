@@ -8,9 +8,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from evidence_program import Program
+from evidence_rows import SOURCE, Row
 from scipy import io
 from validation_structures_orbits import orbits
-from validation_structures_program import CASES, SOURCE, Number, Program
 
 sys.path.insert(0, str(SOURCE / "tests" / "referee"))
 from linear_modes import Modes, pressed, rubbed  # noqa: E402
@@ -27,7 +28,7 @@ def last(output: Path, *names: str) -> list[float]:
         return [float(file[name][-1]) for name in names]
 
 
-def grazes(program: Program) -> list[Number]:
+def grazes(program: Program) -> list[Row]:
     """Grazes of the motion without impacts: its largest position with the stop out of reach."""
     found = []
     coupled = np.array([[2, -1], [-1, 1]])
@@ -47,17 +48,17 @@ def grazes(program: Program) -> list[Number]:
         with h5py.File(program.run("trajectory", "two_masses", **settings)) as file:
             largest = float(file.attrs["x_max"])
         what = f"two masses, {frequency} rad/s, graze: largest position of the second, stop at 1"
-        found.append(Number(CLOSED, what, 1.0, largest, 1e-9))
+        found.append(Row(CLOSED, what, 1.0, largest, 1e-9))
     return found
 
 
-def single_impacts(program: Program) -> list[Number]:
+def single_impacts(program: Program) -> list[Row]:
     """Orbits with one impact a period: any damping, three masses, the impact damper at another frequency."""
     found = []
     general = {"spring__frame__damping": 0.5, "spring__coupling__damping": 0}
     hit = program.events("two_masses", "impact_upper", "contact.stop", run__duration=1500, **general)[-1]
     what = "two masses with a stop, damping diag(0.5, 0), 0.6 rad/s: impact speed"
-    found.append(Number(CLOSED, what, 1.418642594893, hit[2], 1e-9))
+    found.append(Row(CLOSED, what, 1.418642594893, hit[2], 1e-9))
     chain = np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])
     _, phase, position, velocity = max(
         orbits(0.5, np.eye(3), 0.05 * chain, chain, [1, 0, 0], [0, 0, 1], 1, 0.7)
@@ -67,7 +68,7 @@ def single_impacts(program: Program) -> list[Number]:
         start |= {f"body__{body}__x0": position[k], f"body__{body}__v0": velocity[k]}
     hit = program.events("three_masses", "impact_upper", "contact.stop", run__duration=130, **start)[-1]
     what = "three masses with a stop, 0.5 rad/s: impact speed after ten periods"
-    found.append(Number(CLOSED, what, 1.965215727977, hit[2], 1e-9))
+    found.append(Row(CLOSED, what, 1.965215727977, hit[2], 1e-9))
     # Structure and particle just after the upper wall.
     speed, ratio, loss, clearance, frequency = -4.467709642531, 0.1, 0.8, 10, 1.1
     after = speed * (1 - loss + 2 * ratio) / (1 + loss) - 2 * ratio * speed
@@ -85,36 +86,36 @@ def single_impacts(program: Program) -> list[Number]:
     hit = program.events("impact_damper", "impact_upper", "contact.cavity", **start)[-1]
     source = "S. F. Masri, T. K. Caughey (1966), " + CLOSED
     what = "impact damper, clearance 10 m, 1.1 rad/s: relative speed after the impact"
-    found.append(Number(source, what, abs(after - speed), abs(hit[3]), 1e-8))
+    found.append(Row(source, what, abs(after - speed), abs(hit[3]), 1e-8))
     return found
 
 
-def beads(program: Program) -> list[Number]:
+def beads(program: Program) -> list[Row]:
     """A column that bounces as one body, two balls on a spring, and three in a row by both rules."""
     output = program.run("trajectory", "beads")
     position, lowest, highest = last(output, "b1_x", "b1_v", "b10_v")
     source = "Siconos, BeadColumnED_NewtonLaw"
     found = [
-        Number(
+        Row(
             source,
             "column of ten beads at 0.493 s: position of the lowest (m)",
             1.602081295401314e-2,
             position,
             1e-13,
         ),
-        Number(source, "the same: velocity of the lowest", -0.8745122353873974, lowest, 1e-12),
-        Number(source, "the same: velocity of the highest", -0.8745122353873974, highest, 1e-12),
+        Row(source, "the same: velocity of the lowest", -0.8745122353873974, lowest, 1e-12),
+        Row(source, "the same: velocity of the highest", -0.8745122353873974, highest, 1e-12),
     ]
     hits = program.events("two_balls", "impact_lower", "contact.floor")
     source = "nosnoc, two_balls_cls, in 40 digits"
     wanted = ((0.4038550218769218, 3.961817764612603), (0.4233169688147067, 3.88599783811507))
     for k, (time, speed) in enumerate(wanted):
-        found.append(Number(source, f"two balls on a spring: impact {k + 1} (s)", time, hits[k, 0], 1e-12))
-        found.append(Number(source, f"the same: speed of impact {k + 1}", speed, abs(hits[k, 2]), 1e-9))
+        found.append(Row(source, f"two balls on a spring: impact {k + 1} (s)", time, hits[k, 0], 1e-12))
+        found.append(Row(source, f"the same: speed of impact {k + 1}", speed, abs(hits[k, 2]), 1e-9))
     ends = last(program.run("trajectory", "two_balls"), "lower_x", "upper_x", "lower_v", "upper_v")
     theirs = (0.2468418867288353, 1.228210312008501, -2.379839521466434, -3.114092393623756)
     for name, value, ours in zip(("lower", "upper", "lower v", "upper v"), theirs, ends, strict=True):
-        found.append(Number(source, f"the same at 1 s: {name}", value, ours, 1e-9))
+        found.append(Row(source, f"the same at 1 s: {name}", value, ours, 1e-9))
     for rule, loss, after in (
         (0, 1, (-1 / 3, 2 / 3, 2 / 3)),
         (1, 1, (0, 0, 1)),
@@ -128,11 +129,11 @@ def beads(program: Program) -> list[Number]:
         what = (
             f"three balls in a row, e = {loss}, {'in sequence' if rule else 'together'}: largest difference"
         )
-        found.append(Number(CLOSED, what, 0, float(np.max(abs(np.array(ends) - after))), 1e-12))
+        found.append(Row(CLOSED, what, 0, float(np.max(abs(np.array(ends) - after))), 1e-12))
     return found
 
 
-def stack(program: Program) -> list[Number]:
+def stack(program: Program) -> list[Row]:
     """A break-away that takes another along, one that does not, and what redundant friction holds."""
     found = []
     for between, together in ((0.4, True), (0.6, False)):
@@ -142,21 +143,21 @@ def stack(program: Program) -> list[Number]:
             for joint in ("ground", "between")
         ]
         what = f"two stacked bodies, {between} N between: release of the lower (s)"
-        found.append(Number(CLOSED, what, asin(2 / 2.5) / 0.01, times[0][0], 1e-9))
+        found.append(Row(CLOSED, what, asin(2 / 2.5) / 0.01, times[0][0], 1e-9))
         if together:
             found.append(
-                Number(CLOSED, "the same: simultaneous release of the upper (s)", times[0][0], times[1][0], 0)
+                Row(CLOSED, "the same: simultaneous release of the upper (s)", times[0][0], times[1][0], 0)
             )
         else:
             # Together 0.5 m/s^2; the upper stays until it would need more than 0.6.
             slow = times[1][0] if len(times[1]) else np.inf
             found.append(
-                Number(CLOSED, "the same: later release of the upper (s)", asin(2.2 / 2.5) / 0.01, slow, 1e-9)
+                Row(CLOSED, "the same: later release of the upper (s)", asin(2.2 / 2.5) / 0.01, slow, 1e-9)
             )
     return found
 
 
-def capsules(program: Program) -> list[Number]:
+def capsules(program: Program) -> list[Row]:
     """Progress of capsules per period of the drive, forward and backward."""
     source = "capsule after Y. Liu, E. Pavlovskaia, M. Wiercigroch (2013), other code"
     found = []
@@ -173,14 +174,14 @@ def capsules(program: Program) -> list[Number]:
         end = int(time[-1] // turn)
         ends = [x[np.argmin(abs(time - k * turn))] for k in (end - periods, end)]
         what = f"shell of {mass} kg, {frequency} rad/s: progress per period, of {periods}"
-        found.append(Number(source, what, theirs, float(ends[1] - ends[0]) / periods, 1e-8))
+        found.append(Row(source, what, theirs, float(ends[1] - ends[0]) / periods, 1e-8))
     return found
 
 
-def beam(program: Program) -> list[Number]:
+def beam(program: Program) -> list[Row]:
     """A cantilever of 16 coordinates with dry friction at a node."""
     mass, damping, stiffness = (
-        io.mmread(CASES / f"beam_{name}.mtx").toarray() for name in ("mass", "damping", "stiffness")
+        io.mmread(Program.cases / f"beam_{name}.mtx").toarray() for name in ("mass", "damping", "stiffness")
     )
     modes = Modes.of(mass, damping, stiffness)
     found = []
@@ -200,9 +201,9 @@ def beam(program: Program) -> list[Number]:
         with h5py.File(output) as file:
             largest = float(np.max(abs(file["x"][-2000:])))
         what = f"beam with dry friction, {frequency:g} rad/s"
-        found.append(Number(source, f"{what}: largest deflection (m)", tip, largest, 5e-13))
-        found.append(Number(source, f"{what}: onset of sliding (periods)", release, shares[0], 1e-5))
-        found.append(Number(source, f"{what}: onset of stick (periods)", stick, shares[1], 1e-5))
+        found.append(Row(source, f"{what}: largest deflection (m)", tip, largest, 5e-13))
+        found.append(Row(source, f"{what}: onset of sliding (periods)", release, shares[0], 1e-5))
+        found.append(Row(source, f"{what}: onset of stick (periods)", stick, shares[1], 1e-5))
         if frequency != 200:
             machine = rubbed(modes, 0.2 * modes.shapes[14], frequency, modes.shapes[4], 1.5, turn / 100)
             machine.run("stuck", modes.start(), 10 * turn)
@@ -210,7 +211,7 @@ def beam(program: Program) -> list[Number]:
             with h5py.File(output) as file:
                 ours = np.unique(file["event_time"][:])[: len(theirs)]
             what = f"the same: largest difference in time of {len(theirs)} events, in periods"
-            found.append(Number(EXPONENTIALS, what, 0, float(np.max(abs(ours - theirs)) / turn), 1e-8))
+            found.append(Row(EXPONENTIALS, what, 0, float(np.max(abs(ours - theirs)) / turn), 1e-8))
     return found
 
 
@@ -218,7 +219,7 @@ def beam(program: Program) -> list[Number]:
 YOUNG, DENSITY, AREA, LENGTH, SPEED, KEPT = 210e9, 7800.0, 3.14e-4, 1.0, 0.1, 16
 
 
-def bar(program: Program) -> list[Number]:
+def bar(program: Program) -> list[Row]:
     """A bar falls on a wall, by its free modes and the flexibility of all others."""
     wave, mass = sqrt(YOUNG / DENSITY), DENSITY * AREA * LENGTH
     number = np.arange(KEPT)
@@ -257,17 +258,17 @@ def bar(program: Program) -> list[Number]:
     source = "Siconos, ImpactingBar; waves"
     what = f"bar on a wall, {KEPT} modes and residual flexibility"
     return [
-        Number(source, f"{what}: contact duration (s)", 2 * LENGTH / wave, leave - touch, 4e-6),
-        Number(EXPONENTIALS, "the same: contact duration (s)", lasted, leave - touch, 1e-12),
-        Number(source, "the same: mean force (N)", DENSITY * wave * AREA * SPEED, force, 13),
-        Number(
+        Row(source, f"{what}: contact duration (s)", 2 * LENGTH / wave, leave - touch, 4e-6),
+        Row(EXPONENTIALS, "the same: contact duration (s)", lasted, leave - touch, 1e-12),
+        Row(source, "the same: mean force (N)", DENSITY * wave * AREA * SPEED, force, 13),
+        Row(
             CLOSED, "the same: ratio of the energies after and before", 1, float(energy[-1] / energy[0]), 1e-9
         ),
-        Number(source, "the same: velocity after contact (m/s)", SPEED, after, 5e-4),
+        Row(source, "the same: velocity after contact (m/s)", SPEED, after, 5e-4),
     ]
 
 
-def cage(program: Program) -> list[Number]:
+def cage(program: Program) -> list[Row]:
     """A Duffing oscillator with a mass in a cage: two impacts a period, by steps and in turn."""
     found = []
 
@@ -296,7 +297,7 @@ def cage(program: Program) -> list[Number]:
         miss = float(np.max(abs(ours - theirs))) if ours.shape == theirs.shape else np.inf
         what = f"mass in a cage (PWSDDE-cont), {frequency} rad/s, eta {cubic}"
         what += f": difference in time of {len(theirs)} events"
-        found.append(Number(STEPS, what, 0, miss, 1e-8))
+        found.append(Row(STEPS, what, 0, miss, 1e-8))
         if frequency != 1.5:
             continue
         turn = 2 * pi / frequency
@@ -306,7 +307,7 @@ def cage(program: Program) -> list[Number]:
         ]
         half = (hits[0][-1, 0] - hits[1][-1, 0]) % turn
         found.append(
-            Number(
+            Row(
                 CLOSED,
                 "the same: interval of impacts of the symmetric orbit (periods)",
                 0.5,
@@ -317,7 +318,7 @@ def cage(program: Program) -> list[Number]:
     return found
 
 
-def pair(program: Program) -> list[Number]:
+def pair(program: Program) -> list[Row]:
     """The pair with backlash as two bodies, in its own law and with names."""
     found = []
     for start, speed in ((0.05, 0.8), (-0.02, 0.3)):
@@ -330,17 +331,17 @@ def pair(program: Program) -> list[Number]:
         same = len(times[0]) == len(times[1])
         miss = float(np.max(abs(times[0] - times[1]))) if same else np.inf
         what = f"pair with backlash from ({start}, {speed}), as a law and as bodies: difference in time of "
-        found.append(Number("pair of Separatrix", f"{what}{len(times[0])} events", 0, miss, 1e-9))
+        found.append(Row("pair of Separatrix", f"{what}{len(times[0])} events", 0, miss, 1e-9))
     return found
 
 
-def microactuator(program: Program) -> list[Number]:
+def microactuator(program: Program) -> list[Row]:
     """The voltage at which the plate of a frame that sticks just reaches its stop."""
-    points = program.branch_points("microactuator", "spring.condenser.attraction", 0.165, 0.175)
-    graze = min((value for label, value, _, _ in points if label == "GR"), default=0.0)
+    points = program.branches("microactuator", "spring.condenser.attraction", (0.165, 0.175))
+    graze = points["parameter"][points["label"] == "GR"].min(initial=np.inf)
     source = "H. Dankowicz, F. Schilder, Recipes for Continuation (2013), 9.3 (COCO)"
     what = "stick-slip microactuator, graze of the orbit whose frame sticks: V"
-    return [Number(source, what, 0.587516250415, sqrt(2 * graze), 1e-9)]
+    return [Row(source, what, 0.587516250415, sqrt(2 * graze), 1e-9)]
 
 
 COMPUTED = (grazes, single_impacts, beads, stack, capsules, beam, bar, cage, pair, microactuator)

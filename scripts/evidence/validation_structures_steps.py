@@ -7,7 +7,8 @@ from math import cos, sin
 
 import h5py
 import numpy as np
-from validation_structures_program import SOURCE, Number, Program
+from evidence_program import Program
+from evidence_rows import SOURCE, Row
 
 sys.path.insert(0, str(SOURCE / "tests" / "referee"))
 from structures import Friction, Rigid, Structure  # noqa: E402
@@ -75,7 +76,7 @@ SIMULATED = {
 }
 
 
-def simulated(program: Program) -> list[Number]:
+def simulated(program: Program) -> list[Row]:
     """Times of all events from the start of a case, by scipy's steps and by the program."""
     found = []
     for case, (build, (q, v), until) in SIMULATED.items():
@@ -86,5 +87,5 @@ def simulated(program: Program) -> list[Number]:
         theirs = np.array([at for _, _, at in machine.events])
         miss = np.max(abs(ours - theirs)) if ours.shape == theirs.shape else np.inf
         what = f"{case}: largest difference in time of {len(theirs)} events in {until:g} s"
-        found.append(Number("`tests/referee/structures.py`", what, 0.0, miss, 1e-9))
+        found.append(Row("`tests/referee/structures.py`", what, 0.0, miss, 1e-9))
     return found

@@ -1,15 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Hands out the positions 1..n of a work list to the ranks of a team, one at a time. Children:
+!> Hands out the items 1..n of a work list to the ranks of a team, one at a time. Children:
 !> serial_scheduler, mpi_scheduler. The loop of every rank:
 !>
 !>     call scheduler%start(n, error)
 !>     do
-!>       call scheduler%next(position)
-!>       if (position == 0) exit
+!>       call scheduler%next(item)
+!>       if (item == 0) exit
 !>       (trajectories, with `call scheduler%poll()` between them; if `stop_requested()` then leave
-!>        the loop without calling `next`, which counts the position before as done)
+!>        the loop without calling `next`, which counts the item before as done)
 !>     end do
 !>     call scheduler%finish()
 module scheduler
@@ -26,7 +26,7 @@ module scheduler
     real(real64) :: time_limit = 0
     !> Splits the ranks of a host into nodes of at most this many ranks; 0 = as the hosts are.
     integer :: ranks_per_node = 0
-    !> Keeps a log of the positions: 32 bytes for each that this rank does.
+    !> Keeps a log of the items: 32 bytes for each that this rank does.
     logical :: logged = .false.
   end type scheduler_options_t
 
@@ -49,7 +49,7 @@ module scheduler
   end type scheduler_t
 
   abstract interface
-    !> Collective: begins a list of `n` positions, the same on every rank.
+    !> Collective: begins a list of `n` items, the same on every rank.
     subroutine start_with(self, n, error)
       import :: error_t, scheduler_t
       class(scheduler_t), intent(inout) :: self
@@ -57,16 +57,16 @@ module scheduler
       type(error_t), allocatable, intent(out) :: error
     end subroutine start_with
 
-    !> The next position; 0 = none left, or a stop was requested. The position that this rank got
+    !> The next item; 0 = none left, or a stop was requested. The item that this rank got
     !> before counts as done.
-    subroutine next_of(self, position)
+    subroutine next_of(self, item)
       import :: scheduler_t
       class(scheduler_t), intent(inout) :: self
-      integer, intent(out) :: position
+      integer, intent(out) :: item
     end subroutine next_of
 
     !> `poll`: cheap; looks for signals, the time limit and messages. `request_stop`: all ranks stop
-    !> soon. `finish`: collective; every rank calls it once after its last position.
+    !> soon. `finish`: collective; every rank calls it once after its last item.
     subroutine act(self)
       import :: scheduler_t
       class(scheduler_t), intent(inout) :: self
@@ -78,7 +78,7 @@ module scheduler
       class(scheduler_t), intent(in) :: self
     end function is_true
 
-    !> Positions done. While the work runs only rank 0 knows it, apart from blocks that other nodes
+    !> Items done. While the work runs only rank 0 knows it, apart from blocks that other nodes
     !> have not reported; after `finish` it is exact on every rank.
     integer function count_of(self)
       import :: scheduler_t

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The scheduler of one process: the positions in the order that ranks would get them.
+!> The scheduler of one process: the items in the order that ranks would get them.
 module serial_scheduler
   use errors, only: error_t, fail
   use scheduler, only: scheduler_t
@@ -26,7 +26,7 @@ module serial_scheduler
 
 contains
 
-  !> Begins a list of `n` positions.
+  !> Begins a list of `n` items.
   subroutine start(self, n, error)
     class(serial_scheduler_t), intent(inout) :: self
     integer, intent(in) :: n
@@ -44,20 +44,20 @@ contains
     call self%begin_log()
   end subroutine start
 
-  !> The next position; 0 = none left, or a stop was requested.
-  subroutine next(self, position)
+  !> The next item; 0 = none left, or a stop was requested.
+  subroutine next(self, item)
     class(serial_scheduler_t), intent(inout) :: self
-    integer, intent(out) :: position
+    integer, intent(out) :: item
     if (self%busy) self%done = self%done + 1
     call self%log%end(self%elapsed())
     self%busy = .false.
-    position = 0
+    item = 0
     call self%poll()
     if (self%stop .or. self%handed_out == self%total) return
     self%handed_out = self%handed_out + 1
     self%busy = .true.
-    position = self%order%position(self%handed_out)
-    call self%log%begin(position, self%elapsed())
+    item = self%order%item(self%handed_out)
+    call self%log%begin(item, self%elapsed())
   end subroutine next
 
   !> Looks for signals and the time limit.
@@ -66,7 +66,7 @@ contains
     if (self%stop_is_due()) self%stop = .true.
   end subroutine poll
 
-  !> No position is handed out any more.
+  !> No item is handed out any more.
   subroutine request_stop(self)
     class(serial_scheduler_t), intent(inout) :: self
     self%stop = .true.
@@ -78,13 +78,13 @@ contains
     stop_requested = self%stop
   end function stop_requested
 
-  !> Positions done.
+  !> Items done.
   integer function done_count(self)
     class(serial_scheduler_t), intent(in) :: self
     done_count = self%done
   end function done_count
 
-  !> The position in hand is given up.
+  !> The item in hand is given up.
   subroutine finish(self)
     class(serial_scheduler_t), intent(inout) :: self
     self%busy = .false.

@@ -1,9 +1,9 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The order in which positions are handed out. Neighbouring tiles of a map cost alike, so a block of
+!> The order in which items are handed out. Neighbouring tiles of a map cost alike, so a block of
 !> neighbours may cost a multiple of the mean. Every run of this order lies evenly over the whole list:
-!> steps near the golden section of its length, which meet each position once.
+!> steps near the golden section of its length, which meet each item once.
 module spread_order
   use kinds, only: int64, real64
   implicit none
@@ -14,14 +14,14 @@ module spread_order
   type, public :: spread_order_t
     integer(int64), private :: length = 0, step = 1
   contains
-    procedure :: position
+    procedure :: item
   end type spread_order_t
 
   real(real64), parameter :: golden = 0.6180339887498949_real64
 
 contains
 
-  !> The order of the positions 1..n.
+  !> The order of the items 1..n.
   pure function new_spread_order(n) result(order)
     integer, intent(in) :: n
     type(spread_order_t) :: order
@@ -32,12 +32,12 @@ contains
     end do
   end function new_spread_order
 
-  !> The position that is handed out as number `number` (from 1).
-  pure integer function position(self, number)
+  !> The item that is handed out as number `number` (from 1).
+  pure integer function item(self, number)
     class(spread_order_t), intent(in) :: self
     integer, intent(in) :: number
-    position = 1 + int(modulo((number - 1)*self%step, self%length))
-  end function position
+    item = 1 + int(modulo((number - 1)*self%step, self%length))
+  end function item
 
   !> Point number `number` of a sample of a grid of so many points along each axis, from 1 along each: the additive recurrence with
   !> square roots of primes. Axes after the eighth repeat the others.

@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> When this rank did which position of a work list, and how often it asked for more. Off, it keeps nothing.
+!> When this rank did which item of a work list, and how often it asked for more. Off, it keeps nothing.
 module work_log
   use kinds, only: real64
   use team, only: team_t
   implicit none
   private
 
-  !> Values of an entry: position, seconds from the start of the list to its beginning and to its end,
+  !> Values of an entry: item, seconds from the start of the list to its beginning and to its end,
   !> questions that this rank had asked rank 0 by then.
   integer, parameter, public :: entry_values = 4
 
@@ -27,10 +27,10 @@ module work_log
 
 contains
 
-  !> Notes that `position` begins, `seconds` after the start.
-  subroutine begin(self, position, seconds)
+  !> Notes that `item` begins, `seconds` after the start.
+  subroutine begin(self, item, seconds)
     class(work_log_t), intent(inout) :: self
-    integer, intent(in) :: position
+    integer, intent(in) :: item
     real(real64), intent(in) :: seconds
     real(real64), allocatable :: longer(:, :)
     if (.not. self%on) return
@@ -41,11 +41,11 @@ contains
       call move_alloc(longer, self%entries)
     end if
     self%count = self%count + 1
-    self%entries(:, self%count) = [real(position, real64), seconds, seconds, real(self%questions, real64)]
+    self%entries(:, self%count) = [real(item, real64), seconds, seconds, real(self%questions, real64)]
     self%open = .true.
   end subroutine begin
 
-  !> Notes that the position begun last is done.
+  !> Notes that the item begun last is done.
   subroutine end_entry(self, seconds)
     class(work_log_t), intent(inout) :: self
     real(real64), intent(in) :: seconds
@@ -62,18 +62,18 @@ contains
     real(real64), allocatable, intent(out) :: entries(:, :)
     integer, allocatable, intent(out) :: rank(:)
     real(real64), allocatable :: mine(:), values(:), counts(:)
-    integer :: i, k, position
+    integer :: i, k, row
     allocate (mine(entry_values*self%count))
     if (self%count > 0) mine = reshape(self%entries(:, :self%count), [size(mine)])
     call team%gather([real(self%count, real64)], counts)
     call team%gather(mine, values)
     entries = reshape(values, [entry_values, size(values)/entry_values])
     allocate (rank(size(entries, 2)))
-    position = 0
+    row = 0
     do i = 1, size(counts)
       do k = 1, nint(counts(i))
-        position = position + 1
-        rank(position) = i - 1
+        row = row + 1
+        rank(row) = i - 1
       end do
     end do
   end subroutine collect

@@ -81,6 +81,24 @@ def discover(
         Of all random choices.
     progress
         As for `basin`; what is counted are thousandths of the work.
+
+    Examples
+    --------
+    A machine with a cubic spring is recorded at 180 samples a second; the case does not have that spring.
+
+    >>> import numpy as np
+    >>> case = sx.load("examples/basin_coulomb.toml").with_(axis=[])
+    >>> machine = case.with_(effect__cubic_spring__stiffness=20.0)
+    >>> motion = sx.trajectory(machine, 0.8, 0.0, duration=6, samples=100)
+    >>> noise = np.random.default_rng(1).normal(0, 8e-6, motion.time.size)
+    >>> angle = 2 * np.pi / motion.drive_period * motion.time
+    >>> columns = np.column_stack([motion.time, motion.x + noise, angle])
+    >>> np.savetxt("record.csv", columns, delimiter=",", header="t,x,phi", comments="")
+    >>> found = sx.discover(case, "record.csv", effects=["cubic_spring"], quick=True)
+    >>> found.effects
+    ('cubic_spring',)
+    >>> round(found.case.parameters["effect.cubic_spring.stiffness"].value, 1)
+    20.0
     """
     case = as_case(case)
     effects = [effects] if isinstance(effects, str) else effects

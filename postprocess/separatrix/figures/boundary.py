@@ -23,7 +23,7 @@ from separatrix.figures.caption import (
 )
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.figures.page import Figures, Page
-from separatrix.labels import axis_label, count_text, plain, symbol, unit
+from separatrix.labels import axis_label, count_text, plain, symbol
 from separatrix.open import decode_flags, decode_word, open_result
 
 # Text of the legend and line of each name of a piece.
@@ -31,11 +31,11 @@ _LINES = {
     "stable_set": ("boundary: stable set of saddle", "-"),
     "recurrent": ("boundary: recurrent edge state", "-"),
     "graze": ("boundary: edge of a graze", "--"),
-    "stick": ("boundary: rim of a stick set", "--"),
+    "stick": ("boundary: edge of a set of sticking states", "--"),
     "chatter": ("boundary: edge of a completed chatter", "--"),
     "other_event": ("boundary: edge at another event", "--"),
-    "not_known": ("boundary: leads to what is not known", "-."),
-    "edge": ("edge of what is not known", ":"),
+    "not_known": ("boundary: edge state not known", "-."),
+    "edge": ("edge of the unlabelled region", ":"),
 }
 _SADDLES = ("black", "#56B4E9", "#F0E442", "#CC79A7", "#009E73", "#D55E00")
 # Lines of the saddles when the colours begin anew.
@@ -121,20 +121,17 @@ def _alone(result: xr.Dataset, title: str, look: Look) -> Figure:
     page = Page(look, (style.SINGLE_COLUMN, 62.0))
     (ax,) = page.axes
     handles = draw(ax, result, across, down, look, {})
-    ax.set_xlabel(axis_label(_in_units(result[across], look)))
-    ax.set_ylabel(axis_label(_in_units(result[down], look)))
+    ax.set_xlabel(axis_label(look.in_units(result[[across]])[across]))
+    ax.set_ylabel(axis_label(look.in_units(result[[down]])[down]))
     for name, (low, high) in look.region.items():
-        (ax.set_xlim if name == across else ax.set_ylim)(low, high)
+        factor = look.scale(result, name.replace(".", "_"))[0]
+        (ax.set_xlim if name == across else ax.set_ylim)(factor * low, factor * high)
     caption = [
         *caption_pieces(result, look, [*describe_case(result), *start_pieces(result)]),
         *_notes(result, look),
         plain(version_text(result)),
     ]
     return page.finish(title, caption, handles)
-
-
-def _in_units(variable: xr.DataArray, look: Look) -> xr.DataArray:
-    return look.selected(variable.to_dataset(name=str(variable.name)))[str(variable.name)]
 
 
 def _notes(result: xr.Dataset, look: Look) -> list[str]:
@@ -166,8 +163,8 @@ def _errors_text(result: xr.Dataset, look: Look) -> str:
     for number, name in enumerate(axes_of(result)):
         errors = result["error"].values[result["across"].values == number]
         if errors.size:
-            si = unit(result[name])
-            size = f"{np.median(errors) * look.factor(si):.1g} {look.unit(si)}".rstrip()
+            factor, shown = look.scale(result, name)
+            size = f"{np.median(errors) * factor:.1g} {'' if shown == '1' else shown}".rstrip()
             texts.append(f"{size} along {symbol(result[name])}")
     return ", ".join(texts)
 
@@ -183,7 +180,7 @@ def draw(
 ) -> list[Line2D]:
     """Draw the pieces and the saddles of one panel; return what the legend needs."""
     handles: dict[str, Line2D] = {}
-    factors = [look.factor(str(result[name].attrs.get("units"))) for name in (across, down)]
+    factors = [look.scale(result, name)[0] for name in (across, down)]
     x, y = (result[name].values * factor for name, factor in zip((across, down), factors, strict=True))
     names = decode_flags(result["piece_name"]).values
     known = (result["label_one"].values != 0) & (result["label_two"].values != 0)
@@ -279,7 +276,7 @@ def _belongs(result: xr.Dataset, prefix: str, row: int, fixed: dict[str, float],
     """Whether a piece or a saddle is of the slice of the map that a panel shows."""
     for name, value in fixed.items():
         variable = result[f"{prefix}{name}"]
-        mine = variable.values[row] * look.factor(str(variable.attrs.get("units")))
+        mine = variable.values[row] * look.scale(result, f"{prefix}{name}")[0]
         if not np.isclose(mine, value, rtol=1e-12, atol=0):
             return False
     return True

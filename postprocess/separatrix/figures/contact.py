@@ -20,6 +20,7 @@ from separatrix.labels import plain, unit
 
 MOST_LOOPS = 8
 _LEAST_SAMPLES = 5
+_DRAWN = ("x", "time", "contact_force")
 
 
 def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
@@ -37,7 +38,7 @@ def loops(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     handles = []
     for number, index in enumerate(order):
         colour = style.OKABE_ITO[number]
-        _draw(page.axes, found[index], colour, look.factor(unit(result["x"])), look.factor("s"))
+        _draw(page.axes, found[index], colour, *(look.factor(unit(result[name])) for name in _DRAWN))
         label = f"impact at {found[index][1] * speed:.3g} {shown}"
         handles.append(Line2D([], [], color=colour, label=label))
     caption = [f"{len(order)} of {len(found)} contacts, by impact speed"]
@@ -68,14 +69,19 @@ def _panels(result: xr.Dataset, look: Look) -> Page:
     over_depth.set_xlabel(f"penetration ({look.unit(unit(result['x']))})")
     over_time.set_xlabel(f"time since first touch ({look.unit('s')})")
     for ax in page.axes:
-        ax.set_ylabel(f"force of the barrier ({unit(result['contact_force'])})")
+        ax.set_ylabel(f"force of the barrier ({look.unit(unit(result['contact_force']))})")
         ax.axhline(0, color="#BBBBBB", linewidth=0.5, zorder=0)
     page.letter()
     return page
 
 
 def _draw(
-    axes: Sequence[Axes], contact: tuple, colour: str, of_depth: float = 1.0, of_time: float = 1.0
+    axes: Sequence[Axes],
+    contact: tuple,
+    colour: str,
+    of_depth: float = 1.0,
+    of_time: float = 1.0,
+    of_force: float = 1.0,
 ) -> None:
     """Draw a contact from no force to no force, times these factors: jumps lie between that and its ends."""
     start, _, time, depth, force = contact
@@ -83,7 +89,7 @@ def _draw(
     # the force at first touch follows from the first two samples
     early = time[:2] - start
     touch = force[0] - early[0] * (force[1] - force[0]) / (early[1] - early[0])
-    force = np.concatenate([[0.0, touch], force, [0.0]])
+    force = of_force * np.concatenate([[0.0, touch], force, [0.0]])
     depths = of_depth * np.concatenate([[0.0, 0.0], depth, depth[-1:]])
     times = of_time * np.concatenate([[0.0, 0.0], time - start, time[-1:] - start])
     over_depth.plot(depths, force, color=colour)

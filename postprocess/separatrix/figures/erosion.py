@@ -43,7 +43,7 @@ def figures(
     result: xr.Dataset, title: str, look: Look = DEFAULT, branches: xr.Dataset | None = None
 ) -> Figures:
     """Return the figure of a file of measures by name."""
-    look.require("file of measures", "region")
+    look.require("file of measures", "region", "units")
     return Figures({"erosion": lambda: diagram(result, title, look, branches)})
 
 
@@ -59,7 +59,7 @@ def diagram(
     axes = page.axes
     handles: list[Line2D] = []
     if branches is not None:
-        handles += _branches(axes, branches, dim)
+        handles += _branches(axes, branches, dim, Look(units=look.units))
     for ax, name in zip(axes[panels - len(names) :], names, strict=True):
         _panel(ax, result, name, dim)
     colours = _colours(result)
@@ -126,18 +126,19 @@ def _births(axes: Sequence[Axes], result: xr.Dataset, dim: str) -> list[Line2D]:
     return [mark] if drawn else []
 
 
-def _branches(axes: Sequence[Axes], branches: xr.Dataset, dim: str) -> list[Line2D]:
+def _branches(axes: Sequence[Axes], branches: xr.Dataset, dim: str, look: Look) -> list[Line2D]:
     """The diagram on top, and lines down from the points at which motions end."""
     over = str(branches.attrs["parameter"]).replace(".", "_")
     if over != dim:
         raise SeparatrixError(f"branches: found them over {over}, allowed over {dim}", USAGE)
-    handles = branch_diagram.draw(axes[0], branches)
-    axes[0].set_ylabel(branch_diagram.height(branches)[1])
+    handles = branch_diagram.draw(axes[0], branches, look)
+    # the panel is lower than the label in one line
+    axes[0].set_ylabel(branch_diagram.height(branches, look)[1].replace("amplitude ", "amplitude\n"))
     if "label" not in branches:
         return handles
-    labels = decode_flags(branches["label"]).values
+    labels, factor = decode_flags(branches["label"]).values, look.scale(branches, "parameter")[0]
     for name, line in _ENDS.items():
-        for value in branches["parameter"].values[labels == name]:
+        for value in (branches["parameter"].values * factor)[labels == name]:
             for ax in axes[1:]:
                 ax.axvline(value, color="0.6", linestyle=line, linewidth=0.6, zorder=0)
     return handles

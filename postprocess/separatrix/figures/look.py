@@ -11,12 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 
 from separatrix.errors import USAGE, SeparatrixError
+from separatrix.figures.frequencies import FREQUENCY, angular, renamed
 
-# unit: SI unit and what one of it is
+# unit: SI unit, or frequency, and what one of it is in SI units
 UNITS = {
     "mm": ("m", 1e-3), "um": ("m", 1e-6), "cm": ("m", 1e-2), "km": ("m", 1e3),
     "mm/s": ("m/s", 1e-3), "cm/s": ("m/s", 1e-2), "km/h": ("m/s", 1 / 3.6),
     "ms": ("s", 1e-3), "us": ("s", 1e-6), "min": ("s", 60.0), "deg": ("rad", np.pi / 180),
+    "deg/s": ("rad/s", np.pi / 180), "g": ("kg", 1e-3), "mN": ("N", 1e-3), "kN": ("N", 1e3),
+    "N/mm": ("N/m", 1e3), "kN/m": ("N/m", 1e3), "mJ": ("J", 1e-3), "kJ": ("J", 1e3),
+    "Hz": (FREQUENCY, 2 * np.pi), "rpm": (FREQUENCY, np.pi / 30), "rad/s": (FREQUENCY, 1.0),
 }  # fmt: skip
 CAPTIONS = ("full", "short", "none")
 _SERVED_BY_SOME = (
@@ -37,7 +41,8 @@ class Look:
     inset: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     #: which axis is horizontal and which vertical
     axes: tuple[str, str] | None = None
-    #: units instead of the SI units, each for all that has its SI unit
+    #: units instead of the SI units, each for all that has its SI unit; Hz, rpm and rad/s for frequencies,
+    #: also for a ratio to the natural frequency
     units: str | Sequence[str] = ()
     #: the settling time as lightness under the colours of a map
     shade: bool = False
@@ -118,29 +123,40 @@ class Look:
                 ends = f"{result[dim].values.min():g} to {result[dim].values.max():g}"
                 raise SeparatrixError(f"{wish} {name}: found {low:g} to {high:g}, allowed {ends}", USAGE)
             ranges[dim] = slice(int(inside[0]), int(inside[-1]) + 1)
-        return self._in_units(result.isel(ranges))
+        return self.in_units(result.isel(ranges))
 
     def factor(self, unit: str) -> float:
         """Return by what a number in an SI unit is multiplied."""
-        return next((1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit), 1.0)
+        found = (1 / UNITS[name][1] for name in self.units if UNITS[name][0] == unit)
+        return 1.0 if unit == FREQUENCY else next(found, 1.0)
 
     def unit(self, si: str) -> str:
         """Return the unit that is used instead of an SI unit."""
         return next((name for name in self.units if UNITS[name][0] == si), si)
 
-    def _in_units(self, result: xr.Dataset) -> xr.Dataset:
+    def scale(self, result: xr.Dataset, key: str) -> tuple[float, str | None]:
+        """Return by what a variable of a result in SI units is multiplied, and the unit that it then has."""
+        si = result[key].attrs.get("units")
+        mine = angular(result, key) if any(UNITS[name][0] == FREQUENCY for name in self.units) else None
         for name in self.units:
-            si, worth = UNITS[name]
-            for key, variable in list(result.variables.items()):
-                if variable.attrs.get("units") != si or str(key).startswith("catalogue_"):
-                    continue
-                changed = (variable.dims, variable.values / worth, {**variable.attrs, "units": name})
-                result = (
-                    result.assign_coords({key: changed})
-                    if key in result.coords
-                    else result.assign({key: changed})
-                )
-        return result
+            kind, worth = UNITS[name]
+            if kind == FREQUENCY and mine is not None:
+                return mine / worth, name
+            if kind == si and mine is None:
+                return 1 / worth, name
+        return 1.0, si
+
+    def in_units(self, result: xr.Dataset) -> xr.Dataset:
+        """Return a result in SI units in the units asked for."""
+        changed = {}
+        for key, variable in result.variables.items() if self.units else ():
+            factor, name = self.scale(result, str(key))
+            if name == variable.attrs.get("units") or str(key).startswith("catalogue_"):
+                continue
+            frequency = UNITS[name][0] == FREQUENCY
+            about = renamed(result, str(key), name) if frequency else {**variable.attrs, "units": name}
+            changed[key] = (variable.dims, variable.values * factor, about)
+        return result.assign(changed)
 
 
 def _axis(result: xr.Dataset, name: str) -> str:

@@ -63,10 +63,8 @@ def draw(
         # Indices in the whole result: the catalogue counts its slices.
         at = {}
         for name, k in zip(others, indices, strict=True):
-            old = whole[name].values
-            at[name] = int(
-                np.abs(old - result[name].values[k] / look.factor(whole[name].attrs.get("units"))).argmin()
-            )
+            shown = result[name].values[k] / look.scale(whole, name)[0]
+            at[name] = int(np.abs(whole[name].values - shown).argmin())
         limits = ax.get_xlim(), ax.get_ylim()
         for identity, x, v in section.points(whole, at):
             mark = _MARKS[(identity - 1) % len(_MARKS)]
@@ -78,7 +76,7 @@ def draw(
             }
             drawn |= {"linestyle": "", "markeredgewidth": 0.6, "zorder": 5}
             lacking |= dict.fromkeys(_not_shown(whole, identity, x, v))
-            x, v = x * look.factor("m"), v * look.factor("m/s")
+            x, v = x * look.scale(whole, "catalogue_x")[0], v * look.scale(whole, "catalogue_v")[0]
             ax.plot(*((x, v) if across == "x0" else (v, x)), **drawn)
             marked[identity] = drawn
         ax.set_xlim(limits[0])

@@ -56,7 +56,10 @@ class Page:
         self.look = look
         if look.ax:
             if len(look.ax) != panels:
-                raise SeparatrixError(f"ax: found {len(look.ax)} axes, this figure needs {panels}", USAGE)
+                many = "" if panels == 1 else " in a sequence, one for each panel"
+                raise SeparatrixError(
+                    f"ax: found {len(look.ax)} axes, this figure needs {panels}{many}", USAGE
+                )
             self.axes = list(look.ax)
             return
         figure = style.new_figure(*(look.size or size))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 
-from separatrix.labels import unit
+from separatrix.labels import flag_text, unit
 from separatrix.open import flag_names
 
 _IMPACTING = {"impact", "mixed", "chattering"}
@@ -49,16 +49,21 @@ def brackets(limits: xr.Dataset, *, in_steps: bool = False) -> np.ndarray:
 
 
 def limit_texts(limits: xr.Dataset) -> list[str]:
-    """Return each limit as text, with how it is known where that is in steps only."""
+    """Return each limit as text, with its run, and whether that of the settled motion is known."""
     known = np.isfinite(limits["lower"].values + limits["upper"].values) if "lower" in limits else []
     shown = f" {unit(limits['lower'])}".rstrip() if "lower" in limits else ""
-    return [
-        f"{'' if settled else 'in steps '}{str(name).replace('_', ' ')} {lower:.6g} to {upper:.6g}{shown}"
-        for name, (lower, upper), settled in zip(
-            limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
-        )
-        if np.isfinite(lower + upper)
-    ]
+    texts = []
+    for name, (lower, upper), settled in zip(
+        limits["name"].values if "name" in limits else [], brackets(limits), known, strict=True
+    ):
+        if not np.isfinite(lower + upper):
+            continue
+        what, _, run = str(name).rpartition("_")
+        about = f"run-{run}" if settled else f"run-{run}, observed in steps"
+        digits = next((n for n in range(6, 15) if f"{lower:.{n}g}" != f"{upper:.{n}g}"), 15)
+        bracket = f"{lower:.{digits}g} to {upper:.{digits}g}" if lower != upper else f"{lower:.6g}"
+        texts.append(f"{flag_text(what)} at {bracket}{shown} ({about})")
+    return texts
 
 
 def boundaries(limits: xr.Dataset) -> list[Boundary]:

@@ -14,7 +14,7 @@ from separatrix.labels import axis_label, plain
 
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure by name."""
-    look.require("survival under impulses")
+    look.require("survival under impulses", "units")
     return Figures({"survival": lambda: diagram(result, title, look)})
 
 
@@ -22,10 +22,11 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return the share over the time with its band, and the law with its own."""
     page = Page(look, (style.SINGLE_COLUMN, 55.0))
     (ax,) = page.axes
+    result = look.selected(result)
     time = result["time"].values
     lines = []
     for name, colour, text in (
-        ("survival", style.OKABE_ITO[1], "motions struck again and again"),
+        ("survival", style.OKABE_ITO[1], "simulated motions"),
         ("law", style.OKABE_ITO[0], "law of rare impulses, exp(-rate p t)"),
     ):
         lines += ax.plot(time, result[name].values, color=colour, label=text)

@@ -65,8 +65,10 @@ def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> F
 def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     """Return stroboscopic positions and mean impact speeds against the swept parameter."""
     name = swept_axis(result)
-    page = Page(look, (style.DOUBLE_COLUMN, 105.0), 2, sharex=True, height_ratios=(3, 2))
-    top, bottom = page.axes
+    # a single one of the user is for the section
+    panels = 1 if len(look.ax) == 1 else 2
+    page = Page(look, (style.DOUBLE_COLUMN, 105.0), panels, sharex=True, height_ratios=(3, 2))
+    top, bottom = page.axes[0], page.axes[1] if panels == 2 else None
     values = result[name].values
     section = result["section_x"].transpose("direction", name, "sample").values
     speed = result["mean_impact_speed"].transpose("direction", name).values
@@ -75,14 +77,16 @@ def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) ->
     colours = {code: (style.RUN_UP, style.RUN_DOWN)[code] for _, code in runs}
     for index, code in runs:
         _thin_points(top, values, section[index], ~agree, colours[code])
-        _thin_points(bottom, values, speed[index][:, np.newaxis], ~agree, colours[code])
     _thin_points(top, values, section[0], agree, style.BOTH_RUNS)
-    _thin_points(bottom, values, speed[0][:, np.newaxis], agree, style.BOTH_RUNS)
     _draw_barriers(top, result)
     top.set_ylabel(f"position $x$ ({unit(result['section_x'])})\nonce per drive period")
-    bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
-    bottom.set_xlabel(axis_label(result[name]))
-    bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
+    if bottom:
+        for index, code in runs:
+            _thin_points(bottom, values, speed[index][:, np.newaxis], ~agree, colours[code])
+        _thin_points(bottom, values, speed[0][:, np.newaxis], agree, style.BOTH_RUNS)
+        bottom.set_ylabel(f"mean impact\nspeed ({unit(result['mean_impact_speed'])})")
+        bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
+    page.axes[-1].set_xlabel(axis_label(result[name]))
     for ax in page.axes:
         ax.set_xlim(values.min(), values.max())
     page.letter()
@@ -279,4 +283,4 @@ def _caption(result: xr.Dataset, name: str, look: Look) -> list[str]:
 
 def _limits_caption(result: xr.Dataset) -> list[str]:
     texts = limit_texts(table(result, "limits"))
-    return ["brackets: " + ", ".join(texts)] if texts else []
+    return ["limits: " + ", ".join(texts)] if texts else []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command `separatrix-measures`: how safe, how large and how entangled the basins of a map are."""
+"""The command `separatrix-measures`: dynamical integrity, size and fractality of the basins of a map."""
 
 import argparse
 import contextlib
@@ -51,7 +51,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _refuse_given_up(options: argparse.Namespace, *results: xr.Dataset) -> None:
-    """Refuse maps all of whose points were given up, unless they are asked for."""
+    """Refuse maps all of whose points were given up, unless --partial accepts them."""
     for path, result in zip(options.files, results, strict=True):
         if not options.partial:
             refuse(path, result)
@@ -117,8 +117,8 @@ def tipping_text(matrix: Tipping) -> str:
         lines.append("  ".join(f"{item:>24}" for item in [str(label), *cells]))
     lines += [
         "",
-        "tipping: the share of the starts of each basin before (row) that lie in each basin after (column)",
-        "  interval: 95 %, as if the starts had been drawn at random (Clopper and Pearson)",
+        "tipping: share of the points of each basin before (row) that lie in each basin after (column)",
+        "  interval: 95 %, as for random initial conditions (Clopper and Pearson)",
     ]
     return "\n".join(lines)
 
@@ -138,8 +138,8 @@ def tipping_dict(matrix: Tipping) -> dict[str, object]:
 def _parser() -> Parser:
     parser = Parser(
         prog="separatrix-measures",
-        description="Measure the basins of a map: how safe, how large, how entangled; with intervals "
-        "and limits.",
+        description="Measures dynamical integrity, size and fractality of the basins of a map, "
+        "with intervals and limitations.",
         epilog="Exit codes: 0 done, 64 usage, 65 not a file to read, 66 no such file, 73 cannot write, "
         "78 every motion was given up.",
     )
@@ -151,7 +151,7 @@ def _parser() -> Parser:
         help=f"all, or some of {', '.join(NAMES)} [those that take seconds]",
     )
     parser.add_argument(
-        "--partial", action="store_true", help="measure a map also if all its points were given up"
+        "--partial", action="store_true", help="accept a map all of whose motions were given up"
     )
     parser.add_argument(
         "--attractor", metavar="N", type=whole_number(1), help="the basin of this attractor alone [all]"
@@ -161,13 +161,13 @@ def _parser() -> Parser:
         metavar="NAME=VALUE,...",
         type=pairs(ranges=False),
         default={},
-        help="one value of each parameter of the map, the nearest",
+        help="a value of each parameter of the map; the nearest one is taken",
     )
     parser.add_argument(
         "--frequency",
         metavar="W",
         type=positive,
-        help="velocities are divided by it, rad/s [natural frequency, or that of the drive]",
+        help="frequency that velocities are divided by, rad/s [natural frequency, or drive frequency]",
     )
     parser.add_argument(
         "--deviation",
@@ -181,34 +181,34 @@ def _parser() -> Parser:
         metavar="N",
         type=whole_number(100),
         default=20000,
-        help="new starts of each share [20000]",
+        help="further initial conditions for each share [20000]",
     )
     parser.add_argument(
         "--phases",
         metavar="N",
         type=whole_number(2),
-        help="also the measures over N crank angles; critical impulse, safe basin, local integrity of the "
+        help="adds the measures over N crank angles: critical impulse, safe basin, local integrity of the "
         "orbit",
     )
     parser.add_argument(
         "--along",
         action="store_true",
-        help="over the parameter of the map; -o FILE.h5 is for separatrix-figures",
+        help="measures along the parameter of the map; -o FILE.h5 writes them for separatrix-figures",
     )
     parser.add_argument(
         "--tipping",
         action="store_true",
-        help="two maps: where the starts of each basin of the first lie in the second",
+        help="two maps: shares of each basin of the first that lie in each basin of the second",
     )
-    parser.add_argument("--map-only", action="store_true", help="no new starts: what the map alone shows")
+    parser.add_argument("--map-only", action="store_true", help="only the map, no further initial conditions")
     parser.add_argument(
-        "--seed", metavar="N", type=whole_number(0), default=1, help="of all that is drawn [1]"
+        "--seed", metavar="N", type=whole_number(0), default=1, help="seed of all random numbers [1]"
     )
     parser.add_argument(
         "--threads",
         metavar="N",
         type=whole_number(1),
-        help="threads; without influence on the results [cores]",
+        help="threads, which do not change the results [cores]",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with all curves")
     parser.add_argument(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long a motion survives random impulses: motions that are struck, beside the law of rare impulses."""
+"""How long a motion survives random impulses, by simulation and by the law of rare impulses."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,8 +18,6 @@ from separatrix.version import __version__
 __all__ = ["survival"]
 
 _TIMES = 60
-# More impulses than anybody waits for: the horizon ends a motion.
-_MOST_IMPULSES = 100_000
 
 
 def survival(
@@ -35,28 +33,30 @@ def survival(
     threads: int | None = None,
     progress: bool | Report | None = None,
 ) -> xr.Dataset:
-    """Return the share of motions that random impulses have not taken out of their basin, over the time.
+    """Return the share of motions that random impulses have not yet taken out of their basin, over time.
 
-    A motion has left when the state right after an impulse lies in another basin, or its label is not known
-    (`not_known` counts these). `survival` is the share that has not left, with its 95 % interval;
-    `law` is exp(-rate p t) of rare impulses, which find the machine settled again: `p` is the probability
-    that one impulse at a random crank angle leaves the basin, from `motions` impulses of its own. Where the
-    two differ, impulses meet motions that have not settled.
+    A motion has left its basin when the state right after an impulse lies in another basin, or has an unknown
+    label (counted by `not_known`). `survival` is the share of motions that have not left, with its 95 %
+    interval. `law` is exp(-rate p t), which holds for impulses so rare that the motion settles between them.
+    `p` is the probability that one impulse at a random crank angle takes the motion out of its basin,
+    estimated from further `motions` impulses. Where `survival` and `law` differ, impulses act on motions that
+    have not settled.
 
     Parameters
     ----------
     result, attractor, slice
-        A map over x0 and v0 of one machine, the motion that is struck, and values of the map's parameters.
+        A map of one body over x0 and v0, the attractor that the impulses act on, and values of the parameters
+        of the map.
     rate
-        Mean number of impulses a second; they come at random (Poisson).
+        Mean number of impulses per second (Poisson process).
     deviation
-        Each changes the velocity by a normal random number of this standard deviation [m/s].
+        Standard deviation of the change of velocity by one impulse, which is normally distributed [m/s].
     horizon
-        Seconds that are watched; None: 20 impulses on average.
+        Duration [s]; without one, 20 impulses on average.
     motions
-        How many motions are struck, all from the attractor at random crank angles.
+        Number of motions, which start on the attractor at random crank angles.
     seed, threads
-        What is drawn depends on the seed; the result does not depend on `threads`.
+        The random numbers depend on the seed. The result does not depend on `threads`.
 
     Examples
     --------
@@ -71,6 +71,8 @@ def survival(
     found = slice_of(result, slice, None, threads)
     _require(found, attractor)
     length = 20.0 / rate if horizon is None else float(horizon)
+    if not 0 < length < np.inf:
+        raise SeparatrixError(f"survival: found horizon {length:g} s, allowed a duration above 0", USAGE)
     states = _on_motion(found, attractor, 2 * motions, generator(seed, 10))
     once, _ = _strike(found, attractor, states[:motions].copy(), deviation, generator(seed, 11))
     left, unknown = np.full(motions, np.inf), np.zeros(motions, bool)
@@ -78,7 +80,7 @@ def survival(
     state, clock = states[motions:].copy(), np.zeros(motions)
     staying = np.arange(motions)
     with Progress(progress) as report:
-        for _ in range(_MOST_IMPULSES):
+        while len(staying):
             # drawn for all, so that a motion's impulses do not depend on the others
             waits = random.exponential(1 / rate, motions)[staying]
             going = clock[staying] + waits <= length
@@ -99,7 +101,8 @@ def survival(
 def _require(found: Slice, attractor: int) -> None:
     if found.machine is None or found.names != ("x0", "v0"):
         raise SeparatrixError(
-            "survival: needs a map over x0 and v0 whose new starts the library labels", USAGE
+            "survival: needs a map over x0 and v0 whose further initial conditions the library can label",
+            USAGE,
         )
     if attractor not in found.entries:
         raise SeparatrixError(
@@ -110,9 +113,9 @@ def _require(found: Slice, attractor: int) -> None:
 
     acting = {one.name: one.acts for one in effects().values()}
     if any(acting.get(name) == "sensor" for name in case.resolved.get("effect", {})):
-        raise SeparatrixError("survival: the case has an effect of the sensor; take it out", USAGE)
+        raise SeparatrixError("survival: found an effect of the sensor, allowed a case without one", USAGE)
     if found.machine.section(attractor) is None:
-        raise SeparatrixError("survival: needs a motion with a period", USAGE)
+        raise SeparatrixError("survival: needs a motion with a known period", USAGE)
 
 
 def _period(found: Slice) -> float:
@@ -120,7 +123,7 @@ def _period(found: Slice) -> float:
 
 
 def _on_motion(found: Slice, own: int, count: int, random: np.random.Generator) -> np.ndarray:
-    """States x, v, crank angle of the motion at random times of it."""
+    """States x, v, crank angle of the motion at random instants."""
     points = found.machine.section(own, 0.0) * found.scale
     angles = random.uniform(0, 2 * np.pi, count)
     chosen = points[random.integers(0, len(points), count)]
@@ -129,7 +132,7 @@ def _on_motion(found: Slice, own: int, count: int, random: np.random.Generator) 
 
 
 def _flown(found: Slice, states: np.ndarray, waits: np.ndarray) -> np.ndarray:
-    """States after each has been left alone for its time; its crank angle has turned on."""
+    """States after each has moved without impulses for its time."""
     machine = found.machine
     paths = list(machine.values)
     parts = machine.case.model.segments(

@@ -94,7 +94,8 @@ class ResultFile:
                 raise SeparatrixError(f"{self.path}: is damaged (axis {key})")
             steps = np.diff(values)
             uniform = len(values) < 3 or bool(np.ptp(steps) <= 1e-9 * abs(steps).max())
-            axis = {"key": key, "path": given["name"], "label": _text(file[key], "long_name", key)}
+            path = RENAMED[key].replace("_", ".", 1) if key in RENAMED else given["name"]
+            axis = {"key": key, "path": path, "label": _text(file[key], "long_name", key)}
             axis |= {"unit": _unit(file[key]), "start": given["name"] in STARTS, "count": len(values)}
             axis |= {"from": values[0], "to": values[-1], "uniform": uniform}
             axis["values"] = None if uniform and len(values) > _SHORT else values.tolist()

@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import h5py
+from evidence_rows import processor
 from rows import ROWS
 
 from machine import SOURCE
@@ -203,15 +204,6 @@ def largest_map(runs: Runs, size: Size, report: Callable[[str], None]) -> None:
         report(f"    {line}")
 
 
-def processor() -> str:
-    """What the processor is called."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return "unknown"
-    return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "unknown")
-
-
 def driver() -> str:
     """The version of the GPU's driver."""
     query = ["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"]
@@ -232,7 +224,7 @@ def conditions(runs: Runs, device: str, size: Size) -> list[str]:
         f"| date | {datetime.now(UTC):%Y-%m-%d %H:%M} UTC |",
         f"| computed by | {device} |",
         f"| driver | {driver()} |",
-        f"| processor | {processor()}, {os.cpu_count()} cores |",
+        f"| processor | {processor()['model name']}, {os.cpu_count()} cores |",
         f"| ranks with the GPU | {size.ranks} unless stated otherwise, {threads} threads for each |",
         f"| Separatrix | {', '.join(version.splitlines()[1:3])} |",
         f"| rounds | {size.rounds} |",

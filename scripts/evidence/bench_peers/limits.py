@@ -13,7 +13,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from markdown import table
+from evidence_rows import processor, table
 from ours import FULL, Program
 from rows import ROWS, Row
 
@@ -158,15 +158,9 @@ def measure(row: Row, program: Program, build: Path) -> Limits:
     return Limits(row, rate, counts, done / total, executed.total() / total, megahertz())
 
 
-def facts() -> dict[str, str]:
-    """Entries of /proc/cpuinfo for the first processor."""
-    lines = Path("/proc/cpuinfo").read_text().split("\n\n")[0].splitlines()
-    return {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
-
-
 def megahertz() -> float:
     """Clock of the processor [MHz], as the system reports it."""
-    return float(facts()["cpu MHz"])
+    return float(processor()["cpu MHz"])
 
 
 def limits_table(found: list[Limits]) -> str:
@@ -209,7 +203,7 @@ def report(program: Program, build: Path) -> str:
     before = os.getloadavg()[0]
     found = [measure(row, program, build) for row in ROWS if row.key in SHOWN]
     text = limits_table(found)
-    fields = facts()
+    fields = processor()
     PAGE.write_text(
         TEMPLATE.read_text().format(
             table=text,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from evidence_rows import version_of
 from reference_run import IMPACT_REGIMES
 
 from machine import SOURCE, Outcomes
@@ -32,8 +33,7 @@ class Program:
 
     def __init__(self, program: Path, folder: Path) -> None:
         self.program, self.folder = program, folder
-        text = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
-        self.version = dict(line.split(" ", 1) for line in text.splitlines())
+        self.version = version_of(program)
 
     def timed(self, points: int, *words: object) -> Timing:
         """Run it and wait; CPU time is user and system time of the process."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import compiled
-from markdown import table
+from evidence_rows import processor, table
 from rows_report import number
 
 from machine import SEED, SOURCE, TOLERANCE, fingerprint, start_points
@@ -190,17 +190,6 @@ def agreement(found: Accuracy) -> str:
     )
 
 
-def processor() -> tuple[str, str]:
-    """Model of the processor and the instruction sets that matter here."""
-    fields = {}
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        key, _, value = line.partition(":")
-        fields.setdefault(key.strip(), value.strip())
-    flags = fields.get("flags", "").split()
-    model = f"{fields.get('model name', 'unknown')}, family {fields.get('cpu family', '?')}"
-    return f"{model}, model {fields.get('model', '?')}", " ".join(flag for flag in ISA if flag in flags)
-
-
 def first_line(*command: str) -> str:
     """What a command answers first."""
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[0]
@@ -208,7 +197,12 @@ def first_line(*command: str) -> str:
 
 def conditions(results: Results) -> str:
     """Machine, versions, date, tolerance."""
-    model, isa = processor()
+    fields = processor()
+    flags = fields.get("flags", "").split()
+    model = (
+        f"{fields['model name']}, family {fields.get('cpu family', '?')}, model {fields.get('model', '?')}"
+    )
+    isa = " ".join(flag for flag in ISA if flag in flags)
     version = results.version
     packages = [first_line("dpkg-query", "-W", "-f=${Package} ${Version}\n", name) for name in PACKAGES]
     modules = [f"{name} {importlib.metadata.version(name)}" for name in ("heyoka", "scipy", "numpy")]

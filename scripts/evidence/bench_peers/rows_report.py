@@ -8,7 +8,7 @@ import statistics
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from markdown import table
+from evidence_rows import table
 from rows import ROWS
 
 from machine import TOLERANCE

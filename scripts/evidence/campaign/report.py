@@ -15,7 +15,7 @@ import followed
 import records
 import seeds
 from bars import LONG, bars
-from markdown import table
+from evidence_rows import table
 from rates import Rate, rate
 from scoring import HAVE_A_TERM, PRECISE, SEPARABLE, STRONG, Score, score
 

@@ -16,7 +16,7 @@ import model
 import packing
 import simulation
 from costs import spread_of
-from markdown import table
+from evidence_rows import processor, table
 from runs import POINTS_PER_TILE, X0_COUNT, Run
 
 if TYPE_CHECKING:
@@ -247,14 +247,10 @@ def bar_table(results: Results) -> str:
 
 def conditions(results: Results) -> str:
     """Machine, build, date."""
-    fields = {}
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        key, _, value = line.partition(":")
-        fields.setdefault(key.strip(), value.strip())
     before, after = results.load
     rows = [
         ["date", datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")],
-        ["machine", f"{fields.get('model name', 'unknown')}, {os.cpu_count()} cores"],
+        ["machine", f"{processor()['model name']}, {os.cpu_count()} cores"],
         ["load (1 min) before and after", f"{before:.1f}, {after:.1f}"],
         ["Separatrix", f"commit {results.version['commit']}, `{results.version['flags']}`"],
         ["repetitions", f"{len(results.strong[1])}, in turn; medians; {results.seconds:.0f} s in all"],

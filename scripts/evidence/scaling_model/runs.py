@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from evidence_rows import version_of
 
 SOURCE = Path(__file__).resolve().parents[3]
 CASE = SOURCE / "examples" / "basin_ratio_stack.toml"
@@ -74,8 +75,7 @@ class Program:
     def __init__(self, build: Path, folder: Path) -> None:
         self.program, self.folder = build / "bin" / "separatrix", folder
         self.replayer = build / "bin" / "tests" / "scheduler_replay"
-        text = subprocess.run([self.program, "--version"], capture_output=True, text=True, check=True).stdout
-        self.version = dict(line.split(" ", 1) for line in text.splitlines())
+        self.version = version_of(self.program)
 
     def command(self, ranks: int, name: str, case: Path, *words: object) -> tuple[list[str], Path]:
         """Return the command of a basin map under mpirun, and its file."""

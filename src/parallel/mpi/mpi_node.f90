@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The ranks of one node and the pool of positions that they share in memory.
+!> The ranks of one node and the pool of items that they share in memory.
 module mpi_node
   use, intrinsic :: iso_c_binding, only: c_ptr
   use atomics, only: atomic_bytes, atomic_fetch_add, atomic_load, atomic_store, atomic_try_lock, yield
@@ -17,7 +17,7 @@ module mpi_node
 
   public :: new_node
 
-  !> The shared words. `next` to `last` are the positions left; `lock` guards the two.
+  !> The shared words. `next` to `last` are the items left; `lock` guards the two.
   integer, parameter :: word_lock = 0, word_next = 1, word_last = 2, word_refilling = 3, &
     word_exhausted = 4, word_stop = 5, word_done = 6, word_count = 7
 
@@ -114,7 +114,7 @@ contains
     call MPI_Barrier(node%comm)
   end subroutine share_words
 
-  !> Takes up to `wanted` positions, or the share `numerator`/`denominator` of what is left if that is
+  !> Takes up to `wanted` items, or the share `numerator`/`denominator` of what is left if that is
   !> more: `first` to `last`; last < first = the pool is empty.
   subroutine take(self, wanted, first, last, numerator, denominator)
     class(node_t), intent(in) :: self
@@ -134,7 +134,7 @@ contains
     last = int(next + count - 1)
   end subroutine take
 
-  !> Whether positions are left in the pool.
+  !> Whether items are left in the pool.
   logical function has_work(self)
     class(node_t), intent(in) :: self
     call lock(self)
@@ -186,14 +186,14 @@ contains
     is_stopped = atomic_load(self%words, word_stop) /= 0
   end function is_stopped
 
-  !> Counts one position done.
+  !> Counts one item done.
   subroutine count_done(self)
     class(node_t), intent(in) :: self
     integer(int64) :: before
     before = atomic_fetch_add(self%words, word_done, 1_int64)
   end subroutine count_done
 
-  !> Positions done in this node.
+  !> Items done in this node.
   integer function done(self)
     class(node_t), intent(in) :: self
     done = int(atomic_load(self%words, word_done))

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Work for the ranks of an MPI team on two levels. Each node has a pool of positions in shared
+!> Work for the ranks of an MPI team on two levels. Each node has a pool of items in shared
 !> memory. That of rank 0's node is the work list itself, in an order in which every block is a fair
 !> sample of it; the others are refilled from it in blocks that shrink with what is left, by messages
 !> which rank 0 answers in `poll` and in `finish`.
@@ -36,7 +36,7 @@ module mpi_scheduler
     logical, private :: active = .false.
     logical, private :: busy = .false., stopped = .false.
     integer, private :: my_done = 0, all_done = 0
-    !> On rank 0: positions done that each node has reported.
+    !> On rank 0: items done that each node has reported.
     integer, allocatable, private :: reported(:)
     !> Notices of a stop: sent to rank 0, received by rank 0, sent on by rank 0, received by a leader.
     integer, private :: notices_sent = 0, notices_received = 0
@@ -70,7 +70,7 @@ contains
     scheduler%ranks = team%size()
   end subroutine new_mpi_scheduler
 
-  !> Begins a list of `n` positions. Collective.
+  !> Begins a list of `n` items. Collective.
   subroutine start(self, n, error)
     class(mpi_scheduler_t), intent(inout) :: self
     integer, intent(in) :: n
@@ -98,10 +98,10 @@ contains
     call self%begin_log()
   end subroutine start
 
-  !> The next position; 0 = none left, or a stop was requested.
-  subroutine next(self, position)
+  !> The next item; 0 = none left, or a stop was requested.
+  subroutine next(self, item)
     class(mpi_scheduler_t), intent(inout) :: self
-    integer, intent(out) :: position
+    integer, intent(out) :: item
     integer :: number, last
     if (self%busy) then
       self%my_done = self%my_done + 1
@@ -110,7 +110,7 @@ contains
       self%busy = .false.
     end if
     do
-      position = 0
+      item = 0
       call self%poll()
       if (self%node%is_stopped()) return
       call self%node%take(1, number, last)
@@ -120,8 +120,8 @@ contains
       call refill_pool(self)
     end do
     self%busy = .true.
-    position = self%order%position(number)
-    call self%log%begin(position, self%elapsed())
+    item = self%order%item(number)
+    call self%log%begin(item, self%elapsed())
   end subroutine next
 
   !> Looks for signals, the time limit and messages.
@@ -159,7 +159,7 @@ contains
     if (self%active) stop_requested = self%node%is_stopped()
   end function stop_requested
 
-  !> Positions done; on rank 0 while the work runs, exact on every rank after `finish`.
+  !> Items done; on rank 0 while the work runs, exact on every rank after `finish`.
   integer function done_count(self)
     class(mpi_scheduler_t), intent(in) :: self
     done_count = self%all_done

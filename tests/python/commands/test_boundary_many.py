@@ -108,7 +108,7 @@ def test_no_two_saddles_look_alike():
     texts = [handle.get_label() for handle in handles]
     assert texts == [
         *(f"boundary: stable set of saddle {k}" for k in range(1, 8)),
-        "edge of what is not known",
+        "edge of the unlabelled region",
     ]
     looks = {(handle.get_color(), str(handle._dash_pattern)) for handle in handles}
     assert len(looks) == 8

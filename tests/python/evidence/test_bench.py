@@ -32,7 +32,8 @@ def test_the_driver_of_a_peer_agrees_with_ours(
     library = build_dir / "bench_peers" / f"libbench_{peer}.so"
     if not library.is_file():
         pytest.skip(f"{library} has not been built; scripts/evidence/bench does")
-    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
+    for folder in ("scripts/evidence", "scripts/evidence/bench_peers"):
+        monkeypatch.syspath_prepend(str(source_dir / folder))
     from compiled import Compiled
 
     from machine import CASE, TOLERANCE, published_machine
@@ -48,7 +49,8 @@ def test_the_driver_of_a_peer_agrees_with_ours(
 
 @pytest.mark.parametrize("key", ["hunt_crossley", "kelvin_voigt_cut", "cubic", "power", "dahl"])
 def test_a_peer_has_the_machine_of_the_row(source_dir, separatrix, tmp_path, monkeypatch, key):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
+    for folder in ("scripts/evidence", "scripts/evidence/bench_peers"):
+        monkeypatch.syspath_prepend(str(source_dir / folder))
     from compiled import Compiled, build
     from rows import ROWS
 
@@ -65,7 +67,8 @@ def test_a_peer_has_the_machine_of_the_row(source_dir, separatrix, tmp_path, mon
 
 
 def test_every_row_is_a_case(source_dir, separatrix, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
+    for folder in ("scripts/evidence", "scripts/evidence/bench_peers"):
+        monkeypatch.syspath_prepend(str(source_dir / folder))
     from rows import ROWS
 
     for row in ROWS:
@@ -73,7 +76,8 @@ def test_every_row_is_a_case(source_dir, separatrix, tmp_path, monkeypatch):
 
 
 def test_the_quadruple_reference_agrees_with_ours(source_dir, build_dir, separatrix, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
+    for folder in ("scripts/evidence", "scripts/evidence/bench_peers"):
+        monkeypatch.syspath_prepend(str(source_dir / folder))
     import reference_run
 
     from machine import CASE

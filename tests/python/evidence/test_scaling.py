@@ -16,7 +16,8 @@ SHAPES = [(1, 1, 50), (2, 1, 50), (5, 2, 333), (16, 4, 17), (64, 8, 1000), (300,
 def scaling(source_dir, tmp_path_factory):
     """The modules of scripts/evidence/scaling_model, and the compiled model."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(source_dir / "scripts/evidence/scaling_model"))
+        for folder in ("scripts/evidence", "scripts/evidence/scaling_model"):
+            patch.syspath_prepend(str(source_dir / folder))
         import costs
         import model
     return model, costs, model.Model(tmp_path_factory.mktemp("model"))

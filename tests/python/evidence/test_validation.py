@@ -26,16 +26,16 @@ def program(rows, library, separatrix, build_dir, tmp_path):
 
 
 @pytest.mark.long
-def test_orbits_of_budd_and_dux_are_theirs_and_stand_in_the_page(rows, numbers, program, source_dir):
+def test_orbits_of_budd_and_dux_are_theirs_and_stand_in_the_page(rows, program, source_dir):
     page = (source_dir / "docs" / "validation.md").read_text()
     found = [*rows.budd_dux(program), *rows.family(program)]
     assert [row for row in found if row.verdict != "agrees"] == []
     assert len(found) == 20
     for row in found:
-        _, what, theirs, bar = numbers.THEIRS[row.key]
-        (line,) = [item for item in page.splitlines() if item.startswith(f"| {what} | {theirs:.12g} |")]
+        start = f"| {row.what} | {row.theirs:.12g} |"
+        (line,) = [item for item in page.splitlines() if item.startswith(start)]
         printed = float(line.split("|")[3])
-        assert abs(printed - row.ours) <= bar, line
+        assert abs(printed - row.ours) <= row.bar, line
 
 
 def test_the_saddle_is_one(rows, program):

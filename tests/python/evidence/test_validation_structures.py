@@ -3,6 +3,7 @@
 """Machines of several bodies beside closed forms: the quick rows of docs/validation.md."""
 
 import importlib
+import json
 import sys
 
 import numpy as np
@@ -76,7 +77,7 @@ def test_what_is_off_is_settled_by_a_closed_form(public, separatrix, build_dir, 
     *found, rest = public.PRINTED[0](public.Program(build_dir, tmp_path))
     assert [number.verdict.split(",")[0] for number in found] == ["theirs is off"] * 5
     assert rest.verdict == "agrees"
-    assert not any(map(public.differs, found))
+    assert not any(number.differs for number in found)
 
 
 def test_every_public_case_is_run(source_dir):
@@ -105,6 +106,12 @@ def test_the_quadratic_gives_orbits_that_come_back(rows):
 
 
 def test_a_number_that_is_off_is_reported(rows):
-    one = rows.Number("somebody", "speed", 1.0, 1.1, 1e-9)
-    assert one.verdict == "DIFFERS"
-    assert "**DIFFERS**" in rows.section([one])
+    one = rows.Row("somebody", "speed", 1.0, 1.1, 1e-9)
+    assert one.differs
+    assert one.cells()["verdict"] == "**DIFFERS**"
+    assert json.loads(one.to_json())["verdict"] == "DIFFERS"
+    many = rows.Row("somebody", "speeds", [1.0, 2.0], [1.0, 1.9], 0.06, relative=True)
+    assert many.difference == pytest.approx(0.05) and not many.differs
+    settled = rows.Row("somebody", "speed", 1.0, 1.1, 1e-9, closed=1.1)
+    assert settled.verdict == "theirs is off, closed form 1.1" and not settled.differs
+    assert rows.Row("somebody", "speed", 1.0, float("nan"), 1e-9).differs

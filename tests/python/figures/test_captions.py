@@ -87,7 +87,9 @@ def test_a_caption_describes_a_measured_force_by_its_samples(library: Path) -> N
 def test_limits_and_powers_have_units() -> None:
     ends = {"lower": ("limit", [0.5], {"units": "N"}), "upper": ("limit", [0.6], {"units": "N"})}
     limits = xr.Dataset({"name": ("limit", ["sticking_to_stuck_up"]), **ends})
-    assert limit_texts(limits) == ["sticking to stuck up 0.5 to 0.6 N"]
+    assert limit_texts(limits) == ["sticking to stuck at 0.5 to 0.6 N (run-up)"]
+    narrow = limits.assign(lower=limits.lower + 0.4999997, upper=limits.upper + 0.4)
+    assert limit_texts(narrow) == ["sticking to stuck at 0.9999997 to 1 N (run-up)"]
     assert [raised(unit) for unit in ("N/m^1.5", "N/m^n", "s^-2")] == ["N/m$^{1.5}$", "N/m$^{n}$", "s$^{-2}$"]
 
 

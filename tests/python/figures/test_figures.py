@@ -87,7 +87,10 @@ def test_a_limit_is_that_of_the_settled_motion_where_it_is_known() -> None:
     limits = xr.Dataset({"name": ("limit", ["impacts_start_up", "impacts_stop_up"])})
     limits = limits.assign({name: ("limit", values) for name, values in ends.items()})
     assert boundaries(limits) == [Boundary(1.0, 1.5), Boundary(3.0, 4.0)]
-    assert limit_texts(limits) == ["impacts start up 1 to 1.5", "in steps impacts stop up 3 to 4"]
+    assert limit_texts(limits) == [
+        "impacts start at 1 to 1.5 (run-up)",
+        "impacts stop at 3 to 4 (run-up, observed in steps)",
+    ]
     assert brackets(limits, in_steps=True).tolist() == [[0.5, 0.6], [3.0, 4.0]]
     assert limit_texts(xr.Dataset()) == []
 

@@ -216,7 +216,13 @@ def test_parts_of_figures_and_lists_are_taken(made: Callable, library: Path) -> 
 @pytest.mark.parametrize(
     ("kind", "name", "number", "more", "message"),
     [
-        ("trajectory", "history", 1, {}, "ax: found 1 axes, this figure needs 2"),
+        (
+            "trajectory",
+            "history",
+            1,
+            {},
+            "ax: found 1 axes, this figure needs 2 in a sequence, one for each panel",
+        ),
         ("trajectory", "phase", 2, {}, "ax: found 2 axes, this figure needs 1"),
         ("stack", "attractor", 2, {}, "ax: found 2 axes, this figure needs 3"),
         ("basin", "attractor", 1, {"inset": {"x0": (-0.5, 0.6), "v0": (-3, 3)}}, "this figure needs 2"),
@@ -236,6 +242,18 @@ def test_a_wrong_request_draws_nothing(
     assert message in str(raised.value)
     assert not any(ax.has_data() for ax in axes)
     assert len(figure.axes) == number
+
+
+def test_one_axes_holds_the_section_of_a_sweep(made: Callable) -> None:
+    result = made("sweep")
+    upper = content(result.separatrix.plot("bifurcation").axes[0])
+    ax = Figure().add_subplot()
+    result.separatrix.plot("bifurcation", ax=ax)
+    found = content(ax)
+    assert {key: found[key] for key in ("lines", "points", "limits", "up")} == {
+        key: upper[key] for key in ("lines", "points", "limits", "up")
+    }
+    assert ax.get_xlabel() == result.separatrix.plot("bifurcation").axes[1].get_xlabel()
 
 
 def test_films_have_no_axes(made: Callable, tmp_path: Path) -> None:

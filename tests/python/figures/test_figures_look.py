@@ -28,6 +28,7 @@ from separatrix.figures import contact as contacts
 from separatrix.figures.animation import animate, ffmpeg
 from separatrix.figures.difference import differing
 from separatrix.figures.look import Look
+from separatrix.labels import symbol
 from separatrix.open import open_result
 
 RATIOS = np.array([1.1, 1.2, 1.3])
@@ -276,6 +277,54 @@ def test_marks_are_those_of_the_slice(library: Path) -> None:
     figure = result.separatrix.plot("attractor", slice={"drive.ratio": 1.2}, units=["mm"])
     marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
     assert sorted(x for line in marks for x in line.get_xdata()) == pytest.approx(sorted(1000 * mine[0]))
+
+
+def test_a_ratio_is_shown_as_a_frequency(library: Path) -> None:
+    """Of a spring of c = 9 pi^2 N/m and a mass of 1 kg the ratio 1 is 1.5 Hz, 90 rpm and 3 pi rad/s."""
+    case = sx.Case.from_text(CASE)
+    result = sx.sweep(case, progress=False)
+    brackets = result["limits_lower"].values
+    for asked, worth in (("Hz", 1.5), ("rpm", 90.0), ("rad/s", 3 * np.pi)):
+        ax = result.separatrix.plot("amplitude", units=asked).axes[0]
+        assert ax.get_xlim() == pytest.approx((0.8 * worth, 1.4 * worth))
+        assert f"({asked})" in ax.get_xlabel() and "ratio" not in ax.get_xlabel()
+        shown = Look(units=asked).selected(result)["limits_lower"].values
+        np.testing.assert_allclose(shown, worth * brackets)
+    ratios = sx.basin(case, drive__ratio=[1.1, 1.2], x0=4, v0=4, progress=False)
+    assert [ax.get_title().split("\n")[0] for ax in ratios.separatrix.plot(units=["Hz"]).axes[:2]] == [
+        "$f$ = 1.65 Hz",
+        "$f$ = 1.8 Hz",
+    ]
+    varied = sx.basin(case, drive__ratio=[1.1, 1.2], body__mass=[0.9, 1.1], progress=False)
+    with pytest.raises(SeparatrixError, match=r"no single natural frequency: body\.mass varies"):
+        varied.separatrix.plot("regime", units=["Hz"])
+
+
+def test_frequencies_are_not_angular_velocities() -> None:
+    """Hz belongs to a frequency in rad/s, deg/s to the velocity of an angle, whatever their order."""
+    data = {"v": ("drive_motor_frequency", [np.pi, 2 * np.pi], {"units": "rad/s", "long_name": "velocity"})}
+    two = "[drive.motor]\nfrequency = 1.0\n[drive.shaker]\nfrequency = 2.0\n"
+    frequency = (
+        "drive_motor_frequency",
+        [2 * np.pi, 4 * np.pi],
+        {"units": "rad/s", "long_name": "angular frequency"},
+    )
+    result = xr.Dataset(data, {"drive_motor_frequency": frequency}, {"resolved_case": two})
+    for units in (("Hz", "deg/s"), ("deg/s", "Hz")):
+        shown = Look(units=units).selected(result)
+        np.testing.assert_allclose(shown["drive_motor_frequency"], [1, 2])
+        np.testing.assert_allclose(shown["v"], [180, 360])
+        assert (shown["v"].units, shown["drive_motor_frequency"].long_name) == ("deg/s", "frequency")
+        assert symbol(shown["drive_motor_frequency"]) == "frequency"
+        single = Look(units=units).selected(result.assign_attrs(resolved_case="[drive.motor]\nfrequency = 1"))
+        assert symbol(single["drive_motor_frequency"]) == "$f$"
+    # what is no frequency keeps its size
+    assert Look(units=("Hz", "rad/s")).factor("rad/s") == 1.0
+
+
+def test_forces_of_contacts_have_units() -> None:
+    motion = xr.Dataset({"contact_force": ("time", [2e3], {"units": "N"})})
+    assert float(Look(units="kN").selected(motion)["contact_force"][0]) == 2.0
 
 
 def test_shares_over_a_parameter_add_up(tmp_path: Path) -> None:

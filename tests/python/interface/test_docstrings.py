@@ -12,7 +12,7 @@ import separatrix as sx
 # Exceptions that carry what a run leaves behind, values that functions return, and the version.
 WITHOUT = {
     "Discovery", "GivenUpError", "Interrupted", "SeparatrixError", "SeparatrixWarning", "Stability",
-    "__version__", "discover",
+    "__version__",
 }  # fmt: skip
 
 

@@ -10,8 +10,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from program import meanings, run, succeed, write_case
 from separatrix import cli
+from separatrix.errors import GivenUpError
 from separatrix.given_up import left_text
 from separatrix.open import open_result
 
@@ -448,3 +450,36 @@ def test_a_motion_that_leaves_reports_when(separatrix, tmp_path):
     assert "; left the" in text
     assert "steady motion" not in text
     assert "drive period" not in text
+
+
+@pytest.mark.parametrize("example", ["structure_impact_damper", "pair_backlash", "basin_coulomb"])
+def test_a_motion_in_python_is_that_of_the_command(separatrix, library, source_dir, example, tmp_path):
+    """The same variables with the same bits, of every body and joint too."""
+    case = sx.load(source_dir / "examples" / f"{example}.toml").with_(
+        {"run.duration": 5.0, "run.window": 2.0}
+    )
+    succeed(separatrix, "trajectory", case.save(tmp_path / "case.toml"), "-o", "motion.h5", folder=tmp_path)
+    mine = sx.trajectory(case)
+    with sx.open_result(tmp_path / "motion.h5") as file:
+        assert set(mine.variables) == set(file.variables)
+        for name in file.variables:
+            np.testing.assert_array_equal(mine[name], file[name], name)
+            assert mine[name].attrs["units"] == file[name].attrs["units"]
+        assert mine.attrs["regime"] == file.attrs["regime"]
+
+
+def test_a_motion_of_several_bodies_that_is_given_up_is_an_error(separatrix, library):
+    parts = {
+        "body": {"a": {"mass": 1.0}, "b": {"mass": 1.0}},
+        "spring": {"s": {"between": ["a", "b"], "stiffness": 1.0}},
+        "contact": {"stop": {"between": ["a"], "law": "newton", "restitution": 0.9, "upper": 0.3}},
+        "start": {"x0": 0.2, "v0": 1.0},
+        "run": {"duration": 100.0, "window": 10.0},
+        "integrator": {"event_budget": 10},
+    }
+    case = sx.Case.from_dict(parts)
+    message = r"given up: event_budget.* after [0-9.]+ s \(partial=True"
+    with pytest.raises(GivenUpError, match=message) as raised:
+        sx.trajectory(case)
+    assert {"a_x", "b_x"} <= set(raised.value.result.variables)
+    assert sx.trajectory(case, partial=True).attrs["reason"] == "event_budget"

@@ -292,6 +292,12 @@ def test_rare_impulses_have_an_exponential_law_and_frequent_ones_do_worse(crank)
         sx.survival(crank, 1, rate=0.0, deviation=1.0)
 
 
+@pytest.mark.parametrize("horizon", [0.0, -1.0, np.inf, np.nan])
+def test_survival_needs_a_duration(crank, horizon: float) -> None:
+    with pytest.raises(sx.SeparatrixError, match="allowed a duration above 0"):
+        sx.survival(crank, 2, rate=0.1, deviation=0.5, motions=20, horizon=horizon)
+
+
 def test_survival_does_not_depend_on_threads(crank) -> None:
     one, other = (
         sx.survival(crank, 2, rate=0.5, deviation=2.0, motions=100, threads=threads) for threads in (1, 3)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LANGUAGES = {"toml", "python", "console", "sh", "text"}
-VARIES = re.compile(r"\b\d+(\.\d+)?(e-?\d+)? (s|MiB|ms)\b|\b\d+ bytes\b")
+VARIES = re.compile(r"\b(\d+ h )?(\d+ min )?\d+(\.\d+)?(e-?\d+)? (s|MiB|ms)\b|\b\d+ bytes\b")
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The site: every code block of its teaching pages runs and prints what it states."""
 
+import html
 import re
 import runpy
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 from documents import LANGUAGES, blocks, matches, run_page
+from fontTools.ttLib import TTFont
 from separatrix import SeparatrixWarning
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
@@ -48,6 +50,7 @@ def test_the_comparison_can_fail() -> None:
     """What differs is seen, what may differ is not."""
     assert matches(["a", "...", "wrote x in 1.5 s"], ["a", "b", "c", "wrote x in 0.02 s"])
     assert not matches(["a", "...", "d"], ["a", "b", "c"])
+    assert matches(["about 11 s on one core"], ["about 1 min 20 s on one core"])
     assert not matches(["share 0.5"], ["share 0.6"])
     assert not matches(["a"], ["a", "b"])
 
@@ -102,12 +105,29 @@ def test_the_site_builds_without_a_warning(
     assert [path.name for path in made if path.read_text() != kept[path]] == [], "scripts/docs --pages"
     home = (tmp_path / "site" / "index.html").read_text()
     assert "petals.png" in home and "Start in 60 seconds" in home
+    check_formulas(tmp_path / "site")
     for page in (tmp_path / "site").glob("*.html"):
         text = page.read_text()
         assert (
             re.findall(r"<pre(?! tabindex)|<img(?![^>]* alt=)|role=.heading.(?! aria-level)", text) == []
         ), page
         assert '<html class="no-js" lang="en"' in text
+
+
+def check_formulas(site: Path) -> None:
+    """Formulas are MathML in a font of the site that has the tables of a mathematics font."""
+    text = (site / "theory.html").read_text()
+    assert text.count("<math") > 100 and "\\dot" not in text
+    style = (site / "_static" / "site.css").read_text()
+    (name,) = re.findall(r'url\("([^"]*)"\) format\("opentype"\)', style)
+    font = TTFont(site / "_static" / name)
+    assert {"MATH", "CFF "} <= set(font.keys())
+    formulas = "".join(re.findall("<math.*?</math>", text, re.DOTALL))
+    letters = {ord(one) for one in html.unescape(re.sub("<[^>]*>", "", formulas))}
+    # application of a function and invisible operators have no glyph
+    letters -= {0x2061, 0x2062, 0x2063}
+    unknown = {chr(one) for one in letters - set(font.getBestCmap()) if not chr(one).isspace()}
+    assert not unknown
 
 
 def test_links_between_documents_lead_somewhere() -> None:

@@ -10,8 +10,8 @@ import { PALETTE } from "./palette.js";
 // What a curve leads to: text and dashes; its colour is in the palette.
 const LINES = {
   stable_set: ["stable set of a saddle", []], recurrent: ["recurrent edge state", []], graze: ["edge of a graze", [6, 3]],
-  stick: ["rim of a stick set", [6, 3]], chatter: ["edge of a completed chatter", [6, 3]], other_event: ["edge at another event", [6, 3]],
-  not_known: ["leads to what is not known", [6, 3, 1, 3]], edge: ["edge of what is not known", [2, 3]],
+  stick: ["edge of a set of sticking states", [6, 3]], chatter: ["edge of a completed chatter", [6, 3]], other_event: ["edge at another event", [6, 3]],
+  not_known: ["edge state not known", [6, 3, 1, 3]], edge: ["edge of the unlabelled region", [2, 3]],
 };
 
 export class BoundaryPanel {
