@@ -72,6 +72,8 @@ _HOME = {
     "trajectory": "separatrix.motions",
 }
 
+_WITHOUT_RESULTS = ("separatrix.cases", "separatrix.library")
+
 __all__ = [
     "CaseError",
     "GivenUpError",
@@ -86,6 +88,9 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module 'separatrix' has no attribute '{name}'")
+    if _HOME[name] not in _WITHOUT_RESULTS:
+        # Results have their accessor, whatever computes or opens them.
+        importlib.import_module("separatrix.accessor")
     value = getattr(importlib.import_module(_HOME[name]), name)
     globals()[name] = value
     return value

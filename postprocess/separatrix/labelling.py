@@ -10,7 +10,6 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 import numpy as np
 import xarray as xr
 
-import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix.cases import Case
 from separatrix.errors import BAD_DATA, CaseError, GivenUpError, Interrupted
 from separatrix.given_up import all_given_up

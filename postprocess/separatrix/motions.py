@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-import separatrix.accessor  # noqa: F401  (results have their accessor)
 from separatrix import simulate
 from separatrix.cases import Case, as_case, number
 from separatrix.errors import USAGE, GivenUpError, SeparatrixError
