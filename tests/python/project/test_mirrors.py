@@ -91,7 +91,8 @@ def fortran_members(body: str, mirrored: dict[str, str]) -> list[Member]:
 
 def mirrors() -> dict[str, tuple[str, str]]:
     """Name in C++ by the name in Fortran, with the body there."""
-    pattern = r"Mirrors `(\w+)` of \w+\.hpp[^\n]*\n(?:  !>[^\n]*\n)*  type, bind\(c\)(?:, public)? :: (\w+)\n(.*?)\n  end type"
+    comment = r"Mirrors `(\w+)` of \w+\.hpp[^\n]*\n(?:  !>[^\n]*\n)*"
+    pattern = comment + r"  type, bind\(c\)(?:, public)? :: (\w+)\n(.*?)\n  end type"
     found = {}
     for file in sorted(LANES.glob("*.f90")):
         for cpp, fortran, body in re.findall(pattern, file.read_text(), re.S):
