@@ -138,17 +138,28 @@ contains
     if (.not. allocated(error)) call h5_open(path, file, error, writable=.true.)
   end subroutine h5_create
 
-  !> Opens a file; with a team of several ranks (collective) all of them together. Code 74.
-  subroutine h5_open(path, file, error, writable, team)
+  !> Opens a file; with a team of several ranks (collective) all of them together. Code 74. Ranks that wait for each other use the
+  !> processor: one rank alone tries first whether the file is damaged, and the time that all take has no limit.
+  recursive subroutine h5_open(path, file, error, writable, team)
     character(len=*), intent(in) :: path
     type(h5_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: writable
     class(team_t), intent(in), optional :: team
+    type(h5_file_t) :: tried
     integer(hid_t) :: access
     integer :: status, flags, ignored
+    logical :: together
     file%path = path
     flags = H5F_ACC_RDONLY_F
+    together = .false.
+    if (present(team)) together = team%size() > 1
+    if (together) then
+      if (team%is_root()) call h5_open(path, tried, error)
+      if (team%is_root() .and. .not. allocated(error)) call h5_close(tried, error)
+      call team%agree(error)
+      if (allocated(error)) return
+    end if
     call start_library(path, error)
     if (allocated(error)) return
     if (present(writable)) flags = merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable)
@@ -159,10 +170,8 @@ contains
     ! Without caches of its own for data HDF5 hands over at once what it writes: nothing has to be flushed.
     if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_cache_f(access, 0, 0_size_t, 0_size_t, 0.0, status)
     if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_sieve_buf_size_f(access, 0_size_t, status)
-    if (present(team) .and. status >= 0) then
-      if (team%size() > 1) call set_parallel_access(access, team%communicator(), status)
-    end if
-    call trap('its beginning', path, endless=.true.)
+    if (together .and. status >= 0) call set_parallel_access(access, team%communicator(), status)
+    call trap('its beginning', path, endless=.not. together)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
     call end_guard()
     if (h5_failed(status, 'open', '', path, error)) return

@@ -4,14 +4,15 @@
 /* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
    call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
    write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
-   MPI run. Without $FAULT_AT the number of calls is added as a line to the file $FAULT_COUNT when the process
-   ends. */
+   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. Without $FAULT_AT the
+   number of calls is added as a line to the file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -52,7 +53,7 @@ static int fault(const char *path, int writes) {
   if (name == NULL || strstr(path, name) == NULL)
     return 0;
   const long call = ++calls;
-  if (at == 0 || call < at)
+  if (at == 0 || call < at || strcmp(action, "late") == 0)
     return 0;
   if (strcmp(action, "kill") == 0)
     die();
@@ -79,6 +80,25 @@ static int fault_of(int descriptor, int writes) {
     errno = (number);                                                                                        \
     return -1;                                                                                               \
   }
+
+static int open_late(const char *path, int flags, mode_t mode) {
+  static atomic_int opened;
+  if (name != NULL && at > 0 && strcmp(action, "late") == 0 && (flags & O_ACCMODE) != O_RDONLY &&
+      strstr(path, name) != NULL && atomic_fetch_add(&opened, 1) == 0)
+    sleep((unsigned)at);
+  return REAL(open)(path, flags, mode);
+}
+
+#define OPEN_LATE                                                                                            \
+  va_list more;                                                                                              \
+  va_start(more, flags);                                                                                     \
+  const mode_t mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(more, mode_t) : 0;                       \
+  va_end(more);                                                                                              \
+  return open_late(path, flags, mode);
+
+int open(const char *path, int flags, ...) { OPEN_LATE }
+
+int open64(const char *path, int flags, ...) { OPEN_LATE }
 
 ssize_t write(int descriptor, const void *data, size_t size) {
   const int number = fault_of(descriptor, 1);
