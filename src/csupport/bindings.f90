@@ -8,7 +8,7 @@ module bindings
   implicit none
   private
 
-  public :: c_crashed, c_fork, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
+  public :: c_crashed, c_fork, c_signals_farewell, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
     c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
     c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
@@ -106,6 +106,11 @@ module bindings
     integer(c_int) function c_signals_received() bind(c, name='separatrix_signals_received')
       import :: c_int
     end function c_signals_received
+
+    subroutine c_signals_farewell(text) bind(c, name='separatrix_signals_farewell')
+      import :: c_char
+      character(kind=c_char), intent(in) :: text(*)
+    end subroutine c_signals_farewell
 
     subroutine c_signals_clear() bind(c, name='separatrix_signals_clear')
     end subroutine c_signals_clear

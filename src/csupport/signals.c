@@ -1,15 +1,34 @@
 /* SPDX-FileCopyrightText: The Separatrix developers */
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 
-/* Stop signals set a counter that the scheduler reads between trajectories. */
+/* Stop signals set a counter that the scheduler reads between trajectories. Where nobody has read it in time,
+   within one long trajectory, the process ends by itself: working files are whole at every moment. */
 #include <signal.h>
 #include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
 
-static volatile sig_atomic_t received = 0, terminated = 0;
+static volatile sig_atomic_t received = 0, terminated = 0, noticed = 0;
+
+/* Seconds until a signal has to be noticed. */
+enum { patience = 4, resumable = 75 };
+static char farewell[1024] = "separatrix: stopped within one long trajectory\n";
+
+static void give_up(int number) {
+  (void)number;
+  if (noticed || received == 0)
+    return;
+  if (write(STDERR_FILENO, farewell, strlen(farewell)) < 0)
+    _exit(resumable);
+  _exit(resumable);
+}
 
 static void count_signal(int number) {
   if (number == SIGTERM)
     terminated = 1;
+  if (received == 0)
+    alarm(patience);
   if (received < 1000000)
     received++;
 }
@@ -38,18 +57,32 @@ int separatrix_signals_install(void) {
     if (sigaction(counted[i], &action, NULL) != 0)
       return -1;
   }
+  action.sa_handler = give_up;
+  if (sigaction(SIGALRM, &action, NULL) != 0)
+    return -1;
   action.sa_handler = count_interrupt;
   return sigaction(SIGINT, &action, NULL);
 }
 
-int separatrix_signals_received(void) { return (int)received; }
+/* What a process that ends by itself prints. */
+void separatrix_signals_farewell(const char *text) {
+  snprintf(farewell, sizeof farewell, "separatrix: %s\n", text);
+}
+
+int separatrix_signals_received(void) {
+  if (received > 0)
+    noticed = 1;
+  return (int)received;
+}
 
 /* Whether SIGTERM was among them. */
 int separatrix_signals_terminated(void) { return (int)terminated; }
 
 void separatrix_signals_clear(void) {
+  alarm(0);
   received = 0;
   terminated = 0;
+  noticed = 0;
 }
 
 /* Sends a signal to this process. */

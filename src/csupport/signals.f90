@@ -1,16 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Stop signals: SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted, SIGXFSZ can be ignored.
+!> Stop signals: SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted, SIGXFSZ can be ignored. A process that has not asked
+!> for the count some seconds after the first ends by itself with code 75.
 module signals
-  use bindings, only: c_signals_clear, c_signals_ignore_file_limit, c_signals_install, c_signals_raise, &
+  use, intrinsic :: iso_c_binding, only: c_null_char
+  use bindings, only: c_signals_clear, c_signals_farewell, c_signals_ignore_file_limit, c_signals_install, c_signals_raise, &
     c_signals_received, c_signals_terminated
   use errors, only: error_t, fail
   use status, only: exit_internal
   implicit none
   private
 
-  public :: install_signals, ignore_file_limit, signal_count, termination_asked, clear_signals, raise_signal
+  public :: install_signals, ignore_file_limit, set_farewell, signal_count, termination_asked, clear_signals, raise_signal
 
   !> Linux signal numbers.
   integer, parameter, public :: sig_usr1 = 10, sig_usr2 = 12, sig_term = 15, sig_xfsz = 25
@@ -22,6 +24,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (c_signals_install() /= 0) call fail(error, exit_internal, 'cannot install the signal handlers')
   end subroutine install_signals
+
+  !> What a process prints that ends by itself after a signal.
+  subroutine set_farewell(text)
+    character(len=*), intent(in) :: text
+    call c_signals_farewell(text//c_null_char)
+  end subroutine set_farewell
 
   !> Makes a write beyond the file size limit an error instead of the end of the process; code 70 if the system refuses.
   subroutine ignore_file_limit(error)

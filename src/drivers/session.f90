@@ -24,7 +24,7 @@ module session
   use provenance, only: provenance_t, start_provenance
   use restoring_law, only: position_is_angle
   use serial_team, only: serial_team_t
-  use signals, only: ignore_file_limit, install_signals, termination_asked
+  use signals, only: ignore_file_limit, install_signals, set_farewell, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
   use sketch, only: sketch_of
   use structure_file, only: read_structure_file
@@ -85,6 +85,7 @@ contains
     call session%stop_if(error)
     row = rows(command_number(command%name))
     if (row%stops_early) call install_signals(error)
+    call set_farewell('stopped within one long trajectory; nothing was written yet, the same command starts again')
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
                                                    needs_sweep=command%name == 'sweep', structure_file=read_structure_file)

@@ -22,6 +22,7 @@ module tiled_run
   use session, only: session_t
   use shard, only: in_shard
   use spread_order, only: spread_subscripts
+  use signals, only: set_farewell
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -85,6 +86,8 @@ contains
                           error, shares=max(1, session%command%shard_count))
     end if
     call session%stop_if(error)
+    call set_farewell('stopped within one long trajectory; the tiles done are kept in '//working_path(path)// &
+                      '; the same command with --resume (without --force) goes on')
   end subroutine open_tiles
 
   !> The shape of the tiles of an interrupted run, if it has as many axes.

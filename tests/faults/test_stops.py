@@ -198,3 +198,20 @@ def test_a_dead_rank_ends_the_job_and_the_others_report_how_to_continue(
         life.tiles_of(folder)
     assert longest < 10
     figures.update(seed=SEED, deaths=deaths, survivors_spoke=reported, longest=round(longest, 2))
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, ranks):
+    """It ends with code 75 and says how to go on, though nobody looks for signals meanwhile."""
+    life.write_case(tmp_path)
+    # The pilot points of a dry run take minutes each.
+    long = ["--set", "run.duration=2e6", "--set", "integrator.event_budget=1000000000"]
+    process = life.launch(mpi_separatrix, tmp_path, ranks, *long, "--dry-run")
+    time.sleep(1)
+    code, ended, _ = stop(
+        process, ranks, lambda computing: [os.kill(one, signal.SIGTERM) for one in computing]
+    )
+    log = (tmp_path / "log").read_text()
+    assert code == 75, log
+    assert ended < 8
+    assert "stopped" in log
