@@ -14,7 +14,7 @@ module journal
   implicit none
   private
 
-  public :: json_text, json_number, duration_text
+  public :: json_text, json_number, duration_text, size_text
 
   real(wp), parameter :: terminal_interval = 0.5_wp, first_interval = 10, longest_interval = 300
 
@@ -254,6 +254,7 @@ contains
     real(wp), intent(in) :: seconds
     character(len=:), allocatable :: words
     integer(int64) :: whole
+    integer(int64), parameter :: day = 86400, year = 365*day
     whole = nint(min(max(seconds, 0.0_wp), 1e15_wp), int64)
     if (seconds < 10) then
       words = to_text(max(seconds, 0.0_wp), 2)//' s'
@@ -261,9 +262,29 @@ contains
       words = to_text(whole)//' s'
     else if (whole < 3600) then
       words = to_text(whole/60)//' min '//to_text(modulo(whole, 60_int64))//' s'
-    else
+    else if (whole < 2*day) then
       words = to_text(whole/3600)//' h '//to_text(modulo(whole, 3600_int64)/60)//' min'
+    else if (whole < 2*year) then
+      words = to_text(whole/day)//' days '//to_text(modulo(whole, day)/3600)//' h'
+    else
+      words = to_text(whole/year)//' years'
     end if
   end function duration_text
+
+  !> A size in the unit that fits it: "512 bytes", "1.92 TB".
+  pure function size_text(bytes) result(words)
+    integer(int64), intent(in) :: bytes
+    character(len=:), allocatable :: words
+    character(len=2), parameter :: units(5) = ['kB', 'MB', 'GB', 'TB', 'PB']
+    real(wp) :: amount
+    integer :: i
+    words = to_text(bytes)//' bytes'
+    amount = bytes
+    do i = 1, size(units)
+      if (amount < 1000) return
+      amount = amount/1000
+      words = to_text(amount, 3)//' '//units(i)
+    end do
+  end function size_text
 
 end module journal

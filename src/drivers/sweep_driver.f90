@@ -15,7 +15,7 @@ module sweep_driver
   use errors, only: error_t
   use file_layout, only: add_map_variables, axis_dimension
   use grid, only: grid_t
-  use journal, only: duration_text
+  use journal, only: duration_text, size_text
   use kinds, only: int64, wp
   use machine_type, only: section_state_t
   use map_file, only: map_file_t
@@ -140,7 +140,7 @@ contains
       call describe_chains(session, chains, schema)
       holds = size(values)*merge(2, 1, sweep%directions == 'both')
       plan = to_text(size(values))//' values of '//trim(sweep%swept%name)//', '//directions_text(session%the_case)//': '// &
-        to_text(holds)//' holds, '//to_text(schema%bytes())//' bytes; about '// &
+        to_text(holds)//' holds, '//size_text(schema%bytes())//'; about '// &
         duration_text(size(values)*seconds)//' on one core for each direction'
       if (product(sweep%starts) > 0) then
         ! Without catalogues: every point discovers its own attractor, which takes longer.

@@ -7,7 +7,7 @@ module tiled_run
   use command_line, only: command_t
   use errors, only: error_t
   use files, only: file_exists
-  use journal, only: duration_text
+  use journal, only: duration_text, size_text
   use kinds, only: int64, wp
   use lane_gpu, only: seconds_waited
   use map_file, only: create_working, map_file_t, open_working, working_path
@@ -338,7 +338,7 @@ contains
       lines = lines//' x '//to_text(lengths(i))
     end do
     lines = lines//' = '//to_text(points)//' points in '//to_text(tiling%count())//' tiles; '// &
-      to_text(points*bytes_per_point)//' bytes while it runs, less when compressed; about '// &
+      size_text(points*bytes_per_point)//' while it runs, less when compressed; about '// &
       duration_text(points*seconds_per_point)//' on one core (from a small sample), divided by the number of ranks'
   end function plan_text
 
