@@ -203,7 +203,7 @@ def _compare_checksums(path: Path, file: h5py.File) -> None:
         if item.id.get_create_plist().get_nfilters() > 0:
             return
         values = np.ascontiguousarray(item[()], item.dtype.newbyteorder("<"))
-        if zlib.crc32(values.tobytes()) != int(item.attrs["checksum"]):
+        if zlib.crc32(values.tobytes()) != np.ravel(item.attrs["checksum"])[0]:
             raise SeparatrixError(
                 f"{path}: is damaged (/{name}: its values do not match their checksum)", BAD_DATA
             )
