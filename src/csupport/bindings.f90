@@ -16,7 +16,8 @@ module bindings
     c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
     c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment, &
-    c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_close_bytes
+    c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_has_name, &
+    c_close_bytes
 
   interface
     integer(c_int32_t) function c_crc32_combine(first, second, size) bind(c, name='separatrix_crc32_combine')
@@ -64,6 +65,12 @@ module bindings
       type(c_ptr), value :: bytes
       integer(c_int64_t), value :: size, offset
     end function c_write_bytes
+
+    integer(c_int) function c_has_name(descriptor, path) bind(c, name='separatrix_has_name')
+      import :: c_char, c_int
+      integer(c_int), value :: descriptor
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_has_name
 
     integer(c_int) function c_close_bytes(descriptor, sync) bind(c, name='separatrix_close_bytes')
       import :: c_int

@@ -4,7 +4,7 @@
 !> Bytes at offsets of a file that exists. Errors have code 74.
 module byte_file
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char
-  use bindings, only: c_close_bytes, c_open_bytes, c_read_bytes, c_write_bytes
+  use bindings, only: c_close_bytes, c_has_name, c_open_bytes, c_read_bytes, c_write_bytes
   use errors, only: error_t
   use files, only: test_status
   use kinds, only: int64, int8
@@ -21,6 +21,7 @@ module byte_file
     procedure :: read => read_bytes
     procedure :: write => write_bytes
     procedure :: close => close_bytes
+    procedure :: has_name
   end type byte_file_t
 
 contains
@@ -36,6 +37,14 @@ contains
     number = c_open_bytes(path//c_null_char, merge(1_c_int, 0_c_int, writable), self%descriptor)
     call test_status(number, exit_io, 'cannot open', path, error)
   end subroutine open_bytes
+
+  !> Whether the file is still there under its name: it has been neither removed nor moved. A file system that does not answer
+  !> counts as one that has it.
+  logical function has_name(self)
+    class(byte_file_t), intent(in) :: self
+    has_name = .true.
+    if (self%descriptor >= 0) has_name = c_has_name(self%descriptor, self%path//c_null_char) /= 0
+  end function has_name
 
   !> Reads what lies at an offset (from 0).
   subroutine read_bytes(self, bytes, offset, error)

@@ -217,6 +217,14 @@ int separatrix_write_bytes(int descriptor, const void *bytes, int64_t size, int6
   return 0;
 }
 
+/* Whether the open file is still the one of that name. */
+int separatrix_has_name(int descriptor, const char *path) {
+  struct stat own, other;
+  if (fstat(descriptor, &own) != 0 || stat(path, &other) != 0)
+    return errno != ENOENT && errno != ENOTDIR && errno != ESTALE;
+  return own.st_dev == other.st_dev && own.st_ino == other.st_ino;
+}
+
 /* `sync`: what was written is durable afterwards. */
 int separatrix_close_bytes(int descriptor, int sync) {
   const int status = sync && fsync(descriptor) != 0 ? errno : 0;

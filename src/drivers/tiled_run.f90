@@ -35,6 +35,9 @@ module tiled_run
   public :: point_work_t
   public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds, index_in_block
 
+  !> Seconds between two looks at the name of the working file.
+  real(wp), parameter :: check_interval = 10
+
   !> Points of the small sample from which a dry run estimates the time.
   integer, parameter :: pilot_points = 64
 
@@ -42,6 +45,9 @@ module tiled_run
   type, extends(watch_t) :: tile_watch_t
     class(scheduler_t), pointer :: scheduler => null()
     type(session_t), pointer :: session => null()
+    type(map_file_t), pointer :: file => null()
+    !> When the name of the file was last looked up [s].
+    real(wp) :: last_check = 0
     !> Points of the map, those done before this run, and the tiles that this run has to do.
     integer(int64) :: total = 0, before = 0
     integer :: unfinished = 0
@@ -107,7 +113,7 @@ contains
   !> Computes every tile that is not yet done. `complete` is false after a stop.
   subroutine run_tiles(session, file, work, complete)
     type(session_t), intent(inout), target :: session
-    type(map_file_t), intent(inout) :: file
+    type(map_file_t), intent(inout), target :: file
     class(point_work_t), intent(inout) :: work
     logical, intent(out) :: complete
     class(scheduler_t), allocatable, target :: scheduler
@@ -134,6 +140,8 @@ contains
     call session%stop_if(error)
     watch%scheduler => scheduler
     watch%session => session
+    watch%file => file
+    watch%last_check = monotonic_seconds()
     computed = 0
     busy = 0
     waited = seconds_waited()
@@ -230,7 +238,15 @@ contains
   subroutine look_at_run(self, stop_now)
     class(tile_watch_t), intent(inout) :: self
     logical, intent(out) :: stop_now
+    type(error_t), allocatable :: error
+    real(wp) :: now
     call self%scheduler%poll()
+    now = monotonic_seconds()
+    if (self%session%team%is_root() .and. now - self%last_check > check_interval) then
+      self%last_check = now
+      call self%file%check_name(error)
+      call self%session%abort_if(error)
+    end if
     stop_now = self%scheduler%stop_requested()
     if (stop_now .or. .not. self%session%journal%active) return
     call self%session%journal%progress(self%before + nint(real(self%total - self%before, wp) &

@@ -14,7 +14,7 @@ module map_file
   use map_layout, only: create_objects, path_of, write_data
   use map_schema, only: schema_t, type_int64, type_int8
   use output_check, only: check_create, check_resume, working_path
-  use status, only: exit_cannot_create, exit_internal
+  use status, only: exit_cannot_create, exit_internal, exit_io
   use team, only: team_t
   use text, only: to_text
   use tile_store, only: tile_store_t
@@ -47,6 +47,7 @@ module map_file
     procedure :: write_tile
     procedure :: read_tile
     procedure :: recheck
+    procedure :: check_name
     procedure :: open => open_part
     procedure :: close => close_part
   end type map_file_t
@@ -222,6 +223,15 @@ contains
     if (.not. allocated(error)) call self%store%open(working_path(self%path), error)
     call team%agree(error)
   end subroutine open_part
+
+  !> Code 74 if the working file has been removed or moved: what is written then is lost to whoever looks for it by its name.
+  subroutine check_name(self, error)
+    class(map_file_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+    if (self%store%has_name()) return
+    call fail(error, exit_io, "'"//working_path(self%path)//"' has been removed or moved while the run writes it; with the "// &
+              'file back under this name the same command with --resume (without --force) goes on')
+  end subroutine check_name
 
   !> Closes the working file; it can be opened again. Collective.
   subroutine close_part(self, team, error)

@@ -27,6 +27,7 @@ module tile_store
     procedure :: locate
     procedure :: open => open_store
     procedure :: close => close_store
+    procedure :: has_name
     procedure :: read_tile
     procedure :: read_block
   end type tile_store_t
@@ -67,6 +68,12 @@ contains
     call self%close()
     call self%file%open(path, .false., error)
   end subroutine open_store
+
+  !> Whether the file is still there under its name.
+  logical function has_name(self)
+    class(tile_store_t), intent(in) :: self
+    has_name = self%file%has_name()
+  end function has_name
 
   !> Closes the file; one that is not open stays so.
   subroutine close_store(self)

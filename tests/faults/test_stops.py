@@ -215,3 +215,28 @@ def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, ranks):
     assert code == 75, log
     assert ended < 8
     assert "stopped" in log
+
+
+@pytest.mark.parametrize("moved", [False, True])
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, ranks, moved):
+    """The run does not go on to its end for nothing; a file that was moved can be put back."""
+    life.write_case(tmp_path)
+    long = ["--set", "run.duration=20000"]
+    process = life.launch(mpi_separatrix, tmp_path, ranks, *long)
+    part, elsewhere = tmp_path / f"{life.NAME}.part", tmp_path / "elsewhere"
+    while process.poll() is None and not part.exists():
+        time.sleep(0.001)
+    # All ranks have opened it.
+    time.sleep(2)
+    if moved:
+        part.rename(elsewhere)
+    else:
+        part.unlink()
+    assert process.wait(60) == 74
+    assert "has been removed or moved" in (tmp_path / "log").read_text()
+    if moved:
+        elsewhere.rename(part)
+        process = life.launch(mpi_separatrix, tmp_path, ranks, *long, "--resume", "--time-limit", "1")
+        assert process.wait(60) == 75
+        assert "tiles were done before" in (tmp_path / "log").read_text()
