@@ -141,17 +141,16 @@ def grow(source: random.Random, depth: int) -> tuple[str, Function]:
     return f"({first} {name} {second})", combined(name, left, right)
 
 
-def numbers_of(function: Function, shift: float = 0.0) -> tuple[list[Number], list[Number]] | None:
+def numbers_of(function: Function) -> tuple[list[Number], list[Number]] | None:
     """Derivatives by x and y, and Taylor coefficients; None where they are no moderate real numbers."""
     step = mpmath.mpf(10) ** -45
-    point = POINT[0] + shift, POINT[1] + shift
     try:
         slopes = [
-            mpmath.diff(lambda x: function(x, point[1]), point[0], h=step, relative=False),
-            mpmath.diff(lambda y: function(point[0], y), point[1], h=step, relative=False),
+            mpmath.diff(lambda x: function(x, POINT[1]), POINT[0], h=step, relative=False),
+            mpmath.diff(lambda y: function(POINT[0], y), POINT[1], h=step, relative=False),
         ]
         found = slopes + mpmath.taylor(
-            lambda t: function(point[0] + SPEED[0] * t, point[1] + SPEED[1] * t),
+            lambda t: function(POINT[0] + SPEED[0] * t, POINT[1] + SPEED[1] * t),
             0,
             ORDERS,
             h=step,
@@ -164,15 +163,6 @@ def numbers_of(function: Function, shift: float = 0.0) -> tuple[list[Number], li
     if not all(mpmath.isfinite(value) and abs(value) < 1000 for value in found):
         return None
     return found[:2], found[2:]
-
-
-def is_sensitive(function: Function, numbers: tuple[list[Number], list[Number]]) -> bool:
-    """Whether rounding of the arguments changes a number a hundred times as much."""
-    moved = numbers_of(function, 1e-12)
-    if moved is None:
-        return True
-    pairs = zip(numbers[0] + numbers[1], moved[0] + moved[1], strict=True)
-    return any(abs(after - before) > 1e-10 * max(1, abs(before)) for before, after in pairs)
 
 
 def literal(value: Number) -> str:
@@ -216,10 +206,11 @@ def main() -> None:
         rows.append((text, *numbers))
     while len(rows) < 80:
         text, meaning = grow(source, 4)
-        if len(text) < 25 or len(text) > 90:
+        # an arc of its own function magnifies rounding
+        if not 25 <= len(text) <= 90 or "asin(sin" in text or "acos(cos" in text:
             continue
         numbers = numbers_of(meaning)
-        if numbers is not None and any(numbers[0]) and not is_sensitive(meaning, numbers):
+        if numbers is not None and any(numbers[0]):
             rows.append((text, *numbers))
     parts = [HEADER]
     for first in range(0, len(rows), 10):
