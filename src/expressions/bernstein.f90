@@ -18,13 +18,14 @@ contains
   !> Bernstein coefficients of the polynomial with coefficients `p` by rising power.
   pure function bernstein_of(p) result(b)
     real(wp), intent(in) :: p(0:)
-    real(wp) :: b(0:ubound(p, 1)), binomial
+    real(wp) :: b(0:ubound(p, 1)), inverse
     integer :: n, i, k
     n = ubound(p, 1)
-    binomial = 1
+    ! One over the binomial coefficient.
+    inverse = 1
     do k = 0, n
-      b(k) = p(k)/binomial
-      binomial = binomial*(n - k)/(k + 1)
+      b(k) = p(k)*inverse
+      if (k < n) inverse = inverse*(k + 1)/(n - k)
     end do
     do k = 1, n
       do i = n, k, -1

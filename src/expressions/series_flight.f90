@@ -186,7 +186,7 @@ contains
     real(wp), parameter :: most = 30
     real(wp) :: smallest
     smallest = logarithm(epsilon(1.0_wp))
-    step = exponential(most)
+    step = most
     do i = 1, size(flight%rates)
       node = flight%rates(i)
       ! Coefficients of the rate; that of the state of order k + 1 is the one of order k over k + 1.
@@ -195,7 +195,7 @@ contains
         size_of(k) = abs(flight%series%c(k - 1, node))/k
       end do
       do k = 0, series_order
-        size_of(k) = merge(logarithm(max(size_of(k), tiny(1.0_wp))), -huge(1.0_wp), size_of(k) > 0)
+        size_of(k) = merge(rough_logarithm(max(size_of(k), tiny(1.0_wp))), -huge(1.0_wp), size_of(k) > 0)
       end do
       do k = series_order - 4, series_order
         if (size_of(k) <= -huge(1.0_wp)) cycle
@@ -205,10 +205,17 @@ contains
             reach = max(reach, smallest/(series_order - j) + (size_of(j) - size_of(k))/(k - j))
           end if
         end do
-        step = min(step, exponential(min(reach, most)))
+        step = min(step, reach)
       end do
     end do
+    step = exponential(step)
   end function natural_step
+
+  !> Logarithm to 0.06, by the exponent and a line.
+  pure elemental real(wp) function rough_logarithm(x)
+    real(wp), intent(in) :: x
+    rough_logarithm = (exponent(x) + 2*fraction(x) - 2)*0.693147180559945_wp
+  end function rough_logarithm
 
   !> Proves that the solution stays in a box over the step, and bounds the next coefficients there. `excess`: the largest
   !> remainder over its margin; proven if it is at most 1.
@@ -299,6 +306,10 @@ contains
     p(:series_order - m) = p(m:)
     p(series_order - m + 1:) = 0
     total = remainder + rounding
+    at = 2
+    is_proven = .true.
+    ! The first term outweighs all others.
+    if (abs(p(0)) > sum(abs(p(1:))) + total) return
     call first_crossing(p, total, (series_order + 1 + m)*total, flight%guards(g)%direction, at, is_proven)
   end subroutine cross
 

@@ -119,10 +119,8 @@ contains
     integer, intent(in) :: i, k
     real(wp), intent(in) :: sign, divisor(:)
     type(series_t), intent(in) :: series
-    type(node_t) :: node
     integer :: branch
-    node = tape%nodes(i)
-    associate (a => series%c(:, node%first), c => series%c)
+    associate (node => tape%nodes(i), a => series%c(:, tape%nodes(i)%first), c => series%c)
       select case (node%operation)
       case (op_add)
         y = a(k + 1) + c(k, node%second)
@@ -180,20 +178,20 @@ contains
         end do
         y = y/(k*divisor(node%first))
       case (op_exp)
-        y = rate_products(a, own, k)/k
+        y = rate_products(a, own, k, k)/k
       case (op_sin, op_sinh, op_cosh, op_tan, op_tanh)
-        y = rate_products(a, c(:, node%partner), k)/k
+        y = rate_products(a, c(:, node%partner), k, k)/k
       case (op_cos)
-        y = sign*rate_products(a, c(:, node%partner), k)/k
+        y = sign*rate_products(a, c(:, node%partner), k, k)/k
       case (op_log)
-        y = (k*a(k + 1) + sign*inner_rate_products(own, a, k))/(k*divisor(node%first))
+        y = (k*a(k + 1) + sign*rate_products(own, a, k, k - 1))/(k*divisor(node%first))
       case (op_asin, op_atan)
-        y = (k*a(k + 1) + sign*inner_rate_products(own, c(:, node%partner), k))/(k*divisor(node%partner))
+        y = (k*a(k + 1) + sign*rate_products(own, c(:, node%partner), k, k - 1))/(k*divisor(node%partner))
       case (op_acos)
-        y = sign*(k*a(k + 1) + inner_rate_products(own, c(:, node%partner), k))/(k*divisor(node%partner))
+        y = sign*(k*a(k + 1) + rate_products(own, c(:, node%partner), k, k - 1))/(k*divisor(node%partner))
       case (op_arc_tangent)
-        y = rate_products(a, c(:, node%second), k) + sign*rate_products(c(:, node%second), a, k)
-        y = (y + sign*inner_rate_products(own, c(:, node%partner), k))/(k*divisor(node%partner))
+        y = rate_products(a, c(:, node%second), k, k) + sign*rate_products(c(:, node%second), a, k, k)
+        y = (y + sign*rate_products(own, c(:, node%partner), k, k - 1))/(k*divisor(node%partner))
       case default
         y = 0
       end select
@@ -233,33 +231,32 @@ contains
   pure real(wp) function inner_products(y, b, k) result(total)
     real(wp), intent(in), contiguous :: y(:), b(:)
     integer, intent(in) :: k
+    real(wp) :: other
     integer :: i
     total = 0
-    do i = 1, k
+    other = 0
+    do i = 1, k - 1, 2
       total = total + y(i)*b(k + 2 - i)
+      other = other + y(i + 1)*b(k + 1 - i)
     end do
+    total = total + other
+    if (modulo(k, 2) == 1) total = total + y(k)*b(2)
   end function inner_products
 
-  !> Sum of j a(j) u(k - j), j = 1 ... k.
-  pure real(wp) function rate_products(a, u, k) result(total)
+  !> Sum of j a(j) u(k - j), j = 1 ... last.
+  pure real(wp) function rate_products(a, u, k, last) result(total)
     real(wp), intent(in), contiguous :: a(:), u(:)
-    integer, intent(in) :: k
+    integer, intent(in) :: k, last
+    real(wp) :: other
     integer :: j
     total = 0
-    do j = 1, k
+    other = 0
+    do j = 1, last - 1, 2
       total = total + j*a(j + 1)*u(k - j + 1)
+      other = other + (j + 1)*a(j + 2)*u(k - j)
     end do
+    total = total + other
+    if (modulo(last, 2) == 1) total = total + last*a(last + 1)*u(k - last + 1)
   end function rate_products
-
-  !> The same without the last term: j = 1 ... k - 1.
-  pure real(wp) function inner_rate_products(y, w, k) result(total)
-    real(wp), intent(in), contiguous :: y(:), w(:)
-    integer, intent(in) :: k
-    integer :: j
-    total = 0
-    do j = 1, k - 1
-      total = total + j*y(j + 1)*w(k - j + 1)
-    end do
-  end function inner_rate_products
 
 end module tape_series
