@@ -63,6 +63,8 @@ module series_flight
     type(series_t), private :: series, bounds
     !> Length of the last proven step, as a part of that by the last coefficients.
     real(wp), private :: proven = 1
+    !> A power of two near the step behind.
+    real(wp), private :: next_unit = 1
   end type flight_t
 
 contains
@@ -114,6 +116,8 @@ contains
     do i = 1, flight%step_budget
       status = flight_reached
       if (flight%time >= until) return
+      flight%series%unit = flight%next_unit
+      flight%bounds%unit = flight%next_unit
       call expand(flight%tape, flight%state, flight%parameters, flight%series, flight%fault)
       status = flight_left_domain
       if (flight%fault > 0) return
@@ -139,6 +143,8 @@ contains
     integer :: try, fault
     logical :: is_certain
     natural = natural_step(flight)
+    ! A polynomial has no natural step.
+    if (natural < 1e12_wp*flight%next_unit) flight%next_unit = scale(1.0_wp, exponent(natural))
     step = min(natural*min(1.0_wp, flight%proven), longest)
     fraction = 2
     fault = 0
@@ -192,7 +198,7 @@ contains
       ! Coefficients of the rate; that of the state of order k + 1 is the one of order k over k + 1.
       size_of(0) = abs(flight%state(i))
       do k = 1, series_order
-        size_of(k) = abs(flight%series%c(k - 1, node))/k
+        size_of(k) = abs(flight%series%unit*flight%series%c(k - 1, node))/k
       end do
       do k = 0, series_order
         size_of(k) = merge(rough_logarithm(max(size_of(k), tiny(1.0_wp))), -huge(1.0_wp), size_of(k) > 0)
@@ -208,7 +214,7 @@ contains
         step = min(step, reach)
       end do
     end do
-    step = exponential(step)
+    step = exponential(step)*flight%series%unit
   end function natural_step
 
   !> Logarithm to 0.06, by the exponent and a line.
@@ -236,7 +242,7 @@ contains
     excess = 0
     call bound_coefficients(flight%tape, box, flight%parameters, flight%bounds, flight%fault)
     if (flight%fault > 0) return
-    power = step**(series_order + 1)*1.01_wp
+    power = 1.01_wp*(step/flight%bounds%unit)**series_order*step
     do i = 1, size(flight%rates)
       excess = max(excess, flight%bounds%c(series_order, flight%rates(i))/(series_order + 1)*power/margin(i))
     end do
@@ -251,10 +257,10 @@ contains
     real(wp) :: p(0:series_order), power
     integer :: k
     p(0) = flight%state(i)
-    power = 1
+    power = step
     do k = 1, series_order
-      power = power*step
       p(k) = flight%series%c(k - 1, flight%rates(i))/k*power
+      power = power*(step/flight%series%unit)
     end do
   end function polynomial_of
 
@@ -298,7 +304,7 @@ contains
     do k = 0, series_order
       p(k) = flight%series%c(k, node)*power
       if (k >= m) total = total + (k + 1)*abs(p(k))
-      power = power*step
+      power = power*(step/flight%series%unit)
     end do
     remainder = 1.01_wp*flight%bounds%c(series_order + 1, node)*power
     rounding = epsilon(1.0_wp)*total

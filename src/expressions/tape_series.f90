@@ -18,6 +18,8 @@ module tape_series
   !> What a series is made of: the nodes in use with the given branches, and where it is stored.
   type, public :: series_t
     integer :: order = 0
+    !> The time is counted in this unit, so that coefficients of high orders do not overflow.
+    real(wp) :: unit = 1
     !> Coefficients of powers of the time: (0:order, node).
     real(wp), allocatable :: c(:, :)
     !> Nodes in use; those of them that vary.
@@ -87,9 +89,13 @@ contains
       do at = 1, size(series%varying)
         i = series%varying(at)
         if (tape%nodes(i)%operation == op_variable) then
-          series%c(k, i) = series%c(k - 1, series%rates(tape%nodes(i)%first))/k
+          series%c(k, i) = series%unit*series%c(k - 1, series%rates(tape%nodes(i)%first))/k
         else
           series%c(k, i) = coefficient(tape, i, k, sign, divisor, series)
+        end if
+        if (.not. abs(series%c(k, i)) <= huge(1.0_wp)) then
+          fault = i
+          return
         end if
       end do
     end do
