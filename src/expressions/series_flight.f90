@@ -12,7 +12,7 @@ module series_flight
   use elementary, only: exponential, logarithm
   use intervals, only: interval_t
   use kinds, only: wp
-  use operations, only: op_add, op_select, op_subtract
+  use operations, only: op_add, op_select, op_subtract, op_variable
   use tape, only: tape_t
   use tape_bounds, only: bound_coefficients
   use tape_series, only: expand, prepare_series, series_t
@@ -22,9 +22,9 @@ module series_flight
   public :: start_flight, set_branches, advance_flight
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
-  !> proven; at the budget of steps.
+  !> proven; at the budget of steps; at its start, whose branches are not those of the state.
   integer, parameter, public :: flight_reached = 0, flight_crossed = 1, flight_left_domain = 2, flight_no_progress = 3, &
-    flight_step_budget = 4
+    flight_step_budget = 4, flight_wrong_branch = 5
 
   !> The last term of a step is then some epsilon of the first.
   integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
@@ -121,6 +121,8 @@ contains
       call expand(flight%tape, flight%state, flight%parameters, flight%series, flight%fault)
       status = flight_left_domain
       if (flight%fault > 0) return
+      status = flight_wrong_branch
+      if (i == 1 .and. .not. branches_agree(flight)) return
       longest = until - flight%time
       call take_step(flight, longest, step, fraction, status)
       if (status == flight_no_progress .or. status == flight_left_domain) return
@@ -132,6 +134,23 @@ contains
     end do
     status = flight_step_budget
   end subroutine advance_flight
+
+  !> Whether the switching functions have the signs of their branches, or leave zero to that side.
+  pure logical function branches_agree(flight)
+    type(flight_t), intent(in) :: flight
+    real(wp) :: value, rounding
+    integer :: k, g, m
+    branches_agree = .true.
+    do k = 1, size(flight%series%branches)
+      g = size(flight%guards) - size(flight%series%branches) + k
+      if (.not. flight%is_active(g)) cycle
+      m = min(flight%zeros(g), series_order)
+      value = flight%series%c(m, flight%guards(g)%node)
+      rounding = 0
+      if (m == 0) rounding = 8*epsilon(1.0_wp)*size_of_arguments(flight, flight%series%c(0, :), flight%guards(g)%node)
+      if (abs(value) > rounding .and. ((value > 0) .neqv. flight%series%branches(k) > 0)) branches_agree = .false.
+    end do
+  end function branches_agree
 
   !> The longest proven step up to `longest`, and the fraction of it at which the first guard crosses zero; 2 without one.
   pure subroutine take_step(flight, longest, step, fraction, status)
@@ -161,12 +180,14 @@ contains
       ! What the remainder allows: it grows with the step to the power of its order.
       scaling = exponential(logarithm(0.5_wp/max(excess, 1e-90_wp))/(series_order + 1))
       flight%proven = step/natural*scaling
-      if (excess > 1) then
+      ! Less than 1 by far more than rounding of the polynomials.
+      if (excess > 0.9_wp) then
         step = step*max(0.25_wp, min(0.9_wp, scaling))
         cycle
       end if
       call find_crossing(flight, step, fraction, is_certain)
       if (.not. is_certain) then
+        flight%proven = step/natural
         step = 0.5_wp*step
         cycle
       end if
@@ -182,40 +203,65 @@ contains
     status = merge(flight_left_domain, flight_no_progress, fault > 0)
   end subroutine take_step
 
-  !> Length of a step whose last term is epsilon times one of the first terms, in every variable. Symmetric motions lack some of
-  !> the last orders: those before count as if terms shrank evenly.
+  !> Length of a step whose last term is epsilon times one of the first terms, in every variable and every guard that is more
+  !> than a variable and a constant.
   pure real(wp) function natural_step(flight) result(step)
     type(flight_t), intent(in) :: flight
-    real(wp) :: size_of(0:series_order), reach
-    integer :: i, k, j, node
+    real(wp) :: terms(0:series_order), reach
+    integer :: i, k
     ! Its powers must not overflow.
     real(wp), parameter :: most = 30
-    real(wp) :: smallest
-    smallest = logarithm(epsilon(1.0_wp))
-    step = most
+    reach = most
     do i = 1, size(flight%rates)
-      node = flight%rates(i)
-      ! Coefficients of the rate; that of the state of order k + 1 is the one of order k over k + 1.
-      size_of(0) = abs(flight%state(i))
+      terms(0) = flight%state(i)
       do k = 1, series_order
-        size_of(k) = abs(flight%series%unit*flight%series%c(k - 1, node))/k
+        terms(k) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k
       end do
-      do k = 0, series_order
-        size_of(k) = merge(rough_logarithm(max(size_of(k), tiny(1.0_wp))), -huge(1.0_wp), size_of(k) > 0)
-      end do
-      do k = series_order - 4, series_order
-        if (size_of(k) <= -huge(1.0_wp)) cycle
-        reach = -huge(1.0_wp)
-        do j = 0, series_order/2
-          if (size_of(j) > -huge(1.0_wp)) then
-            reach = max(reach, smallest/(series_order - j) + (size_of(j) - size_of(k))/(k - j))
-          end if
-        end do
-        step = min(step, reach)
-      end do
+      reach = min(reach, reach_of(terms))
     end do
-    step = exponential(step)*flight%series%unit
+    do i = 1, size(flight%guards)
+      if (flight%is_active(i) .and. .not. is_plain(flight%tape, flight%guards(i)%node)) &
+        reach = min(reach, reach_of(flight%series%c(:, flight%guards(i)%node)))
+    end do
+    step = exponential(reach)*flight%series%unit
   end function natural_step
+
+  !> Logarithm of that length for one series. Symmetric motions lack some of the last orders: those before count as if terms
+  !> shrank evenly.
+  pure real(wp) function reach_of(terms) result(reach)
+    real(wp), intent(in) :: terms(0:series_order)
+    real(wp) :: size_of(0:series_order), longest
+    integer :: k, j
+    real(wp), parameter :: none = -huge(1.0_wp)
+    do k = 0, series_order
+      size_of(k) = none
+      if (abs(terms(k)) > 0) size_of(k) = rough_logarithm(abs(terms(k)))
+    end do
+    reach = huge(1.0_wp)
+    do k = series_order - 4, series_order
+      if (size_of(k) <= none) cycle
+      longest = none
+      do j = 0, series_order/2
+        if (size_of(j) > none) longest = max(longest, rough_logarithm(epsilon(1.0_wp))/(series_order - j) &
+                                             + (size_of(j) - size_of(k))/(k - j))
+      end do
+      if (longest > none) reach = min(reach, longest)
+    end do
+  end function reach_of
+
+  !> Whether a node is a variable, or the sum or difference of one and what is constant in time.
+  pure logical function is_plain(tape, node)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: node
+    logical :: is_variable(2), is_steady(2)
+    is_plain = tape%nodes(node)%operation == op_variable
+    if (tape%nodes(node)%operation /= op_add .and. tape%nodes(node)%operation /= op_subtract) return
+    associate (both => tape%nodes([tape%nodes(node)%first, tape%nodes(node)%second]))
+      is_variable = both%operation == op_variable
+      is_steady = both%is_steady
+    end associate
+    is_plain = (is_variable(1) .and. is_steady(2)) .or. (is_steady(1) .and. is_variable(2))
+  end function is_plain
 
   !> Logarithm to 0.06, by the exponent and a line.
   pure elemental real(wp) function rough_logarithm(x)
@@ -224,7 +270,7 @@ contains
   end function rough_logarithm
 
   !> Proves that the solution stays in a box over the step, and bounds the next coefficients there. `excess`: the largest
-  !> remainder over its margin; proven if it is at most 1.
+  !> remainder over its margin; proven if it is less than 1.
   pure subroutine enclose(flight, step, excess)
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: step
@@ -308,7 +354,7 @@ contains
     end do
     remainder = 1.01_wp*flight%bounds%c(series_order + 1, node)*power
     rounding = epsilon(1.0_wp)*total
-    if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, node)
+    if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, flight%bounds%c(0, :), node)
     p(:series_order - m) = p(m:)
     p(series_order - m + 1:) = 0
     total = remainder + rounding
@@ -319,15 +365,15 @@ contains
     call first_crossing(p, total, (series_order + 1 + m)*total, flight%guards(g)%direction, at, is_proven)
   end subroutine cross
 
-  !> Magnitude of what a guard is a sum of: it may be far larger than the sum.
-  pure real(wp) function size_of_arguments(flight, node)
+  !> Magnitude of what a guard is a sum of, from those of all nodes: it may be far larger than the sum.
+  pure real(wp) function size_of_arguments(flight, size_of, node)
     type(flight_t), intent(in) :: flight
+    real(wp), intent(in) :: size_of(:)
     integer, intent(in) :: node
     associate (it => flight%tape%nodes(node))
-      size_of_arguments = flight%bounds%c(0, node)
-      if (it%operation == op_add .or. it%operation == op_subtract) then
-        size_of_arguments = flight%bounds%c(0, it%first) + flight%bounds%c(0, it%second)
-      end if
+      size_of_arguments = abs(size_of(node))
+      if (it%operation == op_add .or. it%operation == op_subtract) &
+        size_of_arguments = abs(size_of(it%first)) + abs(size_of(it%second))
     end associate
   end function size_of_arguments
 
