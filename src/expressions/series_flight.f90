@@ -12,7 +12,8 @@ module series_flight
   use elementary, only: exponential, logarithm
   use intervals, only: interval_t
   use kinds, only: wp
-  use operations, only: op_add, op_select, op_subtract, op_variable
+  use operations, only: op_add, op_select, op_subtract
+  use step_length, only: is_plain, natural_step
   use tape, only: tape_t
   use tape_bounds, only: bound_coefficients
   use tape_series, only: expand, prepare_series, series_t
@@ -61,6 +62,8 @@ module series_flight
     !> Margin of an enclosure, as a part of the state.
     real(wp) :: margin = epsilon(1.0_wp)**0.6_wp
     type(series_t), private :: series, bounds
+    !> Nodes of the active guards that are more than a variable and a constant.
+    integer, allocatable, private :: curved(:)
     !> Length of the last proven step, as a part of that by the last coefficients.
     real(wp), private :: proven = 1
     !> A power of two near the step behind.
@@ -69,7 +72,8 @@ module series_flight
 
 contains
 
-  !> A motion of a system: rates of its variables and guards are nodes of the tape. The caller sets time, state and branches.
+  !> A motion of a system: rates of its variables and guards are nodes of the tape. The caller sets time and state,
+  !> and the branches where they are not all the first.
   pure subroutine start_flight(flight, tape, rates, guards, parameters)
     type(flight_t), intent(out) :: flight
     type(tape_t), intent(in) :: tape
@@ -86,9 +90,10 @@ contains
     flight%zeros = 0
     flight%crossed = .false.
     flight%state = 0
+    call set_branches(flight, [(1, k=1, size(tape%switches))])
   end subroutine start_flight
 
-  !> Chooses the branch of every switching function by a sign; needed once before the motion also without any.
+  !> Chooses the branch of every switching function by a sign.
   pure subroutine set_branches(flight, branches)
     type(flight_t), intent(inout) :: flight
     integer, intent(in) :: branches(:)
@@ -101,6 +106,12 @@ contains
     do i = 1, flight%tape%count
       if (flight%tape%nodes(i)%operation == op_select .and. flight%series%is_used(i)) then
         flight%is_active(own + flight%tape%nodes(i)%first) = .true.
+      end if
+    end do
+    flight%curved = [integer ::]
+    do i = 1, size(flight%guards)
+      if (flight%is_active(i) .and. .not. is_plain(flight%tape, flight%guards(i)%node)) then
+        flight%curved = [flight%curved, flight%guards(i)%node]
       end if
     end do
   end subroutine set_branches
@@ -161,7 +172,7 @@ contains
     real(wp) :: natural, excess, scaling
     integer :: try, fault
     logical :: is_certain
-    natural = natural_step(flight)
+    natural = natural_step(flight%series, flight%state, flight%curved)
     ! A polynomial has no natural step.
     if (natural < 1e12_wp*flight%next_unit) flight%next_unit = scale(1.0_wp, exponent(natural))
     step = min(natural*min(1.0_wp, flight%proven), longest)
@@ -202,72 +213,6 @@ contains
     flight%fault = fault
     status = merge(flight_left_domain, flight_no_progress, fault > 0)
   end subroutine take_step
-
-  !> Length of a step whose last term is epsilon times one of the first terms, in every variable and every guard that is more
-  !> than a variable and a constant.
-  pure real(wp) function natural_step(flight) result(step)
-    type(flight_t), intent(in) :: flight
-    real(wp) :: terms(0:series_order), reach
-    integer :: i, k
-    ! Its powers must not overflow.
-    real(wp), parameter :: most = 30
-    reach = most
-    do i = 1, size(flight%rates)
-      terms(0) = flight%state(i)
-      do k = 1, series_order
-        terms(k) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k
-      end do
-      reach = min(reach, reach_of(terms))
-    end do
-    do i = 1, size(flight%guards)
-      if (flight%is_active(i) .and. .not. is_plain(flight%tape, flight%guards(i)%node)) &
-        reach = min(reach, reach_of(flight%series%c(:, flight%guards(i)%node)))
-    end do
-    step = exponential(reach)*flight%series%unit
-  end function natural_step
-
-  !> Logarithm of that length for one series. Symmetric motions lack some of the last orders: those before count as if terms
-  !> shrank evenly.
-  pure real(wp) function reach_of(terms) result(reach)
-    real(wp), intent(in) :: terms(0:series_order)
-    real(wp) :: size_of(0:series_order), longest
-    integer :: k, j
-    real(wp), parameter :: none = -huge(1.0_wp)
-    do k = 0, series_order
-      size_of(k) = none
-      if (abs(terms(k)) > 0) size_of(k) = rough_logarithm(abs(terms(k)))
-    end do
-    reach = huge(1.0_wp)
-    do k = series_order - 4, series_order
-      if (size_of(k) <= none) cycle
-      longest = none
-      do j = 0, series_order/2
-        if (size_of(j) > none) longest = max(longest, rough_logarithm(epsilon(1.0_wp))/(series_order - j) &
-                                             + (size_of(j) - size_of(k))/(k - j))
-      end do
-      if (longest > none) reach = min(reach, longest)
-    end do
-  end function reach_of
-
-  !> Whether a node is a variable, or the sum or difference of one and what is constant in time.
-  pure logical function is_plain(tape, node)
-    type(tape_t), intent(in) :: tape
-    integer, intent(in) :: node
-    logical :: is_variable(2), is_steady(2)
-    is_plain = tape%nodes(node)%operation == op_variable
-    if (tape%nodes(node)%operation /= op_add .and. tape%nodes(node)%operation /= op_subtract) return
-    associate (both => tape%nodes([tape%nodes(node)%first, tape%nodes(node)%second]))
-      is_variable = both%operation == op_variable
-      is_steady = both%is_steady
-    end associate
-    is_plain = (is_variable(1) .and. is_steady(2)) .or. (is_steady(1) .and. is_variable(2))
-  end function is_plain
-
-  !> Logarithm to 0.06, by the exponent and a line.
-  pure elemental real(wp) function rough_logarithm(x)
-    real(wp), intent(in) :: x
-    rough_logarithm = (exponent(x) + 2*fraction(x) - 2)*0.693147180559945_wp
-  end function rough_logarithm
 
   !> Proves that the solution stays in a box over the step, and bounds the next coefficients there. `excess`: the largest
   !> remainder over its margin; proven if it is less than 1.
@@ -372,8 +317,9 @@ contains
     integer, intent(in) :: node
     associate (it => flight%tape%nodes(node))
       size_of_arguments = abs(size_of(node))
-      if (it%operation == op_add .or. it%operation == op_subtract) &
+      if (it%operation == op_add .or. it%operation == op_subtract) then
         size_of_arguments = abs(size_of(it%first)) + abs(size_of(it%second))
+      end if
     end associate
   end function size_of_arguments
 
