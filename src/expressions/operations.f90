@@ -20,7 +20,7 @@ module operations
   real(wp), parameter, public :: largest_angle = 1.6e6_wp
 
   type, public :: operation_t
-    character(len=8) :: name
+    character(len=9) :: name
     !> Number of arguments that are nodes of a tape.
     integer :: arguments
     !> What its arguments must be.
@@ -34,7 +34,7 @@ module operations
   type(operation_t), parameter, public :: operation_table(24) = [ &
                                           operation_t('constant', 0, finite), &
                                           operation_t('variable', 0, finite), &
-                                          operation_t('param.', 0, finite), &
+                                          operation_t('parameter', 0, finite), &
                                           operation_t('+', 2, finite), &
                                           operation_t('-', 2, finite), &
                                           operation_t('*', 2, finite), &

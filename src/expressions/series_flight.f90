@@ -233,7 +233,11 @@ contains
     excess = 0
     call bound_coefficients(flight%tape, box, flight%parameters, flight%bounds, flight%fault)
     if (flight%fault > 0) return
-    power = 1.01_wp*(step/flight%bounds%unit)**series_order*step
+    ! Not by **: how compilers multiply for it differs.
+    power = 1.01_wp*step
+    do i = 1, series_order
+      power = power*(step/flight%bounds%unit)
+    end do
     do i = 1, size(flight%rates)
       excess = max(excess, flight%bounds%c(series_order, flight%rates(i))/(series_order + 1)*power/margin(i))
     end do

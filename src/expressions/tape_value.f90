@@ -3,6 +3,7 @@
 
 !> Values of all nodes of a tape.
 module tape_value
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: wp
   use operations, only: op_constant, op_parameter, op_select, op_variable, operate, operation_table
   use tape, only: node_t, tape_t
@@ -25,15 +26,18 @@ contains
     integer, intent(in), optional :: branches(:)
     real(wp) :: chosen
     integer :: i, origin
+    logical :: is_finite
     do i = 1, tape%count
       fault(i) = 0
       select case (tape%nodes(i)%operation)
       case (op_constant)
         value(i) = tape%nodes(i)%value
       case (op_variable)
-        value(i) = variables(tape%nodes(i)%first)
+        call take_number(variables(tape%nodes(i)%first), value(i), is_finite)
+        if (.not. is_finite) fault(i) = i
       case (op_parameter)
-        value(i) = parameters(tape%nodes(i)%first)
+        call take_number(parameters(tape%nodes(i)%first), value(i), is_finite)
+        if (.not. is_finite) fault(i) = i
       case (op_select)
         call take_branch(tape, tape%nodes(i), value(:i - 1), fault(:i - 1), chosen, origin, branches)
         value(i) = chosen
@@ -43,6 +47,15 @@ contains
       end select
     end do
   end subroutine evaluate
+
+  pure subroutine take_number(given, value, is_finite)
+    real(wp), intent(in) :: given
+    real(wp), intent(out) :: value
+    logical, intent(out) :: is_finite
+    is_finite = ieee_is_finite(given)
+    value = 0
+    if (is_finite) value = given
+  end subroutine take_number
 
   pure subroutine take_operation(tape, i, value, fault)
     type(tape_t), intent(in) :: tape
@@ -116,6 +129,10 @@ contains
     character(len=:), allocatable :: text
     integer :: operation, last
     operation = tape%nodes(node)%operation
+    if (operation_table(operation)%arguments == 0) then
+      text = trim(operation_table(operation)%name)//' '//to_text(tape%nodes(node)%first)//': found a number that is not finite'
+      return
+    end if
     last = tape%nodes(node)%first
     if (operation_table(operation)%arguments > 1) last = tape%nodes(node)%second
     text = trim(operation_table(operation)%name)//': found '//to_text(real(value(last), kind(1.0d0)))//', allowed: '// &
