@@ -127,9 +127,7 @@ contains
     do i = 1, flight%step_budget
       status = flight_reached
       if (flight%time >= until) return
-      flight%series%unit = flight%next_unit
-      flight%bounds%unit = flight%next_unit
-      call expand(flight%tape, flight%state, flight%parameters, flight%series, flight%fault)
+      call expand_in_unit(flight)
       status = flight_left_domain
       if (flight%fault > 0) return
       status = flight_wrong_branch
@@ -145,6 +143,19 @@ contains
     end do
     status = flight_step_budget
   end subroutine advance_flight
+
+  !> Coefficients at the state, in a unit of time in which they do not overflow.
+  pure subroutine expand_in_unit(flight)
+    type(flight_t), intent(inout) :: flight
+    integer :: try
+    do try = 1, 30
+      flight%series%unit = flight%next_unit
+      call expand(flight%tape, flight%state, flight%parameters, flight%series, flight%fault)
+      if (flight%fault >= 0) return
+      flight%next_unit = scale(flight%next_unit, -30)
+    end do
+    flight%fault = abs(flight%fault)
+  end subroutine expand_in_unit
 
   !> Whether the switching functions have the signs of their branches, or leave zero to that side.
   pure logical function branches_agree(flight)
@@ -173,8 +184,12 @@ contains
     integer :: try, fault
     logical :: is_certain
     natural = natural_step(flight%series, flight%state, flight%curved)
-    ! A polynomial has no natural step.
-    if (natural < 1e12_wp*flight%next_unit) flight%next_unit = scale(1.0_wp, exponent(natural))
+    if (natural < 1e12_wp*flight%next_unit) then
+      flight%next_unit = scale(1.0_wp, exponent(natural))
+    else
+      ! A polynomial has no natural step; but high orders may have vanished in a unit that is too short.
+      flight%next_unit = max(flight%next_unit, scale(1.0_wp, exponent(min(natural, longest))))
+    end if
     step = min(natural*min(1.0_wp, flight%proven), longest)
     fraction = 2
     fault = 0
@@ -208,7 +223,7 @@ contains
     ! Next to the end of a domain steps may shrink before one leaves it: a longer one does.
     if (fault == 0) then
       call enclose(flight, 16*natural, excess)
-      fault = flight%fault
+      fault = max(0, flight%fault)
     end if
     flight%fault = fault
     status = merge(flight_left_domain, flight_no_progress, fault > 0)
@@ -230,9 +245,11 @@ contains
       margin(i) = flight%margin*max(abs(box(i)%low), abs(box(i)%high)) + least
       box(i) = interval_t(box(i)%low - margin(i), box(i)%high + margin(i))
     end do
-    excess = 0
+    excess = huge(1.0_wp)
+    flight%bounds%unit = scale(1.0_wp, exponent(step))
     call bound_coefficients(flight%tape, box, flight%parameters, flight%bounds, flight%fault)
-    if (flight%fault > 0) return
+    if (flight%fault /= 0) return
+    excess = 0
     ! Not by **: how compilers multiply for it differs.
     power = 1.01_wp*step
     do i = 1, series_order
@@ -301,7 +318,11 @@ contains
       if (k >= m) total = total + (k + 1)*abs(p(k))
       power = power*(step/flight%series%unit)
     end do
-    remainder = 1.01_wp*flight%bounds%c(series_order + 1, node)*power
+    power = 1.01_wp
+    do k = 1, series_order + 1
+      power = power*(step/flight%bounds%unit)
+    end do
+    remainder = power*flight%bounds%c(series_order + 1, node)
     rounding = epsilon(1.0_wp)*total
     if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, flight%bounds%c(0, :), node)
     p(:series_order - m) = p(m:)

@@ -87,7 +87,8 @@ contains
   end subroutine bound_branch
 
   !> Bounds on the magnitudes of the Taylor coefficients of every node at any point of the box, in `series%c`; `series` is
-  !> prepared as for coefficients. `fault` is 0, or a node whose operation or series is not proven to be defined.
+  !> prepared as for coefficients. `fault` is 0, or a node whose operation or series is not proven to be defined; negative
+  !> where a bound is too large.
   pure subroutine bound_coefficients(tape, box, parameters, series, fault)
     type(tape_t), intent(in) :: tape
     type(interval_t), intent(in) :: box(:)

@@ -54,7 +54,8 @@ contains
     series%c = 0
   end subroutine prepare_series
 
-  !> Coefficients at a point. `fault` is 0, or the node whose operation, or series, is not defined there.
+  !> Coefficients at a point. `fault` is 0, or the node whose operation, or series, is not defined there; negative where a
+  !> coefficient is too large, as the unit of time is.
   pure subroutine expand(tape, variables, parameters, series, fault)
     type(tape_t), intent(in) :: tape
     real(wp), intent(in) :: variables(:), parameters(:)
@@ -94,7 +95,7 @@ contains
           series%c(k, i) = coefficient(tape, i, k, sign, divisor, series)
         end if
         if (.not. abs(series%c(k, i)) <= huge(1.0_wp)) then
-          fault = i
+          fault = -i
           return
         end if
       end do
