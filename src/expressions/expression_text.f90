@@ -367,11 +367,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: found
     found = "'"//next(reader)//"'"
-    if (reader%at >= len(reader%text)) then
-      found = 'the end'
-    else if (scan(letters, next(reader)) > 0) then
-      found = "'"//word_at(reader)//"'"
-    end if
+    if (scan(letters, next(reader)) > 0) found = "'"//word_at(reader)//"'"
+    if (reader%at >= len(reader%text)) found = 'the end'
     call fail(error, exit_bad_case, 'column '//to_text(reader%at)//': found '//found//', allowed: '//allowed)
   end subroutine report
 
