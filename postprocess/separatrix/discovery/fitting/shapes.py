@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator, CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, KroghInterpolator
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
@@ -110,7 +110,7 @@ def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
     for i in range(at.size):
         first = max(0, min(i - 2, at.size - 5))
         part = slice(first, min(at.size, first + 5))
-        slopes.append(float(BarycentricInterpolator(at[part], value[part]).derivative(at[i])))
+        slopes.append(float(KroghInterpolator(at[part], value[part]).derivative(at[i])))
     return CubicHermiteSpline(at, value, slopes)
 
 
