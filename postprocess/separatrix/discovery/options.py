@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user may choose, and the thresholds of the gates; partial.py has those of names in part alone."""
+"""What a user may choose, and the thresholds of the gates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -8,13 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.decision.added import with_law
-from separatrix.discovery.decision.characterise import characterised, hidden_state_tested
-from separatrix.discovery.decision.functions import with_function
-from separatrix.discovery.decision.partial import decide_in_part, nearest
+from separatrix.discovery.decision.plan import search
 from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.decision.verdict import Findings, verdict_of
-from separatrix.discovery.decision.with_imperfections import decide_with_imperfections
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.fitting.data import Data, fit_stages, gather, scales_of
 from separatrix.discovery.fitting.joint_effects import names_for
@@ -78,17 +75,9 @@ def investigate(
     if predicted is not None:
         _prepare_held_out(predicted, data, model, fitted, scales.mass)
     context = SearchContext(data, predicted, scales, options)
-    if options.partial:
-        decision = decide_in_part(context, fitted)
-    else:
-        context, decision = decide_with_imperfections(context, fitted)
-        decision = hidden_state_tested(context, decision)
-        decision.reasons += nearest(context, decision)
-        options.progress("characterising the rest of the gap", 0.9)
-        decision = with_law(context, characterised(context, decision))
-    decision = with_function(context, decision)
-    # its noise may have been measured again
-    findings = Findings(context, decision.rounds[0].base, decision, chosen)
+    found = search(SearchState(context, fitted))
+    # the noise of the base may have been measured again
+    findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings

@@ -32,7 +32,7 @@ def imported(file: Path) -> set[str]:
 @pytest.mark.parametrize("layer", LAYERS)
 def test_a_layer_knows_only_those_below(source_dir: Path, layer: str) -> None:
     folder = source_dir / "postprocess" / "separatrix" / "discovery" / layer
-    files = sorted(folder.glob("*.py"))
+    files = sorted(folder.rglob("*.py"))
     assert len(files) > 3
     below = {*LAYERS[: LAYERS.index(layer) + 1], *SHARED}
     wrong = {file.name: imported(file) - below for file in files if imported(file) - below}

@@ -118,7 +118,7 @@ def _fit_table(
                 made = fit_member(context.training, found.base, member, known, knots, alike, ahead)
             if made is None:
                 break
-            context.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
+            context.report(f"fitting {member.effect} on {count} knots")
             if made.fit.good.sum() < context.options.followed * found.base.fit.good.sum():
                 # lost segments would appear as a gain
                 continue

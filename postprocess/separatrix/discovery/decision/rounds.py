@@ -53,6 +53,13 @@ class SearchContext:
     held_out: Data | None
     scales: Scales | SensedScales
     options: Options
+    # the part of all work that the present stage is
+    span: tuple[float, float] = (0.0, 1.0)
+
+    def report(self, text: str, part: float = 0.0) -> None:
+        """Report what begins, a part of the present stage being over."""
+        first, last = self.span
+        self.options.progress(text, first + (last - first) * part)
 
     def predict(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
         """Score the held-out records, also from the end of an `other` prediction of them."""
@@ -103,8 +110,6 @@ def run_round(
     context: SearchContext,
     base: Fitted,
     predicted: Prediction | None,
-    first: float,
-    last: float,
     earlier: Round | None = None,
     everything: bool = False,
     without: frozenset[str] = frozenset(),
@@ -123,7 +128,7 @@ def run_round(
         known_alone = [replace(one, imperfections=None) for one in earlier.scored]
         found = replace(earlier, predicted=predicted, scored=known_alone)
     else:
-        found = _screened(context, base, predicted, first)
+        found = _screened(context, base, predicted)
     known = {one.name: one.fitted for one in earlier.scored} if earlier else {}
     ends = [one for one in found.scored if one.fitted.fit.converged]
     rival = max(ends, key=lambda one: one.training).fitted if ends else None
@@ -136,7 +141,7 @@ def run_round(
     ranked = list(known)
     chosen.sort(key=lambda name: ranked.index(name) if name in ranked else len(ranked))
     for number, name in enumerate(chosen):
-        options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
+        context.report(f"fitting {name}", number / len(chosen))
         fitted = refit(
             context.training,
             base,
@@ -160,7 +165,7 @@ def run_round(
     return found
 
 
-def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None, at: float) -> Round:
+def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None) -> Round:
     """All candidates on top of a machine and what they would do, none of them fitted yet."""
     options = context.options
     free = with_values(base.problem.free, base.fit.values)
@@ -183,7 +188,7 @@ def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None
             absent[name] = made
         else:
             candidates[name] = made
-    options.progress(f"screening {len(candidates)} effects", at)
+    context.report(f"screening {len(candidates)} effects")
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}

@@ -71,7 +71,7 @@ def _grown(context: SearchContext, rounds: list[Round], found: ScoredCandidate) 
     limit = hopeless(first.base)
     # an effect that alone is far from the records, as a soft barrier for hard impacts, is no second effect
     lost = frozenset(one.name for one in first.scored if one.fitted.fit.far_off(limit))
-    rounds.append(run_round(context, found.fitted, found.prediction, 0.8, 0.9, without=lost))
+    rounds.append(run_round(context, found.fitted, found.prediction, without=lost))
     sets = [over_base(context, first.base, first.predicted, one) for one in rounds[-1].scored]
     if len(found.fitted.names) > 1:
         return sets

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.experiments import experiments
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
@@ -15,8 +14,9 @@ from separatrix.discovery.decision.other_machine import other_drive, other_machi
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import LARGER_NOISE, LITTLE, ScoredCandidate
+from separatrix.discovery.decision.stages.rig_imperfections import in_words
+from separatrix.discovery.decision.state import Decision, Step
 from separatrix.discovery.decision.where import Map, sentences, where_maps
-from separatrix.discovery.decision.with_imperfections import in_words
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
@@ -44,6 +44,7 @@ class Findings:
     base: Fitted
     decision: Decision
     held_out_chosen: str
+    steps: tuple[Step, ...] = ()
     maps: list[Map] = field(default_factory=list)
 
 
@@ -79,7 +80,8 @@ def verdict_of(findings: Findings) -> dict:
         "gates": best.gates if best else {},
         "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
-        "reasons": decision.reasons,
+        "reasons": list(decision.reasons),
+        "search": [one._asdict() for one in findings.steps],
         "asked_for": None if context.options.candidates is None else list(context.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
         "detectable": detectable(context, first),

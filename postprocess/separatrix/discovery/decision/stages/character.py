@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision
-from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, memories, motion_of
+from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, motion_of
 from separatrix.discovery.decision.joint_hypotheses import hypotheses_at, motion_at
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import family_wise
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import evidence_of_imperfections
 from separatrix.discovery.fitting.sensed import SensedData
 
 # least usable eigenvalue of scaled normal equations: of motions, and of forces, which are exact
@@ -80,18 +79,27 @@ class Character:
         }
 
 
+def has_gap(state: SearchState) -> bool:
+    """Whether the base machine leaves a gap on held-out records."""
+    predicted = state.decision.predicted
+    return predicted is not None and predicted.fit.excess > 0
+
+
+def character(state: SearchState) -> SearchState:
+    """Add to the decision on what an unnamed gap depends."""
+    return state.decided(characterised(state.context, state.decision))
+
+
 def characterised(context: SearchContext, decision: Decision) -> Decision:
     """The decision with what is known of an unnamed gap; unchanged where nothing is certain."""
     base, predicted = decision.rounds[0].base, decision.predicted
-    if decision.outcome != "not-in-catalogue" or predicted is None or predicted.fit.excess <= 0:
-        return decision
     if isinstance(base.problem, CoordinateProblem):
         training, held_out = motion_at(base, context.training), motion_at(predicted, context.held_out)
         tried = hypotheses_at(training)
     else:
-        training, held_out = _motions(context, base, predicted)
+        training, held_out = motions(context, base, predicted)
         tried = hypotheses(training)
-    found = [_best(training, held_out, one) for one in tried]
+    found = [best_of_hypothesis(training, held_out, one) for one in tried]
     best = max(found, key=lambda one: one.evidence)
     if not _known(best, context):
         return replace(decision, suspected=best if _likely(best, context) else None)
@@ -103,40 +111,7 @@ def characterised(context: SearchContext, decision: Decision) -> Decision:
     return replace(decision, outcome="characterised", characters=[best, *others.values()])
 
 
-def hidden_state_tested(context: SearchContext, decision: Decision) -> Decision:
-    """The decision without its names where a hidden state explains clearly more than they do.
-
-    The catalogue has no hidden state, and a function of speed, position or phase reproduces it in part. A
-    right name leaves nothing to explain, so the state must explain more beside the names too, and more than
-    imperfections of the rig.
-    """
-    base, predicted = decision.rounds[0].base, decision.predicted
-    if not decision.accepted or predicted is None or predicted.fit.excess <= 0:
-        return decision
-    name = decision.accepted[0]
-    if context.options.quick or isinstance(base.problem, CoordinateProblem) or name.prediction is None:
-        return decision
-    training, held_out = _motions(context, base, predicted)
-    best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
-    imperfections = evidence_of_imperfections(name.fitted, name.prediction)
-    least = context.options.needed * context.options.separation
-    lead = best.evidence - name.own_evidence / max(1.0, name.fitted.fit.reduced_chi2) - imperfections
-    if lead < least:
-        return decision
-    beside = _best(*_motions(context, name.fitted, name.prediction), best.hypothesis)
-    if beside.evidence - imperfections < least:
-        return decision
-    gap = replace(
-        decision, outcome="not-in-catalogue", accepted=[], alternatives=[], rivals=[], equivalent=False
-    )
-    found = characterised(context, gap)
-    if not found.characters or found.characters[0].hypothesis.depends_on != best.hypothesis.depends_on:
-        return decision
-    names = " and ".join(name.fitted.names)
-    return replace(found, reasons=[f"a hidden state explains more than {names} (log-likelihood {lead:.3g})"])
-
-
-def _motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
+def motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
     """The motion of one body in training and on held-out records."""
     natural = _natural_frequency(context)
     training, held_out = (motion_of(one, context.scales.mass, natural) for one in (base, predicted))
@@ -169,7 +144,7 @@ def _left(one: Character, fit) -> float:
     return max(1.0, 1 + (1 - one.closed) * fit.excess / max(1.0, fit.samples))
 
 
-def _best(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Character:
+def best_of_hypothesis(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Character:
     """A hypothesis with its constant where it closes most, to a fraction of the distance of those tried."""
     values = hypothesis.values
     tried = {float(one): _gain(training, hypothesis, one) for one in values}

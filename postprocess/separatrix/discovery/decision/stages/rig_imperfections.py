@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision, decide
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
@@ -31,24 +31,33 @@ from separatrix.discovery.fitting.rig import (
 _HIDING, _HIDING_SHARE = 10.0, 0.3
 # iterations of the motion along which they act: it is that of the machine fitted beside them
 _TIMES = 2
-# progress of the second search
-_BEGUN, _ENDED = 0.85, 0.89
 
 
-def decide_with_imperfections(context: SearchContext, base: Fitted) -> tuple[SearchContext, Decision]:
-    """Decide; without a name, decide again with fitted imperfections of the rig if they explain much.
+def hidden_by_imperfections(state: SearchState) -> bool:
+    """Whether there is no name and imperfections explain much of the residual in training."""
+    base = state.round.base
+    if _sure(state.decision) or state.context.options.quick or isinstance(base.problem, CoordinateProblem):
+        return False
+    if base.problem.in_force or not base.fit.good.any():
+        return False
+    weight, _ = weight_of_imperfections(base, None)
+    return weight > max(_HIDING, _HIDING_SHARE * 0.5 * base.fit.excess)
 
-    The second decision, with its context, is returned if it is a name.
-    """
-    first = decide(context, base)
-    if not _may_hide(context, first):
-        return context, first
-    context.options.progress("searching beside imperfections of the rig", _BEGUN)
-    found = _with_imperfections(context, first.rounds[0].base, first.predicted)
+
+def beside_imperfections(state: SearchState) -> SearchState:
+    """Begin the search again beside fitted imperfections of the rig; unchanged if their fit fails."""
+    found = _with_imperfections(state.context, state.round.base, state.decision.predicted)
     if found is None:
-        return context, first
-    second = decide(*found)
-    return (found[0], second) if _sure(second) and _small(second.accepted[0]) else (context, first)
+        return state
+    context, base = found
+    return state.again(context=context, base=base, noise_measured=False, without_imperfections=state)
+
+
+def with_or_without(state: SearchState) -> SearchState:
+    """Keep the search beside imperfections if it found a name, else return to the one without them."""
+    if _sure(state.decision) and _small(state.decision.accepted[0]):
+        return replace(state, without_imperfections=None)
+    return replace(state.without_imperfections, steps=state.steps)
 
 
 def _sure(decision: Decision) -> bool:
@@ -71,26 +80,11 @@ def _small(one: ScoredCandidate) -> bool:
     )
 
 
-def _may_hide(context: SearchContext, decision: Decision) -> bool:
-    """Whether there is no name and imperfections explain much of the residual in training."""
-    base = decision.rounds[0].base
-    if _sure(decision) or context.options.quick or isinstance(base.problem, CoordinateProblem):
-        return False
-    if base.problem.in_force or not base.fit.good.any():
-        return False
-    weight, _ = weight_of_imperfections(base, None)
-    return weight > max(_HIDING, _HIDING_SHARE * 0.5 * base.fit.excess)
-
-
 def _with_imperfections(
     context: SearchContext, base: Fitted, prediction: Prediction | None
 ) -> tuple[SearchContext, Fitted] | None:
     """Records with imperfections of their rig, and the machine fitted beside these; None if the fit fails."""
     machine, values, followed = base.problem.free, base.fit.values, base.fit.good.sum()
-    progress = context.options.progress
-    options = replace(
-        context.options, progress=lambda text, at: progress(text, _BEGUN + (_ENDED - _BEGUN) * at)
-    )
     for turn in range(_TIMES):
         usual = usual_acceleration(base.problem, base.fit)
         tables = imperfections_of(base.problem, base.fit, usual)
@@ -107,7 +101,7 @@ def _with_imperfections(
         training.base_starts = fit.starts
         context = replace(context, training=training, held_out=held_out)
         base, values = replace(base, problem=problem, fit=fit), fit.values
-    return replace(context, options=options), base
+    return context, base
 
 
 def in_words(fitted: Fitted) -> list[str]:
