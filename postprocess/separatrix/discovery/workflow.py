@@ -25,11 +25,9 @@ from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import Record, read_record, unique_names
 from separatrix.discovery.measured.sensors import prepare_sensors
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
-
-# share of an only record that is held out, and drive periods that it has at least
-_END, _END_PERIODS = 0.3, 2.05
 
 
 def discover(
@@ -153,11 +151,11 @@ def _split(
     if not records:
         raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
-    at = int((1 - _END) * whole.t.size)
+    at = int((1 - RECORDS.held_out_end) * whole.t.size)
     period = _prepared(whole, model, rest, options or Options()).period_samples
     if period is not None:
         # the end needs some periods too
-        latest = whole.t[-1] - _END_PERIODS * period * whole.interval
+        latest = whole.t[-1] - RECORDS.held_out_periods * period * whole.interval
         at = min(at, max(whole.t.size // 2, int(np.searchsorted(whole.t, latest, "right")) - 1))
     share = f"{100 * (1 - at / whole.t.size):.0f} %"
     first, end = _cut(whole, 0, at, ""), _cut(whole, at, whole.t.size, "_end")

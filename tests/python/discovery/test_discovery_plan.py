@@ -3,6 +3,7 @@
 """The walk along the plan of the search."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from separatrix.discovery.decision import plan
@@ -10,6 +11,8 @@ from separatrix.discovery.decision.plan import Stage, search
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import FIT, RECORDS, SEARCH
+from separatrix.discovery.policy.row import SOURCES, rows_of
 
 NONE = Decision("none", [], [], [], [], None, None)
 
@@ -90,3 +93,22 @@ def test_progress_grows_also_where_a_search_begins_again(monkeypatch) -> None:
     assert reported == sorted(reported)
     assert 0.1 <= reported[0]
     assert reported[-1] < 0.9
+
+
+@pytest.mark.parametrize("policy", [Options(), SEARCH, FIT, RECORDS])
+def test_a_threshold_has_unit_meaning_and_a_known_source(policy: object) -> None:
+    rows = list(rows_of(policy))
+    assert len(rows) > 15
+    assert all(unit and meaning and source in SOURCES for _, _, unit, meaning, source in rows)
+
+
+def test_the_pages_show_stages_gates_and_thresholds_as_they_are(
+    source_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(source_dir / "scripts"))
+    from docs_pages import discovery
+
+    docs = source_dir / "docs"
+    assert (docs / "reference" / "discovery.md").read_text().endswith(discovery.page())
+    guide = (docs / discovery.GUIDE).read_text()
+    assert discovery.with_gates(guide) == guide

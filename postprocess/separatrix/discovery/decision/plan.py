@@ -87,7 +87,7 @@ PLAN = (
     Stage(
         "one effect",
         lambda state: state.open,
-        "the base machine is renewed as long as an effect shows a lower minimum of it",
+        "every search begins so; the base is renewed where an effect shows a lower minimum of it",
         one_effect,
         work=6,
     ),

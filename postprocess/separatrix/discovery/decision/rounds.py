@@ -27,22 +27,7 @@ from separatrix.discovery.fitting.refit import (
 from separatrix.discovery.fitting.rig import cleaned, with_imperfections
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
-
-_CERTAIN_REFITS = 5
-_RELATED = 0.7
-# log-likelihood that a candidate must promise to be worth a refit, where the base is good already
-_WORTH = 1.0
-_FEWEST = 2
-_BAD = 1.3
-# number of leading candidates that are tried again from the best, and their least gain
-_CROSSED = 4
-_WORTH_CROSSING = 5.0
-_SHARE = 0.3
-# share of the best gain from which on an effect that is absent at no size is tried: one form of it predicts
-# little of the others
-_CURVED = 0.05
-# behind the best by less than so many separations: fitted to the end
-_NEAR = 3.0
+from separatrix.discovery.policy import SEARCH
 
 
 @dataclass
@@ -230,7 +215,7 @@ def _beaten_by_noise(fitted: Fitted, base: Fitted) -> bool:
 
 def _fair(context: SearchContext, found: Round) -> None:
     """Let the base predict from the starts of the best candidate too, and compare all with that."""
-    if found.predicted is None or not found.scored or found.scored[0].held_out < _WORTH:
+    if found.predicted is None or not found.scored or found.scored[0].held_out < SEARCH.worth_a_refit:
         return
     fairer = context.predict(found.base, found.scored[0].prediction)
     if fairer.score[fairer.good].sum() <= found.predicted.score[found.predicted.good].sum():
@@ -244,7 +229,7 @@ def _carry_on(context: SearchContext, found: Round) -> None:
     """Fit the candidates near the best to convergence and let them predict, whatever the screen promised."""
     order = found.scored
     for index, one in enumerate(order):
-        near = order[0].evidence - one.evidence < _NEAR * context.options.separation
+        near = order[0].evidence - one.evidence < SEARCH.near * context.options.separation
         done = one.fitted.fit.converged
         if near and not (done and (one.prediction is not None or context.held_out is None)):
             fitted = one.fitted
@@ -258,13 +243,13 @@ def _carry_on(context: SearchContext, found: Round) -> None:
 def _cross(context: SearchContext, found: Round) -> None:
     """Try the leaders again from the machine of the best: it may have left a minimum of theirs."""
     order = found.scored
-    if len(order) < 2 or context.options.quick or order[0].training < _WORTH_CROSSING:
+    if len(order) < 2 or context.options.quick or order[0].training < SEARCH.worth_crossing:
         return
     best = order[0].fitted
-    for index in range(1, min(_CROSSED, len(order))):
+    for index in range(1, min(SEARCH.crossed, len(order))):
         one = order[index]
         behind = order[0].evidence - one.evidence
-        if behind < context.options.separation or one.evidence < _SHARE * order[0].evidence:
+        if behind < context.options.separation or one.evidence < SEARCH.crossed_share * order[0].evidence:
             continue
         better = crossed(context.training, one.fitted, best, found.candidates[one.name])
         if better is not one.fitted:
@@ -279,9 +264,9 @@ def _same_motion(context: SearchContext, found: Round) -> None:
     """
     order = found.scored
     best = next((one for one in order if effect_of(one.name).confused), None)
-    if best is None or context.options.quick or best.training < _WORTH_CROSSING:
+    if best is None or context.options.quick or best.training < SEARCH.worth_crossing:
         return
-    if best.evidence < _SHARE * order[0].evidence:
+    if best.evidence < SEARCH.crossed_share * order[0].evidence:
         return
     for index, one in enumerate(order):
         behind = best.evidence - one.evidence
@@ -297,19 +282,25 @@ def _same_motion(context: SearchContext, found: Round) -> None:
 def choose(base: Fitted, screened: Screened, options: Options, everything: bool = False) -> list[str]:
     """Names to refit, best first; all of them where the base is too bad for the linear screen."""
     order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
-    bad = base.fit.reduced_chi2 > _BAD and not options.quick
-    if everything or (bad and cleaned(base.problem, base.fit).reduced_chi2 > _BAD):
+    bad = base.fit.reduced_chi2 > SEARCH.bad_base and not options.quick
+    if everything or (bad and cleaned(base.problem, base.fit).reduced_chi2 > SEARCH.bad_base):
         return order
     return [
         name
         for index, name in enumerate(order)
-        if (index < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or index < _FEWEST))
+        if (
+            index < SEARCH.certain_refits
+            and (screened.gain[name] > SEARCH.worth_a_refit or index < SEARCH.fewest_refits)
+        )
         or (
-            screened.gain[name] > _WORTH
+            screened.gain[name] > SEARCH.worth_a_refit
             and not options.quick
             and (
-                any(screened.cosine(name, other) > _RELATED for other in order[:3])
-                or (not screened.live[name].any() and screened.gain[name] > _CURVED * screened.gain[order[0]])
+                any(screened.cosine(name, other) > SEARCH.related for other in order[:3])
+                or (
+                    not screened.live[name].any()
+                    and screened.gain[name] > SEARCH.curved_share * screened.gain[order[0]]
+                )
             )
         )
     ]

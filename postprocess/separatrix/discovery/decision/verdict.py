@@ -24,16 +24,14 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of, location_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
-from separatrix.discovery.fitting.refit import WORSE, Fitted
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import Function, Part
 from separatrix.discovery.measured.sensors import SensedPrepared
+from separatrix.discovery.policy import FIT, SEARCH
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
-
-# experiments that are reported, rivals that they should separate
-_EXPERIMENTS, _RIVALS = 5, 4
 
 
 @dataclass
@@ -124,9 +122,9 @@ def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     if isinstance(final.problem, CoordinateProblem):
         # experiments are flown by one body
         return {"separating_experiment": "", "experiments": []}
-    others = rivals[:_RIVALS] or [findings.base]
+    others = rivals[: SEARCH.experiment_rivals] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
-    found = [one for one in experiments(final, others) if one.d_prime > 1][:_EXPERIMENTS]
+    found = [one for one in experiments(final, others) if one.d_prime > 1][: SEARCH.experiments]
     # a name that no held-out record confirms needs one that does, also where it has rivals
     use = "training" if findings.decision.accepted[0].gates.get("hold-out", True) else "held out"
     texts = [f"{one.text(name, names)}{'; hold it out' if use == 'held out' else ''}" for one in found]
@@ -216,7 +214,7 @@ def _candidate(one: ScoredCandidate) -> dict:
         "evidence": one.evidence,
         "reduced_chi2": fit.sample_chi2,
         # a fit worse than the base has not found its minimum, which includes the effect of size zero
-        "converged": fit.converged and one.training > -WORSE,
+        "converged": fit.converged and one.training > -FIT.worse,
         "starts": one.fitted.tries,
         "values": {
             one.fitted.problem.free[i].path: one.fitted.problem.free[i].physical(fit.values[i])

@@ -23,17 +23,11 @@ from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import SEARCH
 from separatrix.discovery.wording import Units, units_of
 
 IMPACT_SPEED = "impact speed"
 _LOW, _SINCE = "low speed", "time since the last impact"
-_IMPACT_BINS, _FEWEST_IMPACTS = 4, 3
-_LEVEL = 0.01
-_BLOCK = 2
-# share of what the best map explains from which on another map is as good
-_NEARLY = 0.9
-# the same for a map of the variable of a named effect
-_MOST = 0.75
 # maps over the variable that a family of effects depends on
 _SPEED, _POSITION, _PLANE, _PHASE = "velocity", "position", "position and velocity", "drive phase"
 _OF_FAMILY = {
@@ -94,7 +88,7 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
         tables.append(impacts[4])
         columns = np.concatenate([columns, kick_columns(problem, fit, impacts[4])], axis=2)
     force, error = _forces(fitted, columns, options)
-    flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
+    flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), SEARCH.flag_level)
     own = {name for effect in named for name in _OF_FAMILY.get(effect_of(effect).family, ())}
     gains = _gains(fitted, columns, [member.shape[2] for member in tables])
     flags &= np.repeat(_reported(maps, gains, own), [member.shape[2] for member in tables])
@@ -128,7 +122,7 @@ def _maps_at_locations(fitted: Fitted, options: Options) -> list[Map]:
     whole = np.concatenate(columns, axis=2)
     force, error = _forces(fitted, whole, options)
     sizes = [one[4].shape[2] for one in maps]
-    flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), _LEVEL)
+    flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), SEARCH.flag_level)
     flags &= np.repeat(_reported(maps, _gains(fitted, whole, sizes), set()), sizes)
     ends = np.cumsum([0, *sizes])
     return [
@@ -178,9 +172,9 @@ def _impacts(problem, fit, units: Units) -> tuple | None:
     before, at = impacts_at(problem, fit)
     at = at * fit.good[:, None]
     hit = at != 0
-    if hit.sum() < _FEWEST_IMPACTS * _IMPACT_BINS:
+    if hit.sum() < SEARCH.impacts_per_bin * SEARCH.impact_bins:
         return None
-    edges = np.unique(np.quantile(before[hit], np.linspace(0, 1, _IMPACT_BINS + 1)))
+    edges = np.unique(np.quantile(before[hit], np.linspace(0, 1, SEARCH.impact_bins + 1)))
     if edges.size < 3:
         return None
     index = np.clip(np.searchsorted(edges, before, side="right") - 1, 0, edges.size - 2)
@@ -210,9 +204,9 @@ def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.n
     force = score.sum(axis=0) / whole_size
     random = np.random.default_rng([options.seed, 21])
     n = score.shape[0]
-    blocks = -(-n // _BLOCK)
+    blocks = -(-n // SEARCH.map_block)
     first = random.integers(0, n, (options.bootstraps, blocks))
-    index = ((first[:, :, None] + np.arange(_BLOCK)) % n).reshape(options.bootstraps, -1)
+    index = ((first[:, :, None] + np.arange(SEARCH.map_block)) % n).reshape(options.bootstraps, -1)
     influence = score - size * force
     spread = np.std(influence[index].sum(axis=1), axis=0) / whole_size
     formal = 1 / np.sqrt(whole_size)
@@ -243,8 +237,8 @@ def _reported(maps: list[tuple], gains: np.ndarray, own: set[str]) -> np.ndarray
     if gains.max() <= 0:
         # nothing is missing, or the stated noise is too large
         return np.zeros(gains.size, bool)
-    near = gains >= _NEARLY * gains.max()
-    mine = np.array([one[0] in own for one in maps]) & (gains >= _MOST * gains.max())
+    near = gains >= SEARCH.map_nearly * gains.max()
+    mine = np.array([one[0] in own for one in maps]) & (gains >= SEARCH.map_of_name * gains.max())
     if mine.any():
         near = mine
     bins = np.array([one[4].shape[2] for one in maps])

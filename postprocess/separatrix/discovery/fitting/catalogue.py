@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 
 from separatrix.discovery.fitting.machine import Free, bounds_of
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 from separatrix.library import Effect, effects
 
@@ -33,7 +34,6 @@ class Scales:
 
 
 Starts = Callable[[Scales], dict[str, list[float]]]
-_FAR = 20.0
 
 
 def _asymmetry(scales: Scales) -> dict[str, list[float]]:
@@ -125,7 +125,7 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
         path = f"effect.{name}.{key}"
         lower, upper = bounds_of(extended.parameters[path])
         if key in effect.sizes:
-            ends = np.log([min(sizes[key]) / _FAR, max(sizes[key]) * _FAR])
+            ends = np.log([min(sizes[key]) / FIT.far_start, max(sizes[key]) * FIT.far_start])
             added.append(Free(path, float(np.log(value)), *ends, 0.1, positive=True))
         else:
             added.append(Free(path, value, lower, upper, abs(value) or 1.0))

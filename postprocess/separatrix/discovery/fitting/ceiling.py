@@ -27,11 +27,7 @@ from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.fitting.rig import cleaned
 from separatrix.discovery.fitting.screen import project
-
-_PIECES = 5
-_USABLE = 1e-6
-# share of the gain of free forces from which on a force of one variable closes most of the gap
-_MOST = 0.5
+from separatrix.discovery.policy import FIT
 
 
 @dataclass
@@ -66,7 +62,7 @@ class Ceiling:
     def mostly(self) -> str:
         """The dependence of a force that explains most of what any force does; '' if none does."""
         free = max(one.gain for one in self.families)
-        of_one = [one for one in self.families if one.name != "pieces" and one.gain > _MOST * free]
+        of_one = [one for one in self.families if one.name != "pieces" and one.gain > FIT.mostly * free]
         return max(of_one, key=lambda one: one.gain).name if of_one else ""
 
 
@@ -92,7 +88,7 @@ def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
     # relative to what the columns were before anything was projected out
     size = np.sqrt(np.maximum(np.diag(matrix)[p:], 1e-300))
     values, vectors = np.linalg.eigh(left / np.outer(size, size))
-    usable = values > _USABLE
+    usable = values > FIT.usable
     parts = vectors[:, usable].T @ (score / size)
     return float(np.sum(parts**2 / values[usable])), int(usable.sum())
 
@@ -101,8 +97,8 @@ def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int
     """Forces of each segment by itself, constant over fifths of it; common parameters stay."""
     inside = problem.segments.inside
     lengths = inside.sum(axis=1)
-    piece = np.minimum(np.arange(inside.shape[1])[None, :] * _PIECES // lengths[:, None], _PIECES - 1)
-    forces = (piece[:, :, None] == np.arange(_PIECES)) * inside[:, :, None].astype(float)
+    piece = np.minimum(np.arange(inside.shape[1])[None, :] * FIT.pieces // lengths[:, None], FIT.pieces - 1)
+    forces = (piece[:, :, None] == np.arange(FIT.pieces)) * inside[:, :, None].astype(float)
     columns = force_columns(problem, fit, forces, mass)
     reduced = fit.normal_equations(columns)
     size = np.sqrt(np.maximum(np.einsum("kii->ki", reduced.matrix), 1e-300))

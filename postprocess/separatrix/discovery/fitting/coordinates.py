@@ -10,12 +10,7 @@ from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.measured.bodies import Structure, structure_of
 from separatrix.discovery.measured.segments import Segments, padded_table
 from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
-
-_TOLERANCE = 1e-10
-# share of the sampling interval, and of a radian of the drive, over which an acceleration is the slope of v
-_SHARE, _INSTANT = 0.25, 1e-3
-# relative step of a parameter of a joint by which its force is differentiated
-_STEP = 1e-6
+from separatrix.discovery.policy import FIT
 
 
 class CoordinateProblem(Problem):
@@ -60,7 +55,7 @@ class CoordinateProblem(Problem):
         instant = 0.0
         if any(one.kind == "a" for one in prepared.sensors):
             radian = 1 / prepared.frequency if prepared.frequency else np.inf
-            instant = min(_SHARE * prepared.record.interval, _INSTANT * radian)
+            instant = min(FIT.slope_share * prepared.record.interval, FIT.slope_angle * radian)
         return {
             "rows": rows,
             "offsets": offsets,
@@ -180,7 +175,7 @@ class CoordinateProblem(Problem):
             times,
             derivatives=directions is not None,
             directions=directions,
-            tolerance=_TOLERANCE,
+            tolerance=FIT.tolerance_of_bodies,
         )
         motion = [result.motion[k::each] for k in range(each)]
         jacobian = None if directions is None else [result.jacobian[k::each] for k in range(each)]
@@ -240,7 +235,7 @@ def joint_force(
     slopes = by_extension[:, None] * np.einsum("kij,i->kj", jacobian[0][:, :n], joint.row)
     slopes += by_speed[:, None] * np.einsum("kij,i->kj", jacobian[0][:, n:], joint.row)
     for key, i in indices.items():
-        step = _STEP * max(abs(own[key]), 1e-6)
+        step = FIT.joint_step * max(abs(own[key]), 1e-6)
         moved = (_force(joint.law, {**own, key: own[key] + step}, s, u)[0] - force) / step
         slopes[:, : len(directions)] += moved[:, None] * directions[:, i]
     return force, slopes

@@ -19,24 +19,8 @@ from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
 from separatrix.discovery.measured.signals import jumps, white_noise
 from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
-
-# lengths of the stages over that of the longest segments
-STAGES = (0.2, 0.5, 1.0)
-FEWEST = 10
-"""Samples of a segment at least."""
-# share of wrong segments up to which the others determine the machine
-_FEW = 0.25
-# natural periods that a segment may last where the drive is slow
-_MOST_NATURAL_PERIODS = 1.5
-# squares by which a fit is far behind another, whatever its suspicious segments may gain
-_SQUARES_BEHIND = 60.0
-# standard errors within which the smoother gives the time of an impact
-_TIMES = 3.0
-# share of the mean time between impacts within which nothing is compared beside one, at most
-_BESIDE = 0.03
-# standard errors of the speed within which a body may be at rest
-_SLOW = 3.0
 
 
 @dataclass
@@ -112,13 +96,17 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
         if seconds is not None:
             length = seconds / record.interval
         elif one.period_samples is not None:
-            length = periods * min(one.period_samples, _MOST_NATURAL_PERIODS * _natural_samples(one))
+            length = periods * min(one.period_samples, FIT.most_natural_periods * _natural_samples(one))
         else:
             length = periods * oscillation
-        lengths.append(int(np.clip(length, FEWEST, record.t.size / 3)))
+        lengths.append(int(np.clip(length, FIT.fewest_segments, record.t.size / 3)))
     stages = [
-        cut([one.samples for one in prepared], smoothed, [max(FEWEST, int(share * n)) for n in lengths])
-        for share in STAGES
+        cut(
+            [one.samples for one in prepared],
+            smoothed,
+            [max(FIT.fewest_segments, int(share * n)) for n in lengths],
+        )
+        for share in FIT.stage_lengths
     ]
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
@@ -169,12 +157,14 @@ def _blind(one: Prepared, seen: Smoothed) -> np.ndarray | None:
     blind = np.zeros(v.size, bool)
     single = samples.size == 1
     rows = jumps(v, max(one.velocity_sigma, white_noise(one.record.v)))
-    longest = _BESIDE * (samples.t[-1] - samples.t[0]) / max(1, rows.size)
+    longest = FIT.beside_impact * (samples.t[-1] - samples.t[0]) / max(1, rows.size)
     for row in rows:
         if not (single[row] and single[row + 1]):
             continue
         near = seen.nearest(samples.t[row : row + 1])[0]
-        late = _TIMES * np.sqrt(seen.covariance[near, 0, 0]) / np.max(np.abs(v[row : row + 2]))
+        late = (
+            FIT.impact_time_errors * np.sqrt(seen.covariance[near, 0, 0]) / np.max(np.abs(v[row : row + 2]))
+        )
         late = min(late, longest)
         first, last = np.searchsorted(samples.t, [samples.t[row + 1] - late, samples.t[row] + late])
         blind[min(first, row) : max(last, row + 2)] = True
@@ -194,7 +184,7 @@ def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.
     hit, slow = np.zeros(at.size, bool), np.zeros(at.size, bool)
     hit[seen.impacts] = True
     hit[np.minimum(seen.impacts + 1, at.size - 1)] = True
-    slow |= np.abs(seen.v) < _SLOW * np.sqrt(seen.covariance[:, 1, 1])
+    slow |= np.abs(seen.v) < FIT.at_rest_errors * np.sqrt(seen.covariance[:, 1, 1])
     slow[:-1] |= seen.v[:-1] * seen.v[1:] <= 0
     for shift in (-1, 1):
         slow |= np.roll(slow, shift)
@@ -279,7 +269,7 @@ def polished(
     if not suspects.size:
         return fit
     versions = [fit]
-    if suspects.size <= _FEW * fit.counts.size:
+    if suspects.size <= FIT.few_wrong * fit.counts.size:
         versions.append(_without(problem, fit, suspects, most, fixed))
         if rival is not None and _behind(versions[-1], rival, suspects):
             return fit
@@ -297,7 +287,7 @@ def _behind(fit: Fit, rival: Fit, suspects: np.ndarray) -> bool:
     """Whether a fit is far behind another one on all but the suspects."""
     both = fit.good & rival.good
     both[suspects] = False
-    return bool((fit.chi2 - rival.chi2)[both].sum() > _SQUARES_BEHIND + fit.decrement)
+    return bool((fit.chi2 - rival.chi2)[both].sum() > FIT.squares_behind + fit.decrement)
 
 
 def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:

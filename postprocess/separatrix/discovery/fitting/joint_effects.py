@@ -24,13 +24,11 @@ from separatrix.discovery.measured.bodies import (
     is_structure,
     structure_of,
 )
+from separatrix.discovery.policy import FIT
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Effect, effects
 
 AT = "@"
-_FAR = 20.0
-# share of the usual impact speed above which a stop yields
-_YIELDS = 0.5
 # keys that a spring with free play in series must not have
 _NO_PLAY = ("free_length", "modulation", "modulation_cosine", "modulation_sine")
 
@@ -192,7 +190,7 @@ JOINT_EFFECTS = {
             "restitution_falloff", "restitution that falls with the impact speed", "restitution over "
             "impact speed",
             _relaw("newton_power", yield_speed=1.0, falloff=0.0),
-            lambda s: {"falloff": [0.05], "yield_speed": [_YIELDS * s.impact_speed, 0.1 * s.impact_speed]},
+            lambda s: {"falloff": [0.05], "yield_speed": [FIT.yields * s.impact_speed, 0.1 * s.impact_speed]},
             ("falloff",), ("yield_speed",), ("contact", "newton"), "barrier",
         ),
         JointEffect(
@@ -296,7 +294,7 @@ def candidate_of(
     for key, values in keys.items():
         parameter = extended.parameters[f"{path}.{key}"]
         if key in row.sizes:
-            ends = np.log([min(values) / _FAR, max(values) * _FAR])
+            ends = np.log([min(values) / FIT.far_joint_start, max(values) * FIT.far_joint_start])
             mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
             start = float(np.log(values[0]))
             added.append(Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror))

@@ -10,8 +10,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
-
-_LOST = 1e-9
+from separatrix.discovery.policy import FIT
 
 
 def columns_of(
@@ -67,7 +66,7 @@ def back_to_start(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.
     lengths, speeds = moved[:, :n].std(), moved[:, n:].std()
     size = np.concatenate([np.full(n, lengths or 1.0), np.full(n, speeds or 1.0)])
     scaled = np.where(finite[:, :, None, None], transition, np.eye(2 * n)) * size / size[:, None]
-    alive = np.logical_and.accumulate(finite & (np.abs(np.linalg.det(scaled)) > _LOST), axis=1)
+    alive = np.logical_and.accumulate(finite & (np.abs(np.linalg.det(scaled)) > FIT.lost_memory), axis=1)
     scaled[~alive] = np.eye(2 * n)
     inverse = np.linalg.inv(scaled) * size[:, None] / size
     back = inverse[:, :, :, n:]

@@ -9,11 +9,7 @@ import numpy as np
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.measured.bodies import Structure, structure_of
-
-# extension or speed over the largest at any location, below which nothing moves there
-_STILL = 1e-9
-# share of the friction of the case below which a fitted one does not determine its size
-_LOST_FRICTION = 0.1
+from separatrix.discovery.policy import FIT
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ def location_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
     for name, row in rows.items():
         length = float(np.std(motion[:, :n] @ row))
         speed = float(np.sqrt(np.mean((motion[:, n:] @ row) ** 2)))
-        if length <= _STILL * largest:
+        if length <= FIT.still * largest:
             found[name] = None
             continue
         mass = 1 / float(row @ (row / structure.mass))
@@ -90,7 +86,7 @@ def _friction(problem: CoordinateProblem, fit: Fit, name: str) -> float:
         return 0.0
     of_case = problem.model.parameters[path].value
     fitted = problem.machine_values(0, fit.values).get(path, of_case)
-    return fitted if fitted > _LOST_FRICTION * of_case else of_case
+    return fitted if fitted > FIT.lost_friction * of_case else of_case
 
 
 def _impact_speed(problem: CoordinateProblem, fit: Fit, structure: Structure, name: str) -> float:

@@ -7,12 +7,11 @@ from scipy.interpolate import BSpline, CubicSpline
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.policy import FIT
 from separatrix.library import effects
 
 # crank angles at which the position of the foot of the spring is computed
 _ANGLES = np.linspace(0, 2 * np.pi, 65)
-# time over which a force is measured, in natural periods or seconds
-_INSTANT = 1e-5
 
 
 def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
@@ -86,7 +85,7 @@ def _slack_positions(problem: Problem, fit: Fit, number: int) -> np.ndarray:
         # free play is no force of its own, but shifts these positions by half of it
         if path == "effect.backlash.gap":
             values[path] = 0.0
-    time = _INSTANT / max(1.0, model.drive_frequency({}))
+    time = FIT.slack_time / max(1.0, model.drive_frequency({}))
     start = np.column_stack([np.full(_ANGLES.size, x), np.zeros(_ANGLES.size), _ANGLES])
     flown = model.segments(
         list(values), np.array(list(values.values())), start, 2 * np.arange(_ANGLES.size + 1),

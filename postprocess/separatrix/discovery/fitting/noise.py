@@ -19,18 +19,9 @@ from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.response import force_columns, standardised
 from separatrix.discovery.measured.condense import Samples, expected_left
+from separatrix.discovery.policy import FIT
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
-_PIECES = 4
-# samples of a piece of a measured force, and powers of time that are taken from it
-_SHORT, _POWERS = 16, 3
-_LEAST = 0.04
-# segments that determine the size of the noise
-_FEWEST = 4
-# memory of a force beyond which it is that of the joint and not of the sensor
-_MOST = 0.8
-_SURE = 3.5
-_OUTLIER = 2.5
 
 
 @dataclass
@@ -65,12 +56,12 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float
     else:
         left = _joined([_of_segments(problem, fit, channel, mass), *condensed])
     # a row of blocks stands for all of one length
-    if left.record.size < _FEWEST and not condensed:
+    if left.record.size < FIT.noise_segments and not condensed:
         return Noise({}, 0.0)
     memory, error = _memory_of(_joined(condensed) if condensed else left)
     if known is not None:
         memory = known
-    if problem.in_force and memory > _MOST:
+    if problem.in_force and memory > FIT.most_memory:
         memory = 0.0
     factors = {}
     for number in np.unique(left.record):
@@ -94,7 +85,7 @@ def _memory_of(left: _Left) -> tuple[float, float]:
     freedom = left.freedom.sum()
     slope = float(np.interp(memory, _MEMORIES, np.gradient(ratio, _MEMORIES)))
     error = float(np.sqrt((1 - memory**2) / freedom)) / max(slope, 1e-3)
-    return (0.0 if memory < max(_LEAST, _SURE / np.sqrt(freedom)) else memory), error
+    return (0.0 if memory < max(FIT.least_memory, FIT.memory_sure / np.sqrt(freedom)) else memory), error
 
 
 def white_share(memory: float) -> float:
@@ -138,15 +129,15 @@ def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left
     segments = problem.segments
     length = segments.inside.shape[1]
     counts = segments.inside.sum(axis=1)
-    piece = np.minimum(np.arange(length)[None, :] * _PIECES // counts[:, None], _PIECES - 1)
+    piece = np.minimum(np.arange(length)[None, :] * FIT.noise_pieces // counts[:, None], FIT.noise_pieces - 1)
     part = slice(channel * length, (channel + 1) * length)
-    fitting = fit.good & (counts >= 2 * (_PIECES + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
+    fitting = fit.good & (counts >= 2 * (FIT.noise_pieces + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
     condensed = np.array([one.samples.condensed for one in problem.prepared])
     rows = np.flatnonzero(fitting & ~condensed[segments.record])
     if not rows.size:
         none = np.zeros(0)
         return _Left(none.astype(int), none, none, none, *np.zeros((2, _MEMORIES.size, 0)))
-    forces = (piece[:, :, None] == np.arange(_PIECES)) * segments.inside[:, :, None].astype(float)
+    forces = (piece[:, :, None] == np.arange(FIT.noise_pieces)) * segments.inside[:, :, None].astype(float)
     columns = np.concatenate([fit.evaluation.by_start, force_columns(problem, fit, forces, mass)], axis=2)
     columns, residual = columns[rows, part], fit.evaluation.residual[rows, part]
     if channel == 0:
@@ -177,15 +168,15 @@ def _of_short_pieces(problem: Problem, fit: Fit) -> _Left:
 
     A force shows every kink of a law at once; pieces with large residuals of a wrong machine are left out.
     """
-    length = problem.segments.inside.shape[1] // _SHORT * _SHORT
-    pieces = fit.evaluation.residual[:, :length].reshape(-1, _SHORT)
-    used = fit.evaluation.used[:, :length].reshape(-1, _SHORT).all(axis=1)
-    record = np.repeat(problem.segments.record, length // _SHORT)[used]
-    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, _SHORT), _POWERS))[0]
+    length = problem.segments.inside.shape[1] // FIT.noise_samples * FIT.noise_samples
+    pieces = fit.evaluation.residual[:, :length].reshape(-1, FIT.noise_samples)
+    used = fit.evaluation.used[:, :length].reshape(-1, FIT.noise_samples).all(axis=1)
+    record = np.repeat(problem.segments.record, length // FIT.noise_samples)[used]
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, FIT.noise_samples), FIT.noise_powers))[0]
     cleaned = pieces[used] - pieces[used] @ basis @ basis.T
-    count = np.full(record.size, _SHORT)
+    count = np.full(record.size, FIT.noise_samples)
     whole = np.broadcast_to(basis, (record.size, *basis.shape))
-    return _without_outliers(record, cleaned, (count - _POWERS).astype(float), whole, count)
+    return _without_outliers(record, cleaned, (count - FIT.noise_powers).astype(float), whole, count)
 
 
 def _without_outliers(
@@ -196,7 +187,7 @@ def _without_outliers(
     share = power / freedom
     kept = np.zeros(record.size, bool)
     for number in np.unique(record):
-        kept |= (record == number) & (share < _OUTLIER * np.median(share[record == number]))
+        kept |= (record == number) & (share < FIT.noise_outlier * np.median(share[record == number]))
     product = np.sum(cleaned[:, 1:] * cleaned[:, :-1], axis=1)
     expected = _expected(basis[kept], counts[kept])
     return _Left(record[kept], power[kept], product[kept], freedom[kept], *expected)

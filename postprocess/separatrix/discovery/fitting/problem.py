@@ -12,24 +12,17 @@ from separatrix.discovery.fitting.late import DELAY, Flown, flown_late
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, padded, padded_table, seeing
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
-
-# tolerance of the adaptive flight, relative to the position from the origin: a third quicker than 1e-9; share
-# of the noise that its error may be for a small motion far from the origin; limit of rounding
-_TOLERANCE = 1e-8
-_NOISE_SHARE = 0.01
-_ROUNDING = 1e-14
-# relative step of a parameter by which the force of a known motion is differentiated
-_STEP = 1e-5
 
 
 def flight_tolerance(prepared: Prepared) -> float:
     """Return the relative tolerance of flights whose errors are far below the noise of a record."""
     farthest = np.max(np.abs(prepared.samples.x), initial=0.0)
-    allowed = _NOISE_SHARE * prepared.sigma
-    if allowed >= _TOLERANCE * farthest:
-        return _TOLERANCE
-    return float(max(_ROUNDING, allowed / farthest))
+    allowed = FIT.tolerance_share * prepared.sigma
+    if allowed >= FIT.tolerance * farthest:
+        return FIT.tolerance
+    return float(max(FIT.tolerance_least, allowed / farthest))
 
 
 class Problem:
@@ -364,7 +357,11 @@ class Problem:
             slopes = np.zeros((at.size, values.size))
             for j, one in enumerate(self.free):
                 # nearly linear; derivatives of so short a flight are not exact for all effects
-                step = _STEP * one.size * (1 if values[j] + _STEP * one.size <= one.upper else -1)
+                step = (
+                    FIT.force_step
+                    * one.size
+                    * (1 if values[j] + FIT.force_step * one.size <= one.upper else -1)
+                )
                 moved = values + step * (np.arange(values.size) == j)
                 slopes[:, j] = (needed(moved) - force) / (step * sigma)
             out.by_parameter[rows, :length] = padded_table(slopes, inside)

@@ -12,8 +12,7 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.joint_response import columns_of
 from separatrix.discovery.fitting.problem import Problem
-
-_LOST = 1e-9
+from separatrix.discovery.policy import FIT
 
 
 def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
@@ -60,7 +59,9 @@ def _back(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
     )
     # a body that sticks loses its memory: later forces have no earlier equivalent
-    alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & problem.segments.inside, axis=1)
+    alive = np.logical_and.accumulate(
+        (np.abs(determinant) > FIT.lost_memory) & problem.segments.inside, axis=1
+    )
     safe = np.where(alive, determinant, 1.0)
     # second column of the inverse
     back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)

@@ -16,23 +16,14 @@ from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import IMPERFECTION_SIZE, imperfection_columns_of
+from separatrix.discovery.fitting.joint_forces import imperfection_columns_of
 from separatrix.discovery.fitting.machine import IMPERFECTION, Free
 from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, inverse_scaled, solve_scaled
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
 from separatrix.discovery.fitting.response import force_columns, standardised
-
-_POWERS = (2, 3)
-_HARMONICS = 6
-# largest imperfection in standard deviations; factors by which its prior is narrowed for that
-_LARGEST = 3.0
-_NARROWER, _NARROWEST = 4.0, 1e15
-# precisions over that of the prior: imperfections of half and a quarter of its size are equally likely
-_SIZES = (1.0, 4.0, 16.0)
-# least usable eigenvalue of scaled equations
-_SHOWN = 1e-11
+from separatrix.discovery.policy import FIT
 
 
 def imperfection_columns(problem: Problem, fit: Fit) -> np.ndarray:
@@ -53,8 +44,10 @@ def _columns_of_imperfections(problem: Problem, fit: Fit, usual: float | None = 
     columns = [_sensor(problem, fit)]
     if state["phase"] is not None:
         usual = usual_acceleration(problem, fit) if usual is None else usual
-        waves = [f(n * state["phase"]) for n in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
-        accelerations = IMPERFECTION_SIZE * usual * np.stack(waves, axis=2) * inside[:, :, None]
+        waves = [
+            f(n * state["phase"]) for n in range(1, FIT.imperfect_harmonics + 1) for f in (np.sin, np.cos)
+        ]
+        accelerations = FIT.imperfection_size * usual * np.stack(waves, axis=2) * inside[:, :, None]
         columns.append(force_columns(problem, fit, accelerations, 1.0))
     return np.concatenate(columns, axis=2)
 
@@ -75,15 +68,15 @@ def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
     signal = fit.evaluation.force if problem.in_force else fit.evaluation.x
     count, length = signal.shape
     records = len(problem.prepared)
-    table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
+    table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(FIT.imperfect_powers)))
     u, deviations = standardised(problem, signal)
     # also of segments that only another machine follows well
     inside = problem.segments.inside & ~fit.evaluation.failed[:, None]
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
         sigma = prepared.deviation(problem.segments.index[rows])
-        size = IMPERFECTION_SIZE * deviations[number]
-        for column, power in enumerate(_POWERS, start=number * len(_POWERS)):
+        size = FIT.imperfection_size * deviations[number]
+        for column, power in enumerate(FIT.imperfect_powers, start=number * len(FIT.imperfect_powers)):
             table[rows, :length, column] = inside[rows] * size * u[rows] ** power / sigma
     return problem.whitened(table)
 
@@ -134,19 +127,22 @@ def imperfections_of(problem: Problem, fit: Fit, usual: float) -> dict[tuple[str
     over the `usual` acceleration [m/s^2].
     """
     records = range(len(problem.prepared))
-    keys = [(f"{IMPERFECTION}curve_{power}", number) for number in records for power in _POWERS]
+    keys = [(f"{IMPERFECTION}curve_{power}", number) for number in records for power in FIT.imperfect_powers]
     curves = len(keys)
     columns = np.nan_to_num(problem.in_units(_columns_of_imperfections(problem, fit, usual)))
     columns[:, :, :, curves:] *= fit.good[:, None, None, None]
     if columns.shape[3] > curves:
-        orders = range(1, _HARMONICS + 1)
+        orders = range(1, FIT.imperfect_harmonics + 1)
         keys += [(f"{IMPERFECTION}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
     return dict(zip(keys, np.moveaxis(columns, 3, 0), strict=True))
 
 
 def as_nuisances(imperfections: dict[tuple[str, int | None], np.ndarray]) -> list[Free]:
     """The sizes of imperfections as unknowns, in standard deviations."""
-    return [Free(path, 0.0, -_LARGEST, _LARGEST, record=record, error=1.0) for path, record in imperfections]
+    return [
+        Free(path, 0.0, -FIT.imperfection_largest, FIT.imperfection_largest, record=record, error=1.0)
+        for path, record in imperfections
+    ]
 
 
 def _explained(problem: Problem, fit: Fit, known: Beside | None) -> tuple[np.ndarray, np.ndarray]:
@@ -208,9 +204,12 @@ def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray
     prior = 1.0
     while True:
         known = matrix + np.diag(np.r_[np.zeros(p), np.full(gradient.size - p, prior)])
-        if np.all(np.abs(solve_scaled(known, gradient, open_)[p:]) <= _LARGEST) or prior > _NARROWEST:
+        if (
+            np.all(np.abs(solve_scaled(known, gradient, open_)[p:]) <= FIT.imperfection_largest)
+            or prior > FIT.imperfection_narrowest
+        ):
             return known, prior
-        prior *= _NARROWER
+        prior *= FIT.imperfection_narrower
 
 
 def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -330,7 +329,7 @@ def _contest(
     without, beside = known or (None, None)
     prior = equations.narrowest(beside)
     plain = equations.of(without, None)
-    tried = [equations.of(beside, prior * narrower) for narrower in _SIZES]
+    tried = [equations.of(beside, prior * narrower) for narrower in FIT.imperfection_sizes]
     return Contest(
         plain[1],
         np.array([evidence - plain[0] for evidence, _ in tried]),
@@ -389,4 +388,4 @@ def _log_determinant(matrix: np.ndarray, open_: np.ndarray) -> float:
     shown = open_ & (np.diag(matrix) > 0)
     size = np.sqrt(np.diag(matrix)[shown])
     values = np.linalg.eigvalsh(matrix[np.ix_(shown, shown)] / np.outer(size, size))
-    return float(np.log(np.maximum(values, _SHOWN)).sum() + 2 * np.log(size).sum())
+    return float(np.log(np.maximum(values, FIT.imperfection_shown)).sum() + 2 * np.log(size).sum())

@@ -10,8 +10,7 @@ from scipy.interpolate import CubicHermiteSpline, KroghInterpolator
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-# probability, or largest deviation over the largest value, from which on a closed form fits
-LIKELY, _CLOSE = 0.01, 2e-3
+from separatrix.discovery.policy import FIT
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ def closed_forms(
             "freedom": freedom,
             "p": p,
             "deviation": deviation,
-            "fits": p > LIKELY or deviation < _CLOSE,
+            "fits": p > FIT.form_p or deviation < FIT.form_close,
             "at": fine,
             "curve": form.value(fine, *fit.x),
         }

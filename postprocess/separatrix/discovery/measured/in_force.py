@@ -9,14 +9,10 @@ import numpy as np
 from separatrix.discovery.measured.preflight import Prepared, check_velocity, velocity_noise
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.sensor_imperfections import check_clipped_force
-from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
+from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.policy import RECORDS
 from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
-
-MOST_SAMPLES = 40_000
-"""Compared samples of such a record; a longer one is averaged over neighbours."""
-# least noise of a force over its scatter: no sensor of force is better
-_EXACT = 5e-4
 
 
 def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared:
@@ -39,7 +35,7 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
         raise SeparatrixError(f"{record.file}: 'force' is constant")
     stated = record.header.get("force_noise_sigma_n") if rest is None else _at_rest(rest)
     resolution = resolution_of(record.force)
-    least = max(_EXACT * float(np.std(record.force)), resolution / np.sqrt(12))
+    least = max(RECORDS.exact_force * float(np.std(record.force)), resolution / np.sqrt(12))
     sigma = max(stated / np.sqrt(_together(record)) if stated else white_noise(record.force), least)
     if not stated:
         notes.append(f"noise of the force {sigma:.3g} {unit}, from fourth differences")
@@ -51,7 +47,7 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
         )
     of_x = max(white_noise(record.x), resolution_of(record.x) / np.sqrt(12))
     of_sensor = (record.header.get("sensor_noise_sigma_m") or 0.0) / np.sqrt(_together(record))
-    motion = max(of_sensor or of_x, QUIET * float(np.std(record.x)))
+    motion = max(of_sensor or of_x, RECORDS.quiet * float(np.std(record.x)))
     prepared = Prepared(
         record, sigma, velocity_noise(record), resolution, notes=notes, origin=float(record.t[0])
     )
@@ -74,7 +70,7 @@ def _together(record: Record) -> int:
 
 def _thinned(record: Record, notes: list[str]) -> Record:
     """Means of neighbours where there are far more samples than a law of the joint needs."""
-    count = -(-record.t.size // MOST_SAMPLES)
+    count = -(-record.t.size // RECORDS.most_in_force)
     if count == 1:
         return record
     rows, pieces = [], []

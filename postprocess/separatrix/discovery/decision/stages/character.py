@@ -21,21 +21,7 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.sensed import SensedData
-
-# least usable eigenvalue of scaled normal equations: of motions, and of forces, which are exact
-_USABLE, _EXACT = 1e-6, 1e-11
-# of the distance of the values of a constant that are tried, towards the best
-_HALVINGS = 3
-# factor of the lowest value of a constant below which a hidden state is none
-_FADED = 1.3
-# share of the best evidence from which on a variable of the same kind may be the right one, and the share of
-# the gap that the best closes from which on it is not
-_AKIN, _NEARLY_ALL = 0.4, 0.9
-
-
-# share of the gap that must be closed, linearised, for a location among several bodies: a force at a wrong
-# one closes most of a large gap, too
-_AT_LOCATION = 0.95
+from separatrix.discovery.policy import SEARCH
 
 
 @dataclass
@@ -121,7 +107,7 @@ def motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tupl
 def _known(best: Character, context: SearchContext) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = context.options
-    least = _AT_LOCATION if isinstance(context.training, SensedData) else options.characterised
+    least = SEARCH.closed_at_location if isinstance(context.training, SensedData) else options.characterised
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > least
 
 
@@ -134,8 +120,8 @@ def _akin(one: Character, best: Character) -> bool:
     """Whether only the second variable differs, which is not determined while the best leaves a gap."""
     return (
         one.hypothesis.depends_on[0] == best.hypothesis.depends_on[0]
-        and one.evidence > _AKIN * best.evidence
-        and min(best.closed, best.held_out_closed) < _NEARLY_ALL
+        and one.evidence > SEARCH.akin * best.evidence
+        and min(best.closed, best.held_out_closed) < SEARCH.nearly_all
     )
 
 
@@ -152,12 +138,12 @@ def best_of_hypothesis(training: Motion, held_out: Motion, hypothesis: Hypothesi
     if values.size > 1:
         index = int(np.searchsorted(values, best))
         step = np.diff(values)[max(0, min(index, values.size - 2))]
-        for _ in range(_HALVINGS):
+        for _ in range(SEARCH.constant_halvings):
             step /= 2
             tried |= {one: _gain(training, hypothesis, one) for one in (best - step, best + step)}
             best = max(tried, key=tried.get)
     found = _scored(training, held_out, hypothesis, best)
-    if hypothesis.fades and best < _FADED * values[0]:
+    if hypothesis.fades and best < SEARCH.faded * values[0]:
         found.evidence = -np.inf
     return found
 
@@ -221,7 +207,7 @@ def _solved(
     """Solution (0 where closed), the decrease of chi^2, and the rank."""
     scaled, size = _scaled(matrix[np.ix_(open_, open_)])
     values, vectors = np.linalg.eigh(scaled)
-    usable = values > (_EXACT if motion.problem.in_force else _USABLE)
+    usable = values > (SEARCH.usable_force if motion.problem.in_force else SEARCH.usable_motion)
     parts = vectors[:, usable].T @ (gradient[open_] / size)
     found = np.zeros(open_.size)
     found[open_] = vectors[:, usable] @ (parts / values[usable]) / size

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.misfit import MOST_IN_LOCAL_MINIMUM, missed, predicted_chi2
+from separatrix.discovery.decision.misfit import missed, predicted_chi2
 from separatrix.discovery.decision.other_machine import other_units
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate, equivalent, sizeable
@@ -17,6 +17,7 @@ from separatrix.discovery.fitting.fit import Fit, without_segments
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.fitting.rig import cleaned_prediction
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import SEARCH
 
 
 def no_effect(state: SearchState) -> SearchState:
@@ -129,7 +130,7 @@ def _gap_of_base(context: SearchContext, decision: Decision) -> tuple[list[str],
     left = [one for data, fit in fits for one in missed(data, fit, context.options)]
     wide = _wide(decision.base_ceiling, base.fit, context.options)
     in_local_minimum = suspicious(base.fit) if wide else np.zeros(0, int)
-    if 0 < in_local_minimum.size <= MOST_IN_LOCAL_MINIMUM:
+    if 0 < in_local_minimum.size <= SEARCH.most_in_local_minimum:
         others = without_segments(base.fit, in_local_minimum)
         wide = _wide(ceiling(base.problem, others, context.scales.mass), others, context.options)
     return left, wide

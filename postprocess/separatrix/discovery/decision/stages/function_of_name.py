@@ -17,8 +17,9 @@ from separatrix.discovery.decision.stages.conclusions import conclude
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.rig import share_with_imperfections
-from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY
+from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import function_of
+from separatrix.discovery.policy import FIT
 
 
 def has_function(state: SearchState) -> bool:
@@ -72,7 +73,7 @@ def table_or_form(state: SearchState) -> SearchState:
         return function_of_name(found) if has_function(found) else found
     # small imperfections of the rig bend a function, too
     own = share_with_imperfections(table.fitted, best.fitted) * function.gain
-    if chi2.sf(own, table.parameters) > LIKELY:
+    if chi2.sf(own, table.parameters) > FIT.form_p:
         return state
     first = table if passes and lead(table, best) > 0 else best
     every = {one.name: one for one in (best, *decision.rivals, table)}

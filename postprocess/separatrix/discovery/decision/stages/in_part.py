@@ -30,11 +30,7 @@ from separatrix.discovery.decision.several import fit_set, over_base, without
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.options import Options
-
-_PAIRS = 12
-_LEADERS = 2
-# share of the gap on held-out records that an effect must close to be worth a name
-_LEAST = 0.1
+from separatrix.discovery.policy import SEARCH
 
 
 def effects_in_part(state: SearchState) -> SearchState:
@@ -120,13 +116,13 @@ def _first(context: SearchContext, found: Round) -> ScoredCandidate | None:
 def _pair(context: SearchContext, found: Round) -> ScoredCandidate | None:
     """Two effects that pass only together: each alone drives the base to where it should not be."""
     seconds = []
-    for one in [one for one in found.scored if one.fitted.fit.converged][:_LEADERS]:
+    for one in [one for one in found.scored if one.fitted.fit.converged][: SEARCH.leaders_in_part]:
         # some effects need another one: presliding needs dry friction
         seconds.append(run_round(context, one.fitted, one.prediction))
     singles = [one for second in seconds for one in second.scored]
     pairs = [over_base(context, found.base, found.predicted, one) for one in singles]
     tried = {frozenset(one.fitted.names) for one in pairs}
-    for _, one, other in pair_gains(found)[:_PAIRS]:
+    for _, one, other in pair_gains(found)[: SEARCH.pairs_in_part]:
         if frozenset((one, other)) in tried:
             continue
         fitted = fit_set(context, found, (one, other))
@@ -190,7 +186,7 @@ def worth_a_name(one: ScoredCandidate, found: Round) -> bool:
 
 
 def _closes(before: float, after: float) -> bool:
-    return before - after > _LEAST * max(before - 1.0, 0.0)
+    return before - after > SEARCH.closes_in_part * max(before - 1.0, 0.0)
 
 
 def _all_needed(context: SearchContext, first: Round, one: ScoredCandidate) -> bool:

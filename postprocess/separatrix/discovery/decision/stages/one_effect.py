@@ -13,12 +13,7 @@ from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noi
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.refit import Fitted, shared_values
-
-# refits of the base, number of leading candidates whose minima they start from, least fall of chi^2
-_RENEWALS = 3
-_LEADERS = 3
-_LOWER = 1.0
-_LOWER_SHARE = 0.01
+from separatrix.discovery.policy import SEARCH
 
 
 def one_effect(state: SearchState) -> SearchState:
@@ -69,7 +64,7 @@ def _gap(context: SearchContext, found: Round) -> Ceiling:
 
 def _renewing(context: SearchContext, found: Round, measured: bool, everything: bool = False) -> Round:
     """Repeat the round as long as it shows that its base can be fitted better."""
-    for _ in range(_RENEWALS):
+    for _ in range(SEARCH.renewals):
         lower = renewed(context, found, measured)
         if lower is None:
             break
@@ -85,7 +80,7 @@ def renewed(context: SearchContext, first: Round, measured: bool = False) -> Fit
     there is not a gain of the candidate.
     """
     base = first.base
-    lowest_misfit = sorted(first.scored, key=lambda one: -one.training)[:_LEADERS]
+    lowest_misfit = sorted(first.scored, key=lambda one: -one.training)[: SEARCH.renewing_leaders]
     if not lowest_misfit:
         return None
     best = next((one for one in first.scored if one.settled), None)
@@ -97,7 +92,9 @@ def renewed(context: SearchContext, first: Round, measured: bool = False) -> Fit
     fits = [fit for fit in fits if fit.good.sum() >= fits[0].good.sum()]
     lowest = min(fits, key=lambda fit: fit.total)
     gain = (best or lowest_misfit[0]).training
-    if not changed and lowest.total > base.fit.total - max(_LOWER, _LOWER_SHARE * 2 * gain):
+    if not changed and lowest.total > base.fit.total - max(
+        SEARCH.lower_base, SEARCH.lower_base_share * 2 * gain
+    ):
         return None
     return Fitted(base.names, base.model, base.problem, lowest, base.added)
 

@@ -17,7 +17,6 @@ from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import IMPERFECTION_SIZE
 from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import (
@@ -26,11 +25,7 @@ from separatrix.discovery.fitting.rig import (
     usual_acceleration,
     weight_of_imperfections,
 )
-
-# log-likelihood in training, and its share of the gap, from which imperfections of a rig may hide an effect
-_HIDING, _HIDING_SHARE = 10.0, 0.3
-# iterations of the motion along which they act: it is that of the machine fitted beside them
-_TIMES = 2
+from separatrix.discovery.policy import FIT, SEARCH
 
 
 def hidden_by_imperfections(state: SearchState) -> bool:
@@ -41,7 +36,7 @@ def hidden_by_imperfections(state: SearchState) -> bool:
     if base.problem.in_force or not base.fit.good.any():
         return False
     weight, _ = weight_of_imperfections(base, None)
-    return weight > max(_HIDING, _HIDING_SHARE * 0.5 * base.fit.excess)
+    return weight > max(SEARCH.hiding, SEARCH.hiding_share * 0.5 * base.fit.excess)
 
 
 def beside_imperfections(state: SearchState) -> SearchState:
@@ -85,7 +80,7 @@ def _with_imperfections(
 ) -> tuple[SearchContext, Fitted] | None:
     """Records with imperfections of their rig, and the machine fitted beside these; None if the fit fails."""
     machine, values, followed = base.problem.free, base.fit.values, base.fit.good.sum()
-    for turn in range(_TIMES):
+    for turn in range(SEARCH.imperfect_rounds):
         usual = usual_acceleration(base.problem, base.fit)
         tables = imperfections_of(base.problem, base.fit, usual)
         training, held_out = context.training.with_imperfections(tables), context.held_out
@@ -107,7 +102,7 @@ def _with_imperfections(
 def in_words(fitted: Fitted) -> list[str]:
     """The sizes of imperfections that were fitted beside a machine, in a sentence; none if none were."""
     sizes = {
-        (one.path, one.record): IMPERFECTION_SIZE * abs(value)
+        (one.path, one.record): FIT.imperfection_size * abs(value)
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
         if one.is_imperfection
     }

@@ -11,9 +11,7 @@ from separatrix.discovery.decision.stages.function import only_follows
 from separatrix.discovery.decision.stages.one_effect import lead, noise_renewed
 from separatrix.discovery.decision.state import Choice, SearchState
 from separatrix.discovery.fitting.fit import minimise
-
-# share of a gap of held-out records that another effect must close
-_CLOSES = 0.5
+from separatrix.discovery.policy import SEARCH
 
 
 def another_effect(state: SearchState) -> SearchState:
@@ -27,7 +25,7 @@ def another_effect(state: SearchState) -> SearchState:
     rounds = [state.round]
     whole, others, closed = with_more(state.context, rounds, best)
     share = closed_share(best.prediction, whole.prediction) if closed and all(whole.gates.values()) else None
-    if share is None or share < _CLOSES:
+    if share is None or share < SEARCH.closes_held_out:
         return state
     return replace(state, one=Choice(whole, others), rounds_of_several=tuple(rounds[1:]))
 
