@@ -142,8 +142,7 @@ def machine_text(fitted: Fitted) -> str:
         return fitted.model.to_text(values)
     except SeparatrixError:
         ends = [values.get("contact.lower", -np.inf), values.get("contact.upper", np.inf)]
-        text = within_barriers(fitted.model.to_text({}), *ends)
-        return type(fitted.model).from_text(text).to_text(values)
+        return within_barriers(fitted.model, *ends).to_text(values)
 
 
 def machine_values(fitted: Fitted) -> dict[str, float]:
