@@ -71,7 +71,7 @@ def test_a_name_has_to_hold_against_a_hidden_state(
     fit = SimpleNamespace(reduced_chi2=1.0, excess=300.0)
     fitted = SimpleNamespace(names=("friction_curve",), fit=fit)
     name = SimpleNamespace(fitted=fitted, own_evidence=100.0, prediction=SimpleNamespace())
-    first = SimpleNamespace(base=SimpleNamespace(problem=None))
+    first = SimpleNamespace(base=SimpleNamespace(problem=SimpleNamespace(has_memories=True)))
     decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
     monkeypatch.setattr(
         hidden_state_module, "motions", lambda _, machine, prediction: (machine is fitted, None)

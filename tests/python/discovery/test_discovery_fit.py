@@ -22,6 +22,7 @@ from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
 from separatrix.discovery.fitting.base import measure_noise
+from separatrix.discovery.fitting.catalogue import names_of_body
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import blocking, minimise
 from separatrix.discovery.fitting.machine import Free
@@ -177,7 +178,7 @@ def test_what_was_not_tested_is_in_the_order_of_the_catalogue(monkeypatch):
     monkeypatch.setattr(rounds, "screen", lambda *_: None)
     monkeypatch.setattr(rounds, "choose", lambda *_: [])
     context = rounds.SearchContext(None, None, None, Options(candidates=tuple(reversed(names))))
-    problem = SimpleNamespace(free=[], in_force=False)
+    problem = SimpleNamespace(free=[], effects=names_of_body, cannot_show=lambda _: "")
     base = SimpleNamespace(names=(), model=SimpleNamespace(parameters={}), problem=problem, fit=fits)
     found = rounds.run_round(context, base, None)
     assert list(found.absent) == names
@@ -326,8 +327,8 @@ def test_a_segment_bars_the_way_of_a_step_where_it_loses_more_than_all_gain(jump
     np.testing.assert_array_equal(found, barred)
 
 
-@pytest.mark.parametrize(("in_force", "of_v"), [(False, 0.2), (True, 0.1)])
-def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, in_force, of_v):
+@pytest.mark.parametrize(("channels", "of_v"), [(2, 0.2), (1, 0.1)])
+def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, channels, of_v):
     """Only the quiet record has v; the memory of the noise is kept, because the machine misses nothing.
 
     Where the force is compared its noise is none of the velocity.
@@ -346,8 +347,8 @@ def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, in_f
         )
         for sigma, v in ((1e-3, np.zeros(3)), (1e-2, None))
     ]
-    data = SimpleNamespace(prepared=prepared)
-    measure_noise(data, SimpleNamespace(in_force=in_force), SimpleNamespace(reduced_chi2=1.0), 1.0)
+    data = SimpleNamespace(prepared=prepared, measured_by_sensor=lambda *_: False)
+    measure_noise(data, SimpleNamespace(channels=channels), SimpleNamespace(reduced_chi2=1.0), 1.0)
     assert [one.memory for one in prepared] == [0.5, 0.5]
     assert [one.velocity_sigma for one in prepared] == [of_v, 0.1]
 
@@ -382,7 +383,7 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     base = SimpleNamespace(
         names=(),
         model=SimpleNamespace(parameters={}),
-        problem=SimpleNamespace(free=[], in_force=False),
+        problem=SimpleNamespace(free=[], effects=names_of_body, cannot_show=lambda _: ""),
         fit=fits,
     )
     context = rounds.SearchContext(None, None, None, Options(candidates=("dahl", "viscous")))

@@ -17,7 +17,9 @@ from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 
 SAMPLES, SEGMENTS = 50, 20
-BODY = SimpleNamespace(model=SimpleNamespace(parameters={"restoring.stiffness"}), in_force=False)
+BODY = SimpleNamespace(
+    model=SimpleNamespace(parameters={"restoring.stiffness"}), unit=lambda units: units.position
+)
 
 
 def data(sigma: float, scatter: float) -> SimpleNamespace:
@@ -28,7 +30,8 @@ def data(sigma: float, scatter: float) -> SimpleNamespace:
         SimpleNamespace(
             record=SimpleNamespace(name=name),
             signal=np.sin(9 * t) + scatter * one,
-            in_force=False,
+            noise_key="sensor_noise_sigma_m",
+            sensor_noise={},
             sigma=sigma,
             sigma_stated=True,
             resolution=0.0,
@@ -86,7 +89,8 @@ def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, train
     # without imperfections of a rig
     monkeypatch.setattr(conclusions, "cleaned_prediction", lambda base, prediction: prediction.fit)
     context = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
-    first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
+    problem = SimpleNamespace(locates=False)
+    first = SimpleNamespace(base=SimpleNamespace(problem=problem, fit=fit(training, 1)))
     predicted = SimpleNamespace(problem=None, fit=fit(1, held_out))
     gap = SimpleNamespace(p=0.5, fit=first.base.fit)
     decision = Decision("none", [], [], [], [first], gap, predicted)

@@ -19,7 +19,7 @@ from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.heldout import Known, predict
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.rig import (
     Contest,
@@ -59,7 +59,7 @@ def fitted_base(drag: float, curved: float) -> tuple[Fitted, Model]:
 def with_drag(base: Fitted, true: Model) -> Fitted:
     """The same with the drag that it lacks, which is known."""
     old = base.problem
-    problem = Problem(true, old.prepared, old.segments, old.free)
+    problem = BodyInMotion(true, old.prepared, old.segments, old.free)
     return Fitted(("quadratic_drag",), true, problem, minimise(problem, base.fit.values, base.fit.starts), ())
 
 

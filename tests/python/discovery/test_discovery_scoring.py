@@ -40,7 +40,7 @@ def fit(chi2: np.ndarray, decrement: float = 0.0) -> Fit:
 
 
 def fitted(name: str, chi2: np.ndarray) -> Fitted:
-    problem = SimpleNamespace(free=[Free(f"effect.{name}.force", 1.0)])
+    problem = SimpleNamespace(free=[Free(f"effect.{name}.force", 1.0)], locates=False)
     return Fitted((name,) if name else (), None, problem, fit(chi2), (0,))
 
 

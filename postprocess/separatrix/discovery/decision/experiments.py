@@ -51,9 +51,9 @@ class Experiment:
 def experiments(one: Fitted, others: list[Fitted]) -> list[Experiment]:
     """Feasible experiments, the most informative first; none where the force on the body must be known."""
     first = one.problem.prepared[0]
-    if first.in_force:
+    if one.problem.experiment == "motion of the joint":
         return _along_other_motions(one, others)
-    if first.record.force is not None:
+    if not one.problem.experiment or first.record.force is not None:
         return []
     ratios = (
         [None] if first.frequency is None else [float(ratio) for ratio in np.linspace(*SEARCH.drive_ratios)]

@@ -46,7 +46,7 @@ def _promising(context: SearchContext, found: Round, ceiling: Ceiling) -> list[M
     highest = max([1e-300, *(one.evidence for one in found.scored)])
     shares = {}
     for member in MEMBERS:
-        if not fits_machine(member, found.base.model):
+        if not (found.base.problem.has_tables and fits_machine(member, found.base.model)):
             continue
         allowed = wanted is None or any(
             name == member.effect or effect_of(name).family == member.family for name in wanted

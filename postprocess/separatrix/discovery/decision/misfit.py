@@ -8,8 +8,8 @@ from scipy.stats import chi2
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, explained
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.noise import noise_of, white_share
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.signals import white_noise
@@ -114,7 +114,7 @@ def _limit(one: Prepared, options: Options) -> float:
     return one.doubt * (options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2)
 
 
-def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:
+def doubted_noise(data: Data, problem: Likelihood, fit: Fit, mass: float) -> list[str]:
     """Return in words what noise cannot be as stated or measured, by the best machine that was found.
 
     More scatter counts only if the fourth differences of the samples show it too: a machine that lacks
@@ -122,7 +122,7 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
     """
     notes = []
     units = units_of(problem.model.parameters)
-    unit = units.force if problem.in_force else units.position
+    unit = problem.unit(units)
     factors = noise_of(problem, fit, 0, mass).factors
     found = record_chi2(data, fit)
     for number, one in enumerate(data.prepared):
@@ -146,7 +146,7 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
 def _more_than_white(one: Prepared, unit: str) -> list[str]:
     """Noise that was measured as far larger than the samples scatter: coloured, or what the machine lacks."""
     white = white_noise(one.signal)
-    key = "force_noise_sigma_n" if one.in_force else "sensor_noise_sigma_m"
+    key = one.noise_key
     if (
         one.sigma < SEARCH.noise_larger * white / np.sqrt(white_share(one.memory))
         or one.resolution**2 > 3 * one.sigma**2

@@ -57,7 +57,7 @@ def other_units(data: Data, model) -> list[str]:
     """
     notes = []
     for one in data.prepared:
-        if not one.in_force:
+        if one.driven is None:
             continue
         motion, at, record = one.driven, one.driven.moves, one.record
         taken = force_needed(model, {}, motion, record.force, record.pieces)[at]

@@ -13,7 +13,6 @@ import numpy as np
 
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
@@ -73,7 +72,7 @@ def _remains(
 ) -> Remains:
     closed = closed_share(_fit_of(before), _fit_of(after))
     size = float(np.sqrt(max(0.0, _fit_of(after).sample_chi2 - 1)))
-    if size < SEARCH.worth_words or isinstance(after.problem, CoordinateProblem):
+    if size < SEARCH.worth_words or after.problem.locates:
         # with several bodies, forces at several locations explain what remains
         return Remains(use, closed, size, "")
     return Remains(use, closed, size, (known or ceiling(after.problem, after.fit, mass)).mostly)

@@ -11,7 +11,7 @@ from separatrix.discovery.fitting.catalogue import ON_REQUEST, Candidate, Scales
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
-from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of, names_for
+from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.locations import SensedScales
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import solve_scaled
@@ -156,7 +156,7 @@ def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
     absent: dict[str, str] = {}
-    every = names_for(base.model, options.candidates)
+    every = base.problem.effects(options.candidates)
     for name in every:
         if name in base.names:
             continue
@@ -165,8 +165,9 @@ def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None
         if name in ON_REQUEST and not options.candidates:
             absent[name] = ON_REQUEST[name]
             continue
-        if base.problem.in_force and effect_of(name).acts != "flight":
-            absent[name] = "it does nothing to the force along a known motion"
+        why = base.problem.cannot_show(effect_of(name))
+        if why:
+            absent[name] = why
             continue
         made = candidate_of(base.model, free, base.names, name, context.scales)
         if isinstance(made, str):

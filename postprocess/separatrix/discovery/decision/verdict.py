@@ -17,18 +17,16 @@ from separatrix.discovery.decision.scoring import LARGER_NOISE, LITTLE, ScoredCa
 from separatrix.discovery.decision.stages.rig_imperfections import in_words
 from separatrix.discovery.decision.state import Decision, Step
 from separatrix.discovery.decision.where import Map, sentences, where_maps
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_effects import effect_of, location_of
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import Function, Part
-from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.policy import FIT, SEARCH
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
@@ -71,7 +69,9 @@ def verdict_of(findings: Findings) -> dict:
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
-        "locations": _locations(final, named, decision),
+        "locations": findings.base.problem.locations(
+            [*named, *(name for names in decision.alternatives for name in names)]
+        ),
         "families": [effect_of(name).family for name in final.names],
         "function": _function(decision.function, final),
         "character": [one.as_dict() for one in decision.characters],
@@ -101,26 +101,11 @@ def verdict_of(findings: Findings) -> dict:
     }
 
 
-def _locations(final: Fitted, named: list[str], decision: Decision) -> dict[str, str]:
-    """Locations of the effects of the verdict in a machine of several bodies, in words; none of one body."""
-    if not isinstance(final.problem, CoordinateProblem):
-        return {}
-    structure = decision.rounds[0].base.problem.structure
-    every = [*named, *(name for names in decision.alternatives for name in names)]
-    found = {}
-    for name in every:
-        where = location_of(name)
-        known = [one.text() for one in structure.locations if one.name == where or where in one.joints]
-        found[name] = known[0] if known else where
-    return found
-
-
 def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     """What to measure next where the name is in doubt: known advice, experiments by their d'."""
     if findings.decision.outcome != "ambiguous":
         return {"separating_experiment": "", "experiments": []}
-    if isinstance(final.problem, CoordinateProblem):
-        # experiments are flown by one body
+    if not final.problem.experiment:
         return {"separating_experiment": "", "experiments": []}
     others = rivals[: SEARCH.experiment_rivals] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
@@ -235,11 +220,10 @@ def _notes(findings: Findings) -> list[str]:
     notes += in_words(fits[0][2])
     for _, data, fitted in fits:
         notes += other_phase(data, fitted)
-        if isinstance(fitted.problem, CoordinateProblem):
-            continue
-        notes += doubted_noise(data, fitted.problem, fitted.fit, context.scales.mass)
-    several = isinstance(findings.base.problem, CoordinateProblem)
-    notes += [] if several else other_machine(context.training, fits[0][2], context.options)
+        if fitted.problem.one_signal:
+            notes += doubted_noise(data, fitted.problem, fitted.fit, context.scales.mass)
+    if findings.base.problem.one_signal:
+        notes += other_machine(context.training, fits[0][2], context.options)
     notes += other_units(context.training, findings.base.model)
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(context.training, findings.base)
@@ -317,8 +301,8 @@ def _records(findings: Findings) -> list[dict]:
                     "sensor_bias": machine.get(SENSOR_BIAS),
                 }
             )
-            if isinstance(one, SensedPrepared):
-                found[-1]["sensors"] = {sensor.name: sensor.sigma for sensor in one.sensors}
+            if one.sensor_noise:
+                found[-1]["sensors"] = one.sensor_noise
     return found
 
 

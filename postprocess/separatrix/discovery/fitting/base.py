@@ -6,19 +6,18 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
-from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances, sensor_zeros
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.noise import noise_of
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import cleaned
-from separatrix.discovery.fitting.sensed import SensedData, joint_parameters, measure_sensors
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.policy import FIT
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can determine; sets noise and memory of the records."""
-    free = _free(data, model)
+    free = data.unknowns(model)
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
     problem, fit = fit_stages(data, model, free, values, stages=[0, 1])
@@ -53,23 +52,12 @@ def _follows_better(fit: Fit, best: Fit) -> bool:
     return bool(now >= kept and fit.total < best.total)
 
 
-def _free(data: Data, model) -> list[Free]:
-    """What is free in the base machine."""
-    if isinstance(data, SensedData):
-        forces = any(sensor.kind == "F" for one in data.prepared for sensor in one.sensors)
-        return joint_parameters(model, forces) + drive_nuisances(model, data.prepared)
-    force = any(one.record.force is not None for one in data.prepared)
-    free = base_parameters(model, force, data.prepared[0].in_force) + drive_nuisances(model, data.prepared)
-    return free + sensor_zeros(free, len(data.prepared))
-
-
-def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
+def measure_noise(data: Data, problem: Likelihood, fit: Fit, mass: float) -> None:
     """Set what the records do not state.
 
     The fit must have been made without memory.
     """
-    if isinstance(data, SensedData):
-        measure_sensors(data, problem, fit)
+    if data.measured_by_sensor(problem, fit):
         return
     found = noise_of(problem, fit, 0, mass)
     factors = found.factors
@@ -78,7 +66,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
-    if not problem.in_force and any(one.record.v is not None for one in data.prepared):
+    if problem.channels > 1:
         # products of velocities in condensed blocks are not kept
         memory = found.memory if found.of_samples else None
         speeds = noise_of(problem, fit, 1, mass, memory).factors
@@ -97,7 +85,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         prepared.memory_error = found.error
 
 
-def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
+def renew_noise(data: Data, problem: Likelihood, fit: Fit, mass: float) -> bool:
     """Measure the noise anew by a better fit; whether it changed enough to matter (else it stays)."""
     before = [one.noise for one in data.prepared]
     for one in data.prepared:
@@ -145,7 +133,7 @@ def limit_noise(source: Data, target: Data) -> bool:
 
     A missing effect would hide in the noise of records that are too short to measure the noise again.
     """
-    if isinstance(source, SensedData):
+    if any(one.sensor_noise for one in source.prepared):
         # nothing of theirs is measured on short records alone
         return False
     shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.signal)) > 0]

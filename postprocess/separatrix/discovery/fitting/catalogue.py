@@ -6,7 +6,7 @@ A size to start from is a few per cent of the machine's own forces, lengths and 
 """
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,7 +15,7 @@ import numpy as np
 from separatrix.cases import toml
 from separatrix.discovery.fitting.machine import Free, bounds_of
 from separatrix.discovery.policy import FIT
-from separatrix.errors import SeparatrixError
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Effect, effects
 
 
@@ -32,6 +32,11 @@ class Scales:
     lowest: float
     highest: float
     interval: float
+
+    @property
+    def frequency(self) -> float:
+        """Angular frequency of the motion [rad/s]."""
+        return self.speed / self.length
 
 
 Starts = Callable[[Scales], dict[str, list[float]]]
@@ -86,6 +91,21 @@ STARTS: dict[str, Starts] = {
 
 All else that is known of an effect stands in the tables of laws, which the library hands out (`effects`).
 """
+
+
+def names_of_body(asked: tuple[str, ...] | None) -> list[str]:
+    """Names of all effects that one body may lack, of those that were asked for."""
+    refuse_unknown(asked, STARTS)
+    return [name for name in STARTS if not asked or name in asked]
+
+
+def refuse_unknown(asked: tuple[str, ...] | None, known: Iterable[str]) -> None:
+    """Refuse effects that a machine cannot have."""
+    unknown = [name for name in asked or () if name not in known]
+    if unknown:
+        raise SeparatrixError(
+            f"effects: found {', '.join(unknown)}, allowed for this machine {', '.join(known)}", USAGE
+        )
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,11 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, beaten, values_of
 from separatrix.discovery.fitting.shapes import through
-from separatrix.discovery.measured.bodies import is_structure
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
@@ -24,9 +23,6 @@ from separatrix.library import effects
 
 def fits_machine(member: Member, model) -> bool:
     """Whether a machine has what the table changes."""
-    if is_structure(model):
-        # its joints have no tables
-        return False
     needs = effects()[member.effect].needs
     has = all(
         any(path == need or path.startswith(f"{need}.") for path in model.parameters)
@@ -118,7 +114,7 @@ def with_table(
     knots: np.ndarray,
     begun: list[np.ndarray],
     alike: bool,
-) -> tuple[object, Problem, np.ndarray] | None:
+) -> tuple[object, Likelihood, np.ndarray] | None:
     """The base machine with a table in place of an effect, its problem, and the values that it begins from.
 
     `begun`: the function at the knots, for each direction; None where there is no such machine.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.normal_equations import (
     Blocks,
     Reduced,
@@ -14,7 +15,6 @@ from separatrix.discovery.fitting.normal_equations import (
     eliminate,
     gauss_newton_step,
 )
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.policy import FIT
 
 
@@ -120,7 +120,7 @@ class Fit:
 
 
 def minimise(
-    problem: Problem,
+    problem: Likelihood,
     values: np.ndarray,
     starts: np.ndarray,
     *,
@@ -185,7 +185,7 @@ class _Descent:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: Likelihood,
         values: np.ndarray,
         starts: np.ndarray,
         movable: np.ndarray,
@@ -282,7 +282,7 @@ class _Descent:
         return bool(self.gain < 0.02 * self.before and self.before > limit * max(1, self.count))
 
 
-def blocking(problem: Problem, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+def blocking(problem: Likelihood, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Segments that lose more by a Gauss-Newton step than it promises in total, and so block it."""
     descent = _Descent(problem, values, starts, np.ones(values.size, bool), False, None)
     descent.look(0.0, rough=False)
@@ -300,7 +300,7 @@ def without_segments(fit: Fit, rows: np.ndarray) -> Fit:
     return replace(fit, evaluation=replace(fit.evaluation, steady=steady))
 
 
-def again(problem: Problem, fit: Fit) -> Fit:
+def again(problem: Likelihood, fit: Fit) -> Fit:
     """The same values and starts, evaluated with the noise as it is known now."""
     current = problem.evaluate(fit.values, fit.starts)
     found = _finished(problem, fit.values, fit.starts, current, fit.movable, fit.iterations)

@@ -16,8 +16,8 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free, drive_amplitudes, on_other_records
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
@@ -30,7 +30,7 @@ class Prediction:
     score: np.ndarray
     good: np.ndarray
     record: np.ndarray
-    problem: Problem
+    problem: Likelihood
     fit: Fit
     # reduced chi^2 of the training records, at least 1
     misfit: float

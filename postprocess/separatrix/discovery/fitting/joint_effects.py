@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import Candidate, Scales, candidate, refuse_unknown
 from separatrix.discovery.fitting.locations import LocationScales, SensedScales
 from separatrix.discovery.fitting.machine import Free, bounds_of
 from separatrix.discovery.measured.bodies import (
@@ -21,11 +21,10 @@ from separatrix.discovery.measured.bodies import (
     Location,
     Structure,
     edited,
-    is_structure,
     structure_of,
 )
 from separatrix.discovery.policy import FIT
-from separatrix.errors import USAGE, SeparatrixError
+from separatrix.errors import SeparatrixError
 from separatrix.library import Effect, effects
 
 AT = "@"
@@ -221,16 +220,9 @@ def location_of(name: str) -> str:
     return name.partition(AT)[2]
 
 
-def names_for(model, asked: tuple[str, ...] | None) -> list[str]:
-    """Names of all effects that a machine may lack, of those that were asked for."""
-    known = JOINT_EFFECTS if is_structure(model) else STARTS
-    unknown = [name for name in asked or () if name not in known]
-    if unknown:
-        raise SeparatrixError(
-            f"effects: found {', '.join(unknown)}, allowed for this machine {', '.join(known)}", USAGE
-        )
-    if not is_structure(model):
-        return [name for name in STARTS if not asked or name in asked]
+def names_at_joints(model, asked: tuple[str, ...] | None) -> list[str]:
+    """Names of all effects that a machine of several bodies may lack, of those that were asked for."""
+    refuse_unknown(asked, JOINT_EFFECTS)
     structure = structure_of(model)
     return [
         f"{kind}{AT}{location}"

@@ -8,14 +8,14 @@ what is not a missing effect.
 
 import numpy as np
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.joint_response import columns_of, sigmas_of
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import clock_of, knots_of, splines
 from separatrix.discovery.policy import FIT
 
 
-def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
+def families_of(problem: Likelihood, fit: Fit) -> dict[str, np.ndarray]:
     """Columns of families of forces by name: over speed, extension and time at locations, phase, kicks."""
     structure, n = problem.structure, problem.structure.n
     good = problem.segments.inside & fit.good[:, None]
@@ -44,7 +44,7 @@ def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     return found
 
 
-def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
+def kicks_of(problem: Likelihood, fit: Fit) -> dict[str, np.ndarray]:
     """Kicks at the impacts of each contact by its path: a cubic of the speed before."""
     structure = problem.structure
     times = problem.sample_times()
@@ -68,7 +68,7 @@ def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     return found
 
 
-def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
+def imperfection_columns_of(problem: Likelihood, fit: Fit) -> np.ndarray:
     """Columns of small imperfections of a rig: slightly nonlinear sensors, further harmonics of a drive."""
     count, length = problem.segments.inside.shape
     good = problem.segments.inside & fit.good[:, None]

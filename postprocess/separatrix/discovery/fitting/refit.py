@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from separatrix.discovery.fitting.catalogue import Candidate
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.data import Data, fit_stages, polished
 from separatrix.discovery.fitting.fit import Fit, blocking, minimise
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.screen import Screened
 from separatrix.discovery.policy import FIT
 
@@ -23,7 +22,7 @@ class Fitted:
 
     names: tuple[str, ...]
     model: object
-    problem: Problem
+    problem: Likelihood
     fit: Fit
     added: tuple[int, ...]
     tries: int = 1
@@ -219,7 +218,7 @@ def _try(
     values: np.ndarray,
     most: int,
     beat: float | None = None,
-) -> tuple[Problem, Fit]:
+) -> tuple[Likelihood, Fit]:
     """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = data.problem(candidate.model, data.last, candidate.free)
@@ -263,7 +262,7 @@ def imitating(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     others = ~np.isin(np.arange(own.size), candidate.added)
     sized = minimise(one.problem, own, other.fit.starts, most=8, fixed=others, rough=True)
     found = _from(data, found, sized.values, other)
-    if gain_over(other, found)[0] < FIT.imitated_behind or isinstance(one.problem, CoordinateProblem):
+    if gain_over(other, found)[0] < FIT.imitated_behind:
         return found
     return _imitated(data, found, other, candidate)
 
@@ -281,7 +280,10 @@ def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     # this motion excludes imperfections of the rig
     imperfections = np.array([free.is_imperfection for free in one.problem.free])
     begun = np.where(imperfections, 0.0, known)
-    fit = minimise(one.problem.imitating(motion), begun, other.fit.starts, most=8, fixed=imperfections)
+    imitating = one.problem.imitating(motion)
+    if imitating is None:
+        return one
+    fit = minimise(imitating, begun, other.fit.starts, most=8, fixed=imperfections)
     starts = other.fit.starts + (fit.starts - other.fit.starts) / FIT.imitated_share
     values = known + (fit.values - begun) / FIT.imitated_share
     lower, upper = (

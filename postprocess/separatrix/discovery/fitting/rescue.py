@@ -6,7 +6,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.policy import FIT
 
 # starts tried, in standard errors of the smoother
@@ -23,7 +23,7 @@ def suspicious(fit: Fit) -> np.ndarray:
 
 
 def rescued(
-    problem: Problem, fit: Fit, suspects: np.ndarray, guesses: list[np.ndarray], spread: np.ndarray
+    problem: Likelihood, fit: Fit, suspects: np.ndarray, guesses: list[np.ndarray], spread: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Starts of all segments, the suspects improved where possible, and which were.
 
@@ -78,7 +78,9 @@ def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
     return np.sort([one for one in kept if np.isfinite(cost[one])]).astype(int)
 
 
-def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solve_starts(
+    problem: Likelihood, values: np.ndarray, starts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Fit the start of each segment by itself, the machine fixed; also the chi^2.
 
     Each keeps its number of impacts: next to a graze a step would leave the minimum with one more unseen.

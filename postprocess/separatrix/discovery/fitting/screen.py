@@ -15,8 +15,8 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.normal_equations import solve_scaled
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.policy import FIT
 
 
@@ -57,7 +57,7 @@ class Screened:
         return float(self.cosines[self.names.index(one), self.names.index(other)])
 
 
-def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None:
+def signature(base: Likelihood, fit: Fit, candidate: Candidate) -> Signature | None:
     """Signature of the added effect at the fitted base, in its form of largest gain; None without one."""
     by_path = {(one.path, one.record): value for one, value in zip(base.free, fit.values, strict=True)}
     values = np.array([by_path.get((one.path, one.record), one.value) for one in candidate.free])
@@ -74,7 +74,7 @@ def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None
     return best
 
 
-def _shown(problem: Problem, fit: Fit, candidate: Candidate, values: np.ndarray) -> Signature | None:
+def _shown(problem: Likelihood, fit: Fit, candidate: Candidate, values: np.ndarray) -> Signature | None:
     """The signature at given shape parameters."""
     added = list(candidate.added)
     good = fit.good

@@ -14,7 +14,7 @@ import numpy as np
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.data import Data, oscillation_samples
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.machine import Free, bounds_of
+from separatrix.discovery.fitting.machine import Free, bounds_of, drive_nuisances
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.rescue import solve_starts
 from separatrix.discovery.measured.bodies import Structure, structure_of
@@ -44,6 +44,21 @@ class SensedData(Data):
     def problem(self, model, stage: int, free: list[Free]) -> CoordinateProblem:
         """The fit of a model to the segments of a stage."""
         return CoordinateProblem(model, self.prepared, self.stages[stage], free)
+
+    def unknowns(self, model) -> list[Free]:
+        """What is free in the base machine."""
+        forces = any(sensor.kind == "F" for one in self.prepared for sensor in one.sensors)
+        return joint_parameters(model, forces) + drive_nuisances(model, self.prepared)
+
+    def measured_by_sensor(self, problem: CoordinateProblem, fit: Fit) -> bool:
+        """Measure the noise of each sensor."""
+        measure_sensors(self, problem, fit)
+        return True
+
+    def details(self, number: int) -> dict[str, tuple[np.ndarray, dict]]:
+        """What each sensor shows: there is no motion of one body."""
+        sensors = {one.name: (one.values, {"sigma": one.sigma}) for one in self.prepared[number].sensors}
+        return sensors | {"impacts": (np.zeros((0, 6)), {})}
 
     def smoothed_starts(self, stage: int) -> np.ndarray:
         """Starts (segments, 2 n) of a stage: smoothed where there is a sensor, guessed elsewhere."""

@@ -3,6 +3,7 @@
 """Properties of a record before any fit: noise, resolution, drive, delay of channels."""
 
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from separatrix.discovery.measured.condense import Samples, whole
 from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.smoother import Smoothed
 from separatrix.discovery.policy import RECORDS
 from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
@@ -43,13 +45,12 @@ class Prepared:
     notes: list[str] = field(default_factory=list)
     # fitted rows: all samples, or fewer with the same information
     samples: Samples | None = None
-    # whether the force is compared: sigma and resolution are its own, the motion is known
-    in_force: bool = False
+    # the known motion, where the force is compared
     driven: Driven | None = None
-    # noise of the positions of such a record
-    motion_sigma: float = 0.0
-    # of the case [kg]
-    mass: float = 0.0
+
+    # key of the header that states the noise; whether the mass is nearly that of the case
+    noise_key: ClassVar[str] = "sensor_noise_sigma_m"
+    near_mass: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Fit every sample by default."""
@@ -59,8 +60,7 @@ class Prepared:
     @property
     def noise(self) -> tuple:
         """Memory of the noise, and its size in each column that is compared."""
-        velocity = self.record.v is not None and not self.in_force
-        return (self.memory, self.sigma, *((self.velocity_sigma,) if velocity else ()))
+        return (self.memory, self.sigma, *(() if self.record.v is None else (self.velocity_sigma,)))
 
     @noise.setter
     def noise(self, known: tuple) -> None:
@@ -78,17 +78,30 @@ class Prepared:
         return 1 + 2 * self.memory_error * 2 * self.memory / (1 - self.memory**2)
 
     @property
+    def column(self) -> np.ndarray:
+        """The column of one body that is compared."""
+        return self.record.x
+
+    @property
     def signal(self) -> np.ndarray:
-        """What is compared: position, or force."""
-        return self.record.force if self.in_force else self.record.x
+        """What is compared first."""
+        return self.column
+
+    @property
+    def sensor_noise(self) -> dict[str, float]:
+        """Noise of each sensor, where there are several."""
+        return {}
+
+    def details(self) -> dict[str, tuple[np.ndarray, dict]]:
+        """Columns beside t and x that are compared, with attributes."""
+        return {}
+
+    def known_motion(self, oscillation: float) -> Smoothed | None:
+        """The motion, where it is known and not compared."""
+        return None
 
     def deviation(self, rows: np.ndarray) -> np.ndarray:
-        """Standard deviation of the noise of what is compared at some rows.
-
-        That of a force has the error of mass times acceleration in it.
-        """
-        if self.in_force:
-            return np.hypot(self.sigma, self.driven.inertia_error)[rows]
+        """Standard deviation of the noise of what is compared at some rows."""
         return self.sigma * self.samples.spread(self.memory)[rows]
 
     @property

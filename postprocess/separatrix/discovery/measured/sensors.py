@@ -63,6 +63,11 @@ class SensedPrepared(Prepared):
             one.sigma = sigma
         self.sigma = self.sensors[0].sigma
 
+    @property
+    def sensor_noise(self) -> dict[str, float]:
+        """Noise of each sensor."""
+        return {one.name: one.sigma for one in self.sensors}
+
     def sensor(self, name: str) -> Sensor | None:
         """The sensor of a column, if this record has it."""
         return next((one for one in self.sensors if one.name == name), None)

@@ -38,7 +38,7 @@ class Search:
         "least share of the best evidence for imperfections to be weighed")
     weighed: int = row(8, "1", "effort", "number of candidates beside which imperfections are weighed")
     linear_error: float = row(0.1, "1", "rig", "relative error of what linearised imperfections explain")
-    # decision/hypotheses.py
+    # fitting/hypotheses.py
     coherent_periods: int = row(12, "period", "rig",
         "periods over which an oscillation of a parameter keeps its phase")
     waves: tuple = row((0.3, 4.0), "1", "campaign",
@@ -59,7 +59,7 @@ class Search:
         "least number of samples after impacts for one about their time")
     shortest_way: float = row(2e-3, "1", "campaign", "shortest way after a turning point over the longest")
     way_knots: int = row(12, "1", "campaign", "knots of a function of that way")
-    # decision/joint_hypotheses.py
+    # fitting/joint_hypotheses.py
     joint_knots: int = row(8, "1", "campaign", "knots of a force of one joint")
     joint_knots_of_two: int = row(4, "1", "campaign", "knots in each variable of a force of two")
     joint_harmonics: int = row(3, "1", "campaign", "harmonics of the drive phase of such a force")

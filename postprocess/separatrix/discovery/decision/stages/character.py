@@ -11,16 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, motion_of
-from separatrix.discovery.decision.joint_hypotheses import hypotheses_at, motion_at
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import family_wise
 from separatrix.discovery.decision.state import Decision, SearchState
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.hypotheses import Hypothesis, Motion
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.sensed import SensedData
 from separatrix.discovery.policy import SEARCH
 
 
@@ -79,15 +76,10 @@ def character(state: SearchState) -> SearchState:
 def characterised(context: SearchContext, decision: Decision) -> Decision:
     """The decision with what is known of an unnamed gap; unchanged where nothing is certain."""
     base, predicted = decision.rounds[0].base, decision.predicted
-    if isinstance(base.problem, CoordinateProblem):
-        training, held_out = motion_at(base, context.training), motion_at(predicted, context.held_out)
-        tried = hypotheses_at(training)
-    else:
-        training, held_out = motions(context, base, predicted)
-        tried = hypotheses(training)
-    found = [best_of_hypothesis(training, held_out, one) for one in tried]
+    training, held_out = motions(context, base, predicted)
+    found = [best_of_hypothesis(training, held_out, one) for one in base.problem.hypotheses(training)]
     best = max(found, key=lambda one: one.evidence)
-    if not _known(best, context):
+    if not _known(best, context, base.problem.locates):
         return replace(decision, suspected=best if _likely(best, context) else None)
     others: dict[tuple[str, ...], Character] = {}
     for one in sorted(found, key=lambda one: -one.evidence):
@@ -98,16 +90,17 @@ def characterised(context: SearchContext, decision: Decision) -> Decision:
 
 
 def motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
-    """The motion of one body in training and on held-out records."""
-    natural = _natural_frequency(context)
-    training, held_out = (motion_of(one, context.scales.mass, natural) for one in (base, predicted))
+    """The motion in training and on held-out records."""
+    pairs = (base, context.training), (predicted, context.held_out)
+    mass, natural = context.scales.mass, _natural_frequency(context)
+    training, held_out = (one.problem.motion(one.fit, data, mass, natural) for one, data in pairs)
     return training, held_out
 
 
-def _known(best: Character, context: SearchContext) -> bool:
+def _known(best: Character, context: SearchContext, located: bool) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = context.options
-    least = SEARCH.closed_at_location if isinstance(context.training, SensedData) else options.characterised
+    least = SEARCH.closed_at_location if located else options.characterised
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > least
 
 
@@ -163,7 +156,7 @@ def _movable(motion: Motion) -> np.ndarray:
     A bound that the machine ran into without it holds them, but where the force is compared: that is so
     nearly linear in them that they may come back from anywhere.
     """
-    return ~motion.fit.at_bound | motion.problem.in_force
+    return ~motion.fit.at_bound | motion.problem.exact
 
 
 def _scored(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant: float) -> Character:
@@ -207,7 +200,7 @@ def _solved(
     """Solution (0 where closed), the decrease of chi^2, and the rank."""
     scaled, size = _scaled(matrix[np.ix_(open_, open_)])
     values, vectors = np.linalg.eigh(scaled)
-    usable = values > (SEARCH.usable_force if motion.problem.in_force else SEARCH.usable_motion)
+    usable = values > (SEARCH.usable_force if motion.problem.exact else SEARCH.usable_motion)
     parts = vectors[:, usable].T @ (gradient[open_] / size)
     found = np.zeros(open_.size)
     found[open_] = vectors[:, usable] @ (parts / values[usable]) / size
@@ -245,4 +238,4 @@ def _predicted_fall(
 def _natural_frequency(context: SearchContext) -> float:
     """That of the machine of the case [rad/s], or where it has none, of its motion in the records."""
     stated = next((one.natural for one in context.training.prepared if one.natural), None)
-    return stated or context.scales.speed / context.scales.length
+    return stated or context.scales.frequency

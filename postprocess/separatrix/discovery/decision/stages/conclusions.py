@@ -12,7 +12,6 @@ from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate, equivalent, sizeable
 from separatrix.discovery.decision.state import Choice, Decision, SearchState
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, without_segments
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.fitting.rig import cleaned_prediction
@@ -82,8 +81,7 @@ def without_name(context: SearchContext, decision: Decision) -> Decision:
         decision = decision.because(_no_gap(context, decision))
     if wide:
         # with several bodies, forces at several locations explain a large gap
-        several = isinstance(decision.rounds[0].base.problem, CoordinateProblem)
-        name = "" if several else decision.base_ceiling.mostly
+        name = "" if decision.rounds[0].base.problem.locates else decision.base_ceiling.mostly
         what = f"forces that depend on {name}" if name else "free forces"
         decision = decision.because(f"{what} would explain more, no effect does")
     return replace(decision, outcome="not-in-catalogue") if left or wide else decision

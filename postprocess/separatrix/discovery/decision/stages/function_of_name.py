@@ -15,7 +15,6 @@ from separatrix.discovery.decision.gates import pass_gates, score_ceiling, weigh
 from separatrix.discovery.decision.scoring import clear_of, lead
 from separatrix.discovery.decision.stages.conclusions import conclude
 from separatrix.discovery.decision.state import SearchState
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.rig import share_with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import function_of
@@ -25,7 +24,7 @@ from separatrix.discovery.policy import FIT
 def has_function(state: SearchState) -> bool:
     """Whether the machine that goes on is of one body and has an effect."""
     corrected = state.decision.corrected
-    return corrected is not None and not isinstance(corrected.fitted.problem, CoordinateProblem)
+    return corrected is not None and corrected.fitted.problem.has_tables
 
 
 def function_of_name(state: SearchState) -> SearchState:

@@ -7,10 +7,9 @@ The catalogue has no hidden state, and a function of speed, position or phase re
 
 from dataclasses import replace
 
-from separatrix.discovery.decision.hypotheses import memories
 from separatrix.discovery.decision.stages.character import best_of_hypothesis, characterised, has_gap, motions
 from separatrix.discovery.decision.state import SearchState
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.fitting.hypotheses import memories
 from separatrix.discovery.fitting.rig import evidence_of_imperfections
 
 
@@ -19,7 +18,7 @@ def can_be_hidden(state: SearchState) -> bool:
     accepted = state.decision.accepted
     if not accepted or accepted[0].prediction is None or not has_gap(state):
         return False
-    return not (state.context.options.quick or isinstance(state.round.base.problem, CoordinateProblem))
+    return state.round.base.problem.has_memories and not state.context.options.quick
 
 
 def hidden_state(state: SearchState) -> SearchState:

@@ -14,26 +14,25 @@ import numpy as np
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.decision.state import Decision, SearchState
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import (
     as_nuisances,
     imperfections_of,
-    usual_acceleration,
     weight_of_imperfections,
 )
+from separatrix.discovery.fitting.rig_columns import usual_acceleration
 from separatrix.discovery.policy import FIT, SEARCH
 
 
 def hidden_by_imperfections(state: SearchState) -> bool:
     """Whether there is no name and imperfections explain much of the residual in training."""
     base = state.round.base
-    if _sure(state.decision) or state.context.options.quick or isinstance(base.problem, CoordinateProblem):
+    if _sure(state.decision) or state.context.options.quick or not base.problem.fits_imperfections:
         return False
-    if base.problem.in_force or not base.fit.good.any():
+    if not base.fit.good.any():
         return False
     weight, _ = weight_of_imperfections(base, None)
     return weight > max(SEARCH.hiding, SEARCH.hiding_share * 0.5 * base.fit.excess)
@@ -65,7 +64,7 @@ def _sure(decision: Decision) -> bool:
 
 def _small(one: ScoredCandidate) -> bool:
     """Whether no fitted imperfection is at its largest size; a larger one is not an imperfection."""
-    pairs: list[tuple[Problem, Fit]] = [(one.fitted.problem, one.fitted.fit)]
+    pairs: list[tuple[Likelihood, Fit]] = [(one.fitted.problem, one.fitted.fit)]
     if one.prediction is not None:
         pairs.append((one.prediction.problem, one.prediction.fit))
     return not any(

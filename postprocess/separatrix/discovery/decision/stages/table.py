@@ -10,7 +10,6 @@ from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.decision.stages.character import Character
 from separatrix.discovery.decision.state import Decision, SearchState
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import fits_machine
 from separatrix.discovery.fitting.members import MEMBERS
 
@@ -30,7 +29,7 @@ def with_law(context: SearchContext, decision: Decision) -> Decision:
         if not isinstance(found, ScoredCandidate):
             return decision
         return replace(decision, outcome="characterised", characters=[decision.suspected], added=found)
-    if isinstance(decision.rounds[0].base.problem, CoordinateProblem):
+    if not decision.rounds[0].base.problem.has_tables:
         return replace(decision, not_added="nothing is added to the case: tables are laws of one body")
     reasons = []
     for character in decision.characters:

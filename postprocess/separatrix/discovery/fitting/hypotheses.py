@@ -7,14 +7,14 @@ may have columns with separate coefficients for each interval of a record: an os
 the initial value of a hidden state.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import (
     after_impacts,
     extensions,
@@ -24,9 +24,6 @@ from separatrix.discovery.fitting.motions import (
     scaled_motion,
     splines,
 )
-from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.response import force_columns, kick_columns
 from separatrix.discovery.policy import SEARCH
 
 Columns = np.ndarray | None
@@ -36,7 +33,7 @@ Columns = np.ndarray | None
 class Motion:
     """A fitted motion of training or held-out records; times are from the start of each record [s]."""
 
-    problem: Problem
+    problem: Likelihood
     fit: Fit
     mass: float
     # natural frequency [rad/s]
@@ -79,9 +76,8 @@ class Hypothesis:
     values: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
 
-def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
+def motion_of(problem: Likelihood, fit: Fit, mass: float, natural: float) -> Motion:
     """The motion of a fit."""
-    problem, fit = one.problem, one.fit
     t = np.zeros(problem.segments.inside.shape)
     frequency = natural
     for number, prepared in enumerate(problem.prepared):
@@ -95,18 +91,20 @@ def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
     return Motion(problem, fit, mass, natural, coherence_time, t, phase, spring, good)
 
 
-def hypotheses(training: Motion) -> Iterator[Hypothesis]:
-    """All that are tried; knots and scales are those of the training records."""
+def hypotheses(training: Motion, more: Iterable[Hypothesis] = ()) -> Iterator[Hypothesis]:
+    """All that are tried, and `more`; knots and scales are those of the training records."""
     yield from _smooth(training)
     yield from _times(training)
     yield from memories(training)
-    if training.problem.in_force:
-        yield _after_turning(training)
-        yield Hypothesis(
-            ("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record"
-        )
+    yield from more
     if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= SEARCH.impacts_of_hypothesis:
         yield from _at_impacts(training)
+
+
+def of_known_motion(training: Motion) -> Iterator[Hypothesis]:
+    """Those of a force along a known motion: its way since it turned, the drift of its sensor."""
+    yield _after_turning(training)
+    yield Hypothesis(("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record")
 
 
 def _smooth(training: Motion) -> Iterator[Hypothesis]:
@@ -227,7 +225,7 @@ def _at_impacts(training: Motion) -> Iterator[Hypothesis]:
         return (at * speed * (before / speed) ** power)[:, :, None]
 
     def kick(m: Motion, changes: np.ndarray) -> np.ndarray:
-        return kick_columns(m.problem, m.fit, changes)
+        return m.problem.kick_columns(m.fit, changes)
 
     yield Hypothesis(
         ("impact speed",),
@@ -260,7 +258,7 @@ def _function(depends_on: tuple[str, ...], values: Callable, formula: str = "") 
 
 
 def _force(m: Motion, values: np.ndarray) -> np.ndarray:
-    return force_columns(m.problem, m.fit, values, m.mass)
+    return m.problem.force_columns(m.fit, values, m.mass)
 
 
 def _frequencies(m: Motion, ends: tuple[float, float]) -> np.ndarray:

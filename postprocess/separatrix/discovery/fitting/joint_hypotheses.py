@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.decision.hypotheses import Hypothesis, Motion
-from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.hypotheses import Hypothesis, Motion
 from separatrix.discovery.fitting.joint_forces import kicks_of
 from separatrix.discovery.fitting.joint_response import columns_of
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import clock_of, knots_of, products, splines
-from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.sensed import SensedData
 from separatrix.discovery.policy import FIT, SEARCH
 
 
@@ -27,9 +26,8 @@ class SensedMotion(Motion):
     measured: np.ndarray | None = None
 
 
-def motion_at(one: Fitted | Prediction, data: SensedData) -> SensedMotion:
+def motion_at(problem: Likelihood, fit: Fit, data: object) -> SensedMotion:
     """The motion of a fit of several bodies; `t` is the time over a record, -1 to 1."""
-    problem, fit = one.problem, one.fit
     good = problem.segments.inside & fit.good[:, None]
     time, phase = clock_of(problem, fit)
     measured = fit.evaluation.motion.copy()
