@@ -36,9 +36,9 @@ def test_stages_have_names_of_their_own_and_a_reason() -> None:
 def test_a_stage_runs_where_it_applies_and_leaves_a_step(monkeypatch) -> None:
     found = walked(
         monkeypatch,
-        Stage("first", lambda state: state.open, "nothing is decided", decides),
-        Stage("second", lambda state: state.open, "nothing is decided", lambda state: pytest.fail("decided")),
-        Stage("third", lambda state: not state.open, "it is decided", lambda state: state),
+        Stage("first", lambda state: state.open, decides, "nothing is decided"),
+        Stage("second", lambda state: state.open, lambda state: pytest.fail("decided"), "nothing is decided"),
+        Stage("third", lambda state: not state.open, lambda state: state, "it is decided"),
     )
     assert [tuple(one) for one in found.steps] == [
         ("first", "nothing is decided", "none"),
@@ -52,15 +52,15 @@ def test_a_search_that_begins_again_forgets_all_but_its_steps_and_changes(monkey
         return replace(state, round=object(), closed=True)
 
     stages = (
-        Stage("first", lambda state: state.open, "it is open", first),
-        Stage("decided", lambda state: state.open, "it is open", lambda state: state.decided(NONE)),
+        Stage("first", lambda state: state.open, first, "it is open"),
+        Stage("decided", lambda state: state.open, lambda state: state.decided(NONE), "it is open"),
         Stage(
             "again",
             lambda state: not state.noise_measured,
-            "the noise is not measured",
             lambda state: state.again(noise_measured=True),
+            "the noise is not measured",
         ),
-        Stage("last", lambda state: True, "always", lambda state: state),
+        Stage("last", lambda state: True, lambda state: state, "always"),
     )
     monkeypatch.setattr(SearchState, "in_words", lambda _: "")
     found = walked(monkeypatch, *stages)
@@ -78,15 +78,15 @@ def test_progress_grows_also_where_a_search_begins_again(monkeypatch) -> None:
         return state
 
     stages = (
-        Stage("first", lambda state: True, "always", run, work=3),
-        Stage("seldom", lambda state: False, "never", run),
+        Stage("first", lambda state: True, run, "always", work=3),
+        Stage("seldom", lambda state: False, run, "never"),
         Stage(
             "again",
             lambda state: not state.noise_measured,
-            "once",
             lambda state: run(state).again(noise_measured=True),
+            "once",
         ),
-        Stage("last", lambda state: True, "always", run),
+        Stage("last", lambda state: True, run, "always"),
     )
     monkeypatch.setattr(SearchState, "in_words", lambda _: "")
     walked(monkeypatch, *stages, progress=lambda stage, done: reported.append(done))

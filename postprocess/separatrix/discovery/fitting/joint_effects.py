@@ -257,14 +257,9 @@ def candidate_of(
     ends = joint.ends if joint else structure.location(where).ends
     location = Location(where, ends, joint.row if joint else structure.location(where).row, ())
     size = scales.at(where)
-    if size is None:
-        return "nothing moves there in these records"
-    if row.acts == "barrier" and not size.impact_speed > 0:
-        return "there are no impacts in these records"
-    if row.moved and where in scales.measured:
-        return "the force of this joint is measured, which would be that of two"
-    if row.of[0] == "friction" and not size.friction > 0:
-        return "there is no friction"
+    why = _cannot_act(row, size, where in scales.measured)
+    if why:
+        return why
     path = ""
 
     def change(case: dict) -> None:
@@ -276,26 +271,13 @@ def candidate_of(
         extended = edited(model, change)
     except SeparatrixError as reason:
         return str(reason)
-    added = []
     goes_over = {f"{joint.path}.{key}": f"{path}.{key}" for key in row.moved} if joint else {}
     whole = [replace(one, path=goes_over.get(one.path, one.path)) for one in free]
     whole = [one for one in whole if one.is_nuisance or one.path in extended.parameters]
     own = {f"{path}.{key}" for key in keys}
     if any(one.path in own for one in whole):
         return "the base machine has it, and it is fitted"
-    for key, values in keys.items():
-        parameter = extended.parameters[f"{path}.{key}"]
-        if key in row.sizes:
-            ends = np.log([min(values) / FIT.far_joint_start, max(values) * FIT.far_joint_start])
-            mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
-            start = float(np.log(values[0]))
-            added.append(Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror))
-        else:
-            lower, upper = bounds_of(parameter)
-            if key == "static_force":
-                # -1 stands for the force of sliding
-                lower = 0.0
-            added.append(Free(f"{path}.{key}", values[0], lower, upper, abs(values[0])))
+    added = [_free(row, key, values, path, extended) for key, values in keys.items()]
     at = tuple(range(len(whole), len(whole) + len(added)))
     linear = np.array([key in row.amplitudes for key in keys])
     choices = []
@@ -308,6 +290,32 @@ def candidate_of(
     # what a form starts from must be a machine, whatever the joint of the case has
     extended = _with_starts(extended, added)
     return Candidate((*names, name), extended, whole + added, at, starts, forms, linear)
+
+
+def _cannot_act(row: JointEffect, size: LocationScales | None, measured: bool) -> str:
+    """Why an effect makes no sense at a joint whose force may be measured; '' if it does."""
+    if size is None:
+        return "nothing moves there in these records"
+    if row.acts == "barrier" and not size.impact_speed > 0:
+        return "there are no impacts in these records"
+    if row.moved and measured:
+        return "the force of this joint is measured, which would be that of two"
+    if row.of[0] == "friction" and not size.friction > 0:
+        return "there is no friction"
+    return ""
+
+
+def _free(row: JointEffect, key: str, values: list[float], path: str, model) -> Free:
+    """A parameter of an effect, from the first of its usual sizes."""
+    if key in row.sizes:
+        ends = np.log([min(values) / FIT.far_joint_start, max(values) * FIT.far_joint_start])
+        mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
+        start = float(np.log(values[0]))
+        return Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror)
+    lower, upper = bounds_of(model.parameters[f"{path}.{key}"])
+    # -1 stands for the force of sliding
+    lower = 0.0 if key == "static_force" else lower
+    return Free(f"{path}.{key}", values[0], lower, upper, abs(values[0]))
 
 
 def _with_starts(model, added: list[Free]):
