@@ -22,7 +22,7 @@ class Fit:
     same_sensor: float = row(1.5, "1", "rig",
         "ratio of held-out noise to that of the same sensor in training")
     # fitting/catalogue.py
-    far_start: float = row(20.0, "1", "campaign", "usual sizes by which a bound of an effect is away")
+    far_start: float = row(20.0, "1", "campaign", "factor of a usual size up to which a size is fitted")
     # fitting/ceiling.py
     pieces: int = row(5, "1", "campaign", "pieces of a record with free forces of their own")
     usable: float = row(1e-6, "1", "rounding", "least usable eigenvalue of scaled equations of free forces")
@@ -88,7 +88,7 @@ class Fit:
         "reduced chi^2 above which errors of the machine exceed the noise")
     # fitting/joint_effects.py
     far_joint_start: float = row(20.0, "1", "campaign",
-        "usual sizes by which a bound of an effect of a joint is away")
+        "the same of an effect of a joint")
     yields: float = row(0.5, "1", "campaign", "share of the usual impact speed above which a stop yields")
     # fitting/joint_forces.py
     free_knots: int = row(6, "1", "campaign", "knots of a free force")

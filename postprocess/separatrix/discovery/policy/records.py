@@ -74,13 +74,13 @@ class Records:
     stray: tuple = row((20.0, 5.0, 3.0), "1", "test",
         "stray sample over the noise, over the grid, over changes of steps beside it")
     stray_rows: int = row(5, "sample", "test", "rows beside it")
-    most_stray: int = row(3, "sample", "test", "samples of one stray piece")
+    most_stray: int = row(3, "sample", "test", "most stray samples of a record")
     held: tuple = row((20.0, 3.0, 2.0), "1", "test",
         "jump after a held value over the noise, the grid, the usual steps")
     shortest_held: int = row(3, "sample", "test", "shortest held value")
     slow_sensor: float = row(3.0, "1", "test", "usual jump of a slow sensor over the distance of its values")
-    clipped_run: int = row(5, "sample", "test", "longest run at a limit that is no clipping")
-    clipped_share: float = row(0.02, "1", "test", "share of samples at a limit that is none")
+    clipped_run: int = row(5, "sample", "test", "shortest run at a limit that is clipping")
+    clipped_share: float = row(0.02, "1", "test", "share of samples at a limit from which it is clipping")
     abrupt: tuple = row((1.5, 0.05), "1", "test",
         "step to a clipped value over the grid and over the usual step")
     grid_of_noise: float = row(0.5, "1", "test", "noise over the grid that never repeats a number by chance")
