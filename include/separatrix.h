@@ -119,6 +119,20 @@ int separatrix_coordinate(const separatrix_model *model, int index, char *name, 
 int separatrix_contact(const separatrix_model *model, int index, char *name, size_t name_size, char *message,
                        size_t message_size);
 
+/* Force of a joint of a structure, a spring or a soft contact, by its path (spring.NAME, contact.NAME) with
+ * other values of parameters. Code 64 for an unknown joint, 65 for one without a force of its own.
+ *
+ * In:
+ *   extension, speed [sample_count]
+ *     s [m or rad] of its second end from the first, and its rate [m/s or rad/s]
+ * Out:
+ *   force, by_extension, by_speed [sample_count]
+ *     what pulls the second end back [N or N m], and its derivatives */
+int separatrix_joint_force(const separatrix_model *model, int chosen_count, const int *chosen,
+                           const double *values, const char *joint, int sample_count, const double *extension,
+                           const double *speed, double *force, double *by_extension, double *by_speed,
+                           char *message, size_t message_size);
+
 /* As separatrix_segments, of a structure with coordinate_count coordinates. What differs:
  *
  * In:

@@ -277,6 +277,25 @@ class Model:
                 return tuple(found)
             found.append(name.value.decode())
 
+    def joint_force(
+        self, joint: str, active: Sequence[str], values: np.ndarray, extension: np.ndarray, speed: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the force of a spring or soft contact [N] that pulls its second end back, and its slopes.
+
+        The slopes are over extension and speed; `active` parameters have other `values`.
+        """
+        extension, speed = (np.ascontiguousarray(one, float) for one in (extension, speed))
+        found = np.empty((3, extension.size))
+        _call(
+            "separatrix_joint_force",
+            self._handle,
+            *self._along(active, values),
+            joint.encode(),
+            extension.size,
+            *(_pointer(one) for one in (extension, speed, *found)),
+        )
+        return found[0], found[1], found[2]
+
     def coordinate_segments(
         self,
         active: Sequence[str],

@@ -21,7 +21,7 @@ module build_multibody
   implicit none
   private
 
-  public :: is_multibody, multibody_of
+  public :: is_multibody, joint_alone, multibody_of
 
 contains
 
@@ -79,6 +79,21 @@ contains
       if (.not. allocated(error)) call add_impulses(choices, rows, given, machine, error)
     end associate
   end subroutine multibody_of
+
+  !> A spring or a contact along the only coordinate of a machine of unit mass. Code 65 for another law.
+  pure subroutine joint_alone(choice, machine, error)
+    type(law_choice_t), intent(in) :: choice
+    type(multibody_t), intent(out) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    call add_body(machine, 'joint', 1.0_wp, 0.0_wp)
+    if (index(choice%name, 'spring:') == 1) then
+      call add_spring(machine, choice, [1.0_wp], error)
+    else if (index(choice%name, 'contact:') == 1) then
+      call add_contact(machine, choice, [1.0_wp], [integer ::], error)
+    else
+      call fail(error, exit_bad_case, path_of(choice)//': found a law without a force of its own, allowed a spring or a contact')
+    end if
+  end subroutine joint_alone
 
   !> Refuses laws of machines of one or two bodies, and effects.
   pure subroutine refuse_others(choices, error)

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user may choose, and the thresholds of the gates; partial.py has those of names in part alone."""
+"""What a user may choose, and the thresholds of the gates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from separatrix.discovery.policy.row import row
 from separatrix.errors import USAGE, SeparatrixError
 
 COMPARED = ("motion", "force")
@@ -31,45 +32,36 @@ class Options:
     partial: bool = False
     # None = the whole catalogue
     candidates: tuple[str, ...] | None = None
-    # family-wise error of the detection
-    detection_level: float = 0.01
-    # of that error, the share for a gap that no effect closes: a flexible force is tried beside all effects
-    gap_share: float = 0.3
-    # log-likelihood by which a name must beat the next one: odds of 20 to 1
-    separation: float = 3.0
-    # the same for two names of one motion, over `separation`: they differ only while the body sticks
-    equivalent: float = 2.0
-    # the same for a pair over each of its effects alone, over `separation`: pairs are chosen among many
-    needed: float = 2.0
-    # log score that a held-out record may lose by a name: the separation of two names
-    harm: float = -3.0
-    # share of block bootstraps in which an effect has to pay for its parameters
-    inclusion: float = 0.9
-    # share of the segments of the base that the machine with the effect must follow too: losing more would
-    # pass for a gain
-    followed: float = 0.9
-    # scales of the drive beyond which it would be another drive
-    drive_scales: tuple[float, float] = (0.5, 2.0)
-    # largest reduced chi^2 and smallest share of the closable gap of an adequate model
-    adequate_chi2: float = 1.1
-    # reduced chi^2 above which a record of unstated noise is missed: that noise is an estimate
-    missed_chi2: float = 2.0
-    adequate_share: float = 0.8
-    # p value of what is left below which no share is enough
-    adequate_p: float = 1e-4
-    # root mean square over the noise of a sample below which a flexible force explains no gap, and below
-    # which nothing is named: with enough samples even imperfections of a rig are significant
-    least_gap: float = 0.05
-    least_effect: float = 0.02
-    # share of the gap, in training and on held-out records, that may remain of a closed one: a remainder so
-    # small has another cause
-    remaining: float = 1e-2
-    # share of the gap, in training and on held-out records, that a force must close, linearised, for the
-    # dependence of an unnamed gap to be reported
-    characterised: float = 0.5
-    # size of what counts as visible, in standard errors
-    visible: float = 5.0
-    bootstraps: int = 400
+    # fmt: off
+    detection_level: float = row(0.01, "1", "test", "family-wise error of the detection")
+    gap_share: float = row(0.3, "1", "test", "share of that error for a gap that no effect closes")
+    separation: float = row(3.0, "log-likelihood", "test",
+        "distance by which a name must beat the next one: odds of 20 to 1")
+    equivalent: float = row(2.0, "separation", "test", "the same for two names of one motion")
+    needed: float = row(2.0, "separation", "test",
+        "the same for a set over the set without one of its effects")
+    harm: float = row(-3.0, "log-likelihood", "test", "score that a held-out record may lose by a name")
+    inclusion: float = row(0.9, "1", "test", "share of bootstraps in which an effect pays for its parameters")
+    followed: float = row(0.9, "1", "campaign",
+        "share of the segments of the base that a machine must follow: losing more would pass for a gain")
+    drive_scales: tuple[float, float] = row((0.5, 2.0), "1", "rig",
+        "scales of the drive beyond which it would be another drive")
+    adequate_chi2: float = row(1.1, "1", "campaign", "largest reduced chi^2 of an adequate machine")
+    missed_chi2: float = row(2.0, "1", "campaign",
+        "the same for a record of unstated noise, which is an estimate")
+    adequate_share: float = row(0.8, "1", "campaign", "share of the closable gap that it must close")
+    adequate_p: float = row(1e-4, "1", "test", "p value of what is left below which no share is enough")
+    least_gap: float = row(0.05, "noise", "campaign",
+        "root mean square of a sample below which a flexible force explains no gap")
+    least_effect: float = row(0.02, "noise", "campaign",
+        "the same below which nothing is named: imperfections of a rig may be as large")
+    remaining: float = row(1e-2, "1", "campaign",
+        "share that may remain of a closed gap, as of another cause")
+    characterised: float = row(0.5, "1", "campaign",
+        "share of the gap that a force must close for its dependence to be reported")
+    visible: float = row(5.0, "standard error", "test", "size of what counts as visible")
+    bootstraps: int = row(400, "1", "effort", "draws of a bootstrap")
+    # fmt: on
     progress: Callable[[str, float], None] = field(default=_silent, compare=False)
 
     def __post_init__(self) -> None:

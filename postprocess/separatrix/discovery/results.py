@@ -18,8 +18,6 @@ from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.catalogue import within_barriers
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.measured.sensors import SensedPrepared
-from separatrix.discovery.measured.smoother import impact_table, reversals, stick_intervals
 from separatrix.discovery.wording import units_of, with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 
@@ -142,8 +140,7 @@ def machine_text(fitted: Fitted) -> str:
         return fitted.model.to_text(values)
     except SeparatrixError:
         ends = [values.get("contact.lower", -np.inf), values.get("contact.upper", np.inf)]
-        text = within_barriers(fitted.model.to_text({}), *ends)
-        return type(fitted.model).from_text(text).to_text(values)
+        return within_barriers(fitted.model, *ends).to_text(values)
 
 
 def machine_values(fitted: Fitted) -> dict[str, float]:
@@ -192,26 +189,14 @@ def write_details(path: Path, findings: Findings) -> None:
             after = final.prediction if final else None
             _write_fits(file, "held_out", before, after)
         for data in (context.training, context.held_out):
-            for prepared, smoothed in zip(data.prepared, data.smoothed, strict=True) if data else ():
+            for number, prepared in enumerate(data.prepared if data else ()):
                 group = file.create_group(f"records/{prepared.record.name}")
                 group.attrs["sigma"] = prepared.sigma
                 group.attrs["held_out"] = data is context.held_out
                 group["t"], group["x"] = prepared.record.t, prepared.record.x
-                if isinstance(prepared, SensedPrepared):
-                    # no motion of one body: what each sensor shows
-                    for sensor in prepared.sensors:
-                        group[sensor.name] = sensor.values
-                        group[sensor.name].attrs["sigma"] = sensor.sigma
-                    group["impacts"] = np.zeros((0, 6))
-                    continue
-                if prepared.in_force:
-                    group["force"] = prepared.record.force
-                group["smoothed"] = smoothed.state
-                group["smoothed_error"] = np.sqrt(np.einsum("kii->ki", smoothed.covariance))
-                group["impacts"] = impact_table(smoothed)
-                group["impacts"].attrs["columns"] = "t x v_before v_after v_before_error v_after_error"
-                group["reversals"] = reversals(smoothed)
-                group["stick"] = np.array(stick_intervals(smoothed)).reshape(-1, 2)
+                for name, (values, attributes) in data.details(number).items():
+                    group[name] = values
+                    group[name].attrs.update(attributes)
 
 
 def _write_fits(file: h5py.File, use: str, before: object, after: object | None) -> None:
@@ -229,7 +214,7 @@ def _write_fits(file: h5py.File, use: str, before: object, after: object | None)
             group["t"] = (times[rows] + first[:, None])[inside]
             group["segment"] = np.broadcast_to(np.arange(rows.size)[:, None], inside.shape)[inside]
             group["x"], group["v"] = fit.evaluation.x[rows][inside], fit.evaluation.v[rows][inside]
-            if problem.in_force:
+            if fit.evaluation.force is not None:
                 group["force"] = fit.evaluation.force[rows][inside]
             length = inside.shape[1]
             group["residual"] = fit.evaluation.residual[rows, :length][inside]

@@ -8,31 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.discovery.decision.added import with_law
-from separatrix.discovery.decision.characterise import characterised, hidden_state_tested
-from separatrix.discovery.decision.functions import with_function
-from separatrix.discovery.decision.partial import decide_in_part, nearest
+from separatrix.discovery.decision.plan import search
 from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.decision.verdict import Findings, verdict_of
-from separatrix.discovery.decision.with_imperfections import decide_with_imperfections
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
-from separatrix.discovery.fitting.data import Data, fit_stages, gather, scales_of
-from separatrix.discovery.fitting.joint_effects import names_for
-from separatrix.discovery.fitting.locations import location_scales
+from separatrix.discovery.fitting.data import fit_stages
 from separatrix.discovery.fitting.machine import on_other_records, with_values
+from separatrix.discovery.fitting.observations import Observation, observation_of
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.sensed import gather_sensed
-from separatrix.discovery.measured.bodies import is_pair, is_structure, pair_as_structure, structure_of
-from separatrix.discovery.measured.in_force import prepare_force
-from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import Record, read_record, unique_names
-from separatrix.discovery.measured.sensors import prepare_sensors
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Model
-
-# share of an only record that is held out, and drive periods that it has at least
-_END, _END_PERIODS = 0.3, 2.05
 
 
 def discover(
@@ -56,48 +45,33 @@ def investigate(
     """As `discover`; also everything that the figures of the report need."""
     began = time.monotonic()
     options = options or Options()
-    model = _model(base)
+    seen = _observation(base, options.compare)
     # what cannot be looked for is refused before any work
-    names_for(model, options.candidates)
+    seen.effects(options.candidates)
     read = [[_record(one) for one in group] for group in (records, hold_out)]
     still = None if rest is None else _record(rest, at_rest=True)
-    training, held_out, chosen = _split(*read, model, still, options)
+    training, held_out, chosen = _split(*read, seen, still)
     _all_different([*training, *held_out])
     unique_names([*training, *held_out])
     options.progress("reading and smoothing the records", 0.0)
-    prepared = [[_prepared(one, model, still, options) for one in group] for group in (training, held_out)]
-    data = _gathered(prepared[0], model, options)
-    predicted = _gathered(prepared[1], model, options) if held_out else None
-    scales = None if is_structure(model) else scales_of(data, model)
+    prepared = [[seen.prepare(one, still) for one in group] for group in (training, held_out)]
+    data = seen.gather(prepared[0], options)
+    predicted = seen.gather(prepared[1], options) if held_out else None
     options.progress("fitting the base machine", 0.05)
-    fitted = fit_base(data, model, scales.mass if scales else 1.0)
+    fitted = fit_base(data, seen.model, seen.mass)
     if not fitted.fit.good.any():
         raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
     data.base_starts = fitted.fit.starts
-    scales = scales or location_scales(fitted.problem, fitted.fit)
+    scales = seen.scales(data, fitted)
     if predicted is not None:
-        _prepare_held_out(predicted, data, model, fitted, scales.mass)
+        _prepare_held_out(predicted, data, seen.model, fitted, scales.mass)
     context = SearchContext(data, predicted, scales, options)
-    if options.partial:
-        decision = decide_in_part(context, fitted)
-    else:
-        context, decision = decide_with_imperfections(context, fitted)
-        decision = hidden_state_tested(context, decision)
-        decision.reasons += nearest(context, decision)
-        options.progress("characterising the rest of the gap", 0.9)
-        decision = with_law(context, characterised(context, decision))
-    decision = with_function(context, decision)
-    # its noise may have been measured again
-    findings = Findings(context, decision.rounds[0].base, decision, chosen)
+    found = search(SearchState(context, fitted))
+    # the noise of the base may have been measured again
+    findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings
-
-
-def _gathered(prepared: list[Prepared], model, options: Options) -> Data:
-    if is_structure(model):
-        return gather_sensed(prepared, options.segment_periods, options.segment_seconds, model)
-    return gather(prepared, options.segment_periods, options.segment_seconds)
 
 
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:
@@ -110,51 +84,24 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
     copy_noise(training, held_out)
 
 
-def _model(base: object):
+def _observation(base: object, compare: str) -> Observation:
     named = isinstance(base, str | Path)
     model = Model.read(base) if named else base
     try:
-        if is_pair(model):
-            model = pair_as_structure(model)
-        if is_structure(model):
-            structure_of(model)
+        return observation_of(model, compare)
     except SeparatrixError as error:
         raise SeparatrixError(f"{base}: {error}" if named else str(error)) from None
-    return model
 
 
 def _record(one: Path | Record, at_rest: bool = False) -> Record:
     return one if isinstance(one, Record) else read_record(Path(one), at_rest)
 
 
-def _prepared(record: Record, model, rest: Record | None, options: Options) -> Prepared:
-    if is_structure(model):
-        if options.compare == "force":
-            raise SeparatrixError(
-                "compare: found force, allowed for a machine of several bodies motion, with columns F.JOINT",
-                USAGE,
-            )
-        return prepare_sensors(record, model, rest)
-    if record.sensors:
-        found = ", ".join(record.sensors)
-        raise SeparatrixError(
-            f"{record.file}: found columns {found}, allowed for a base machine of one body x, v"
-        )
-    for one in (record, rest):
-        if one is not None and not one.has_position:
-            raise SeparatrixError(
-                f"{one.file}: found a speed and no x, allowed where the machine is written joint by joint "
-                "(body.NAME, spring.NAME, also of one body), without impacts: there each start is fitted"
-            )
-    return prepare_force(record, model, rest) if options.compare == "force" else prepare(record, model, rest)
-
-
 def _split(
     records: list[Record],
     hold_out: list[Record],
-    model,
+    seen: Observation,
     rest: Record | None = None,
-    options: Options | None = None,
 ) -> tuple[list[Record], list[Record], str]:
     """Training and held-out records; by default the last record, or the end of the only one."""
     if hold_out:
@@ -164,11 +111,11 @@ def _split(
     if not records:
         raise SeparatrixError("no record to compare the base machine with", USAGE)
     whole = records[0]
-    at = int((1 - _END) * whole.t.size)
-    period = _prepared(whole, model, rest, options or Options()).period_samples
+    at = int((1 - RECORDS.held_out_end) * whole.t.size)
+    period = seen.prepare(whole, rest).period_samples
     if period is not None:
         # the end needs some periods too
-        latest = whole.t[-1] - _END_PERIODS * period * whole.interval
+        latest = whole.t[-1] - RECORDS.held_out_periods * period * whole.interval
         at = min(at, max(whole.t.size // 2, int(np.searchsorted(whole.t, latest, "right")) - 1))
     share = f"{100 * (1 - at / whole.t.size):.0f} %"
     first, end = _cut(whole, 0, at, ""), _cut(whole, at, whole.t.size, "_end")

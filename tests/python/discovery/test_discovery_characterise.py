@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from separatrix.discovery import Options, discover
-from separatrix.discovery.decision import characterise
-from separatrix.discovery.decision.decide import Decision
+from separatrix.discovery.decision.rounds import SearchContext
+from separatrix.discovery.decision.stages import hidden_state as hidden_state_module
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting import motions
 
 SEED = 31
@@ -70,14 +71,16 @@ def test_a_name_has_to_hold_against_a_hidden_state(
     fit = SimpleNamespace(reduced_chi2=1.0, excess=300.0)
     fitted = SimpleNamespace(names=("friction_curve",), fit=fit)
     name = SimpleNamespace(fitted=fitted, own_evidence=100.0, prediction=SimpleNamespace())
-    first = SimpleNamespace(base=SimpleNamespace(problem=None))
+    first = SimpleNamespace(base=SimpleNamespace(problem=SimpleNamespace(has_memories=True)))
     decision = Decision("named", [name], [], [], [first], None, SimpleNamespace(fit=fit))
-    monkeypatch.setattr(characterise, "_motions", lambda _, machine, prediction: (machine is fitted, None))
-    monkeypatch.setattr(characterise, "memories", lambda _: ["memory"])
-    monkeypatch.setattr(characterise, "evidence_of_imperfections", lambda *_: imperfections)
     monkeypatch.setattr(
-        characterise,
-        "_best",
+        hidden_state_module, "motions", lambda _, machine, prediction: (machine is fitted, None)
+    )
+    monkeypatch.setattr(hidden_state_module, "memories", lambda _: ["memory"])
+    monkeypatch.setattr(hidden_state_module, "evidence_of_imperfections", lambda *_: imperfections)
+    monkeypatch.setattr(
+        hidden_state_module,
+        "best_of_hypothesis",
         lambda named, held_out, variable: one("memory", beside if named else evidence),
     )
 
@@ -85,8 +88,12 @@ def test_a_name_has_to_hold_against_a_hidden_state(
         assert (gap.outcome, gap.accepted) == ("not-in-catalogue", [])
         return Decision("characterised", [], [], [], [first], None, None, characters=[one(likeliest)])
 
-    monkeypatch.setattr(characterise, "characterised", characterised)
-    found = characterise.hidden_state_tested(SimpleNamespace(options=Options()), decision)
+    monkeypatch.setattr(hidden_state_module, "characterised", characterised)
+    state = SearchState(
+        SearchContext(None, None, None, Options()), first.base, round=first, decision=decision
+    )
+    assert hidden_state_module.can_be_hidden(state)
+    found = hidden_state_module.hidden_state(state).decision
     assert found.outcome == outcome
     assert bool(found.accepted) == (outcome == "named")
 

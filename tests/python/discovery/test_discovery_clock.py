@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 from separatrix.discovery.measured import clock
+from separatrix.discovery.policy import RECORDS
 
 
 def scattered(count: int, seed: int, size: float = 0.3) -> np.ndarray:
@@ -19,16 +20,16 @@ def scattered(count: int, seed: int, size: float = 0.3) -> np.ndarray:
 
 def lost_by_definition(t: np.ndarray, usual: float) -> list[int]:
     """Row by row: the largest jump of the means beside it within reach, or a step that is wide in itself."""
-    late, steps, reach = t - usual * np.arange(t.size), np.diff(t), clock._AROUND
+    late, steps, reach = t - usual * np.arange(t.size), np.diff(t), RECORDS.around_step
     jump = {
         row: late[row : row + reach].mean() - late[max(0, row - reach) : row].mean()
         for row in range(1, t.size)
-        if steps[row - 1] > clock._LATE * usual
+        if steps[row - 1] > RECORDS.late * usual
     }
     return [
         row
         for row, size in jump.items()
-        if steps[row - 1] > clock._LOST * usual
+        if steps[row - 1] > RECORDS.lost * usual
         or (size > 0.5 * usual and size == max(jump[k] for k in jump if abs(k - row) < reach))
     ]
 

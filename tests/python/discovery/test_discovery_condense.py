@@ -3,6 +3,7 @@
 """Condensed records keep the information of the samples: least squares and noise, in proportional memory."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from separatrix.discovery.fitting import noise
 from separatrix.discovery.fitting.data import gather
 from separatrix.discovery.measured import tables
 from separatrix.discovery.measured.condense import (
-    NODES,
     _basis,
     _block_noise,
     condense,
@@ -19,6 +19,7 @@ from separatrix.discovery.measured.condense import (
 )
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.records import make_record, read_record
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 
 RATE, PERIOD, SIGMA = 10_000.0, 0.7, 1e-5
@@ -42,10 +43,10 @@ def condensed(record, sigma: float = SIGMA, kept=None, slow=None):
 @pytest.mark.parametrize("size", [16, 64, 256])
 def test_values_of_a_block_have_independent_errors_and_follow_their_degree(size):
     q, nodes, values = _basis(size)
-    weights = values @ q[:, :NODES].T
+    weights = values @ q[:, : RECORDS.block_values].T
     covariance = weights @ weights.T
     assert np.allclose(covariance, np.diag(_block_noise(size, 0.0)[0] ** 2), atol=1e-12)
-    for degree in range(NODES + 1):
+    for degree in range(RECORDS.block_values + 1):
         # one degree more than the polynomial has
         assert np.allclose(weights @ np.arange(size) ** float(degree), nodes**degree, rtol=1e-9)
 
@@ -56,9 +57,9 @@ def test_noise_with_memory_spreads_the_values_and_leaves_what_is_expected(memory
     lags = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
     drawn = random.standard_normal((20_000, size)) @ np.linalg.cholesky(memory**lags).T
     q, _, values = _basis(size)
-    terms = drawn @ q[:, :NODES]
+    terms = drawn @ q[:, : RECORDS.block_values]
     assert np.allclose(np.std(terms @ values.T, axis=0), _block_noise(size, memory)[0], rtol=0.03)
-    rest = drawn - terms @ q[:, :NODES].T
+    rest = drawn - terms @ q[:, : RECORDS.block_values].T
     power, product = expected_left(size, memory)
     assert np.isclose(np.mean(np.sum(rest**2, axis=1)), power, rtol=0.02)
     assert np.isclose(np.mean(np.sum(rest[:, 1:] * rest[:, :-1], axis=1)), product, atol=0.02 * power)
@@ -83,7 +84,7 @@ def test_rows_are_linked_as_the_noise_of_their_samples(memory):
         else:
             q, nodes, values = _basis(size)
             spans.append((round(rows.offset[k] - nodes[node]), size))
-            weights.append((values @ q[:, :NODES].T)[node])
+            weights.append((values @ q[:, : RECORDS.block_values].T)[node])
     design = np.zeros((count, max(first + size for first, size in spans)))
     for k, ((first, size), weight) in enumerate(zip(spans, weights, strict=True)):
         design[k, first : first + size] = weight
@@ -158,7 +159,7 @@ def test_gaps_stay_gaps():
 
 def test_records_that_cannot_be_condensed_are_refused_with_words(monkeypatch):
     record = moving(1.0)
-    monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", 1000)
+    monkeypatch.setattr("separatrix.discovery.measured.condense.RECORDS", replace(RECORDS, most_rows=1000))
     with pytest.raises(SeparatrixError, match="keep every 10th row"):
         condensed(record, kept=np.ones(record.t.size, bool))
 
@@ -166,7 +167,7 @@ def test_records_that_cannot_be_condensed_are_refused_with_words(monkeypatch):
 @pytest.mark.parametrize(("most", "factor"), [(200_000, 1), (1500, 4)])
 def test_condensing_beyond_the_noise_is_reported(monkeypatch, most, factor):
     """If too many rows would stay, blocks need not be smooth within the noise."""
-    monkeypatch.setattr("separatrix.discovery.measured.condense.MOST_ROWS", most)
+    monkeypatch.setattr("separatrix.discovery.measured.condense.RECORDS", replace(RECORDS, most_rows=most))
     prepared = Prepared(moving(), SIGMA, np.inf, 0.0)
     gather([prepared], 1.0, None)
     count = prepared.samples.t.size
@@ -227,9 +228,9 @@ def long_csv(path, first_row: str = "", pause: str = "", end: str = "\n", count:
 @pytest.mark.parametrize("first_row", ["", "0,0"])
 def test_rows_are_counted_and_not_guessed_from_bytes(tmp_path, monkeypatch, end, pause, first_row):
     path = long_csv(tmp_path / "long.csv", first_row, pause.replace("\n", end), end)
-    monkeypatch.setattr(tables, "MOST_SAMPLES", 1000)
+    monkeypatch.setattr(tables, "RECORDS", replace(RECORDS, most_samples=1000))
     assert read_record(path).t.size == 1000
-    monkeypatch.setattr(tables, "MOST_SAMPLES", 999)
+    monkeypatch.setattr(tables, "RECORDS", replace(RECORDS, most_samples=999))
     with pytest.raises(SeparatrixError, match=r"about 1e\+03 samples.*every 2th row"):
         read_record(path)
 
@@ -238,14 +239,14 @@ def test_lines_are_counted_across_chunks_and_without_an_end(tmp_path, monkeypatc
     path = tmp_path / "short.csv"
     path.write_text("# one: 1\n# two: 2\nt,x\n0,1\n# three\n1,2")
     for size in range(1, 12):
-        monkeypatch.setattr(tables, "_CHUNK", size)
+        monkeypatch.setattr(tables, "RECORDS", replace(RECORDS, chunk=size))
         assert tables._count_lines(path) == (6, 3)
 
 
 @pytest.mark.parametrize("pause", ["", "\n# a pause"])
 def test_too_long_a_record_is_refused_before_it_is_read(tmp_path, monkeypatch, pause):
     path = long_csv(tmp_path / "long.csv", pause=pause)
-    monkeypatch.setattr(tables, "MOST_SAMPLES", 100)
+    monkeypatch.setattr(tables, "RECORDS", replace(RECORDS, most_samples=100))
     monkeypatch.setattr(tables, "_parsed", None)
     monkeypatch.setattr(np, "loadtxt", None)
     with pytest.raises(SeparatrixError, match=r"about 1e\+03 samples.*every 10th row"):

@@ -243,6 +243,13 @@ def test_friction_of_a_shape_that_no_effect_has_is_fitted_as_a_function():
     assert all(known.problem.free[i].also for i in known.added)
 
 
+def test_the_curve_through_a_table_has_the_same_bits_each_time():
+    knots = np.array([0.013, 0.11, 0.29, 0.61, 0.83, 1.27])
+    values = np.sin(7 * knots)
+    curves = {through(knots, values)(np.linspace(0.013, 1.27, 50)).tobytes() for _ in range(20)}
+    assert len(curves) == 1
+
+
 def test_a_table_on_more_knots_begins_from_the_one_on_fewer():
     base = Model.from_text(CASE.format(contact=NEWTON))
     data = gather([prepare(records_of(base)[0], base)], 1.0, None)

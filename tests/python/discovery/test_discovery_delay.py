@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fitting.machine import base_parameters, drive_nuisances
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded
@@ -15,7 +15,7 @@ from separatrix.library import Model
 RATE, LENGTH, PHASE = 200, 40, 0.4
 
 
-def late_problem(delay: float) -> tuple[Problem, np.ndarray]:
+def late_problem(delay: float) -> tuple[BodyInMotion, np.ndarray]:
     """A record of x that is late and v that is not, its machine, and where the body was a delay earlier."""
     model = Model.from_text(CASE)
     t = np.arange(4, 604) / RATE
@@ -31,7 +31,7 @@ def late_problem(delay: float) -> tuple[Problem, np.ndarray]:
     extended = model.with_effect("sensor_delay", {"delay": delay})
     first = np.arange(0, t.size, LENGTH)
     free = base_parameters(extended, measured_force=False) + drive_nuisances(extended, prepared)
-    problem = Problem(extended, prepared, padded(np.zeros(first.size, int), first, first + LENGTH), free)
+    problem = BodyInMotion(extended, prepared, padded(np.zeros(first.size, int), first, first + LENGTH), free)
     return problem, np.column_stack([x[first], v_then[first]])
 
 

@@ -2,19 +2,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Laws of the numerics of the discovery workflow that need no simulator."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
-from separatrix.discovery.decision import decide as decide_module
-from separatrix.discovery.decision import partial as partial_module
-from separatrix.discovery.decision import rounds
+from separatrix.discovery.decision import plan, rounds
 from separatrix.discovery.decision.scoring import ScoredCandidate
+from separatrix.discovery.decision.stages import (
+    conclusions,
+    function,
+    in_part,
+    one_effect,
+    several_effects,
+)
+from separatrix.discovery.decision.state import Choice, SearchState
 from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
 from separatrix.discovery.fitting import screen as screen_module
 from separatrix.discovery.fitting.base import measure_noise
+from separatrix.discovery.fitting.catalogue import names_of_body
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import blocking, minimise
 from separatrix.discovery.fitting.machine import Free
@@ -170,9 +178,9 @@ def test_what_was_not_tested_is_in_the_order_of_the_catalogue(monkeypatch):
     monkeypatch.setattr(rounds, "screen", lambda *_: None)
     monkeypatch.setattr(rounds, "choose", lambda *_: [])
     context = rounds.SearchContext(None, None, None, Options(candidates=tuple(reversed(names))))
-    problem = SimpleNamespace(free=[], in_force=False)
+    problem = SimpleNamespace(free=[], effects=names_of_body, cannot_show=lambda _: "")
     base = SimpleNamespace(names=(), model=SimpleNamespace(parameters={}), problem=problem, fit=fits)
-    found = rounds.run_round(context, base, None, 0, 1)
+    found = rounds.run_round(context, base, None)
     assert list(found.absent) == names
     assert found.absent["dahl"] == "the machine has no friction"
 
@@ -186,7 +194,7 @@ def test_signatures_that_vanish_do_not_stop_the_screen():
 
 def test_a_candidate_without_a_prediction_is_clearly_behind():
     far = SimpleNamespace(prediction=None)
-    assert partial_module._clearly(SimpleNamespace(prediction=object()), far, None)
+    assert in_part._clearly(SimpleNamespace(prediction=object()), far, None)
 
 
 class Residuals:
@@ -319,8 +327,8 @@ def test_a_segment_bars_the_way_of_a_step_where_it_loses_more_than_all_gain(jump
     np.testing.assert_array_equal(found, barred)
 
 
-@pytest.mark.parametrize(("in_force", "of_v"), [(False, 0.2), (True, 0.1)])
-def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, in_force, of_v):
+@pytest.mark.parametrize(("channels", "of_v"), [(2, 0.2), (1, 0.1)])
+def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, channels, of_v):
     """Only the quiet record has v; the memory of the noise is kept, because the machine misses nothing.
 
     Where the force is compared its noise is none of the velocity.
@@ -339,8 +347,8 @@ def test_the_noise_of_the_velocity_leaves_that_of_the_position(monkeypatch, in_f
         )
         for sigma, v in ((1e-3, np.zeros(3)), (1e-2, None))
     ]
-    data = SimpleNamespace(prepared=prepared)
-    measure_noise(data, SimpleNamespace(in_force=in_force), SimpleNamespace(reduced_chi2=1.0), 1.0)
+    data = SimpleNamespace(prepared=prepared, measured_by_sensor=lambda *_: False)
+    measure_noise(data, SimpleNamespace(channels=channels), SimpleNamespace(reduced_chi2=1.0), 1.0)
     assert [one.memory for one in prepared] == [0.5, 0.5]
     assert [one.velocity_sigma for one in prepared] == [of_v, 0.1]
 
@@ -375,46 +383,50 @@ def test_fits_stand_as_long_as_their_base(monkeypatch, renewed):
     base = SimpleNamespace(
         names=(),
         model=SimpleNamespace(parameters={}),
-        problem=SimpleNamespace(free=[], in_force=False),
+        problem=SimpleNamespace(free=[], effects=names_of_body, cannot_show=lambda _: ""),
         fit=fits,
     )
     context = rounds.SearchContext(None, None, None, Options(candidates=("dahl", "viscous")))
     monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous"])
-    earlier = rounds.run_round(context, base, None, 0, 1)
+    earlier = rounds.run_round(context, base, None)
     assert fitted_now == [("viscous", False)]
     fitted_now.clear()
     monkeypatch.setattr(rounds, "choose", lambda *_: ["viscous", "dahl"])
     again = SimpleNamespace(**vars(base)) if renewed else base
-    found = rounds.run_round(context, again, None, 0, 1, earlier, everything=True)
+    found = rounds.run_round(context, again, None, earlier, everything=True)
     assert {one.name for one in found.scored} == {"dahl", "viscous"}
     assert fitted_now == ([("viscous", True), ("dahl", False)] if renewed else [("dahl", False)])
 
 
 def test_the_noise_is_measured_again_where_several_effects_leave_nothing_else(monkeypatch):
     """Its memory passes for a gap as long as no single effect comes near it; the search then begins anew."""
-    settled, closed = [], iter([False, True])
-    pair = SimpleNamespace(fitted=SimpleNamespace(fit=SimpleNamespace(like_noise=lambda _: True)))
-    single = SimpleNamespace(gates={"adequate": False, "detect": True, "stable": True})
+    measured, closed = [], iter([False, True])
+    gates = {"adequate": False, "detect": True, "stable": True}
+    pair = SimpleNamespace(fitted=SimpleNamespace(names=("a", "b"), fit=SimpleNamespace(like_noise=bool)))
+    single = SimpleNamespace(gates=gates, fitted=SimpleNamespace(names=("a",)))
     base = Fitted((), None, SimpleNamespace(), SimpleNamespace(values=None, starts=None), ())
 
-    def renewing(context, found, at, known, everything=False):
-        settled.append(known)
+    def renewing(context, found, known, everything=False):
+        measured.append(known)
         return found
 
+    def run_round(context, base, *_):
+        return SimpleNamespace(base=base, scored=[single], predicted=None)
+
+    monkeypatch.setattr(one_effect, "run_round", run_round)
+    monkeypatch.setattr(one_effect, "_renewing", renewing)
+    monkeypatch.setattr(one_effect, "_gap", lambda *_: None)
+    monkeypatch.setattr(one_effect, "lead", lambda *_: Choice(single, []))
+    monkeypatch.setattr(function, "as_function", lambda *_: None)
+    monkeypatch.setattr(several_effects, "with_more", lambda *_: (pair, [], next(closed)))
+    monkeypatch.setattr(several_effects, "noise_renewed", lambda *_: True)
+    monkeypatch.setattr(several_effects, "minimise", lambda *_, **__: "fitted again")
     monkeypatch.setattr(
-        decide_module,
-        "run_round",
-        lambda context, base, *_: SimpleNamespace(base=base, scored=[single], predicted=None),
+        conclusions, "conclude", lambda _, decision, best, rivals: replace(decision, accepted=[best])
     )
-    monkeypatch.setattr(decide_module, "_renewing", renewing)
-    monkeypatch.setattr(decide_module, "_begun", lambda context, found: SimpleNamespace(rounds=[found]))
-    monkeypatch.setattr(decide_module, "_lead", lambda *_: (single, []))
-    monkeypatch.setattr(decide_module, "_shaped", lambda *_: None)
-    monkeypatch.setattr(decide_module, "with_more", lambda *_: (pair, [], next(closed)))
-    monkeypatch.setattr(decide_module, "_noise_renewed", lambda *_: True)
-    monkeypatch.setattr(decide_module, "minimise", lambda *_, **__: "fitted again")
-    monkeypatch.setattr(decide_module, "conclude", lambda context, decision, *found: (decision, *found))
-    context = SimpleNamespace(options=Options(quick=True), predict=lambda _: None)
-    decision, best, rivals = decide_module.decide(context, base)
-    assert (best, rivals, settled) == (pair, [], [False, True])
-    assert decision.rounds[0].base.fit == "fitted again"
+    upto = [one.name for one in plan.PLAN].index("no machine")
+    monkeypatch.setattr(plan, "PLAN", plan.PLAN[: upto + 1])
+    context = rounds.SearchContext(None, None, None, Options(quick=True))
+    found = plan.search(SearchState(context, base))
+    assert (found.decision.accepted, measured) == ([pair], [False, True])
+    assert found.decision.rounds[0].base.fit == "fitted again"

@@ -15,9 +15,10 @@ from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.data import gather
 from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.measured.condense import stride
-from separatrix.discovery.measured.in_force import MOST_SAMPLES, prepare_force
+from separatrix.discovery.measured.in_force import prepare_force
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.smoother import smooth
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 
@@ -327,7 +328,7 @@ def test_rest_and_turning_points_are_not_compared() -> None:
 
 
 def test_a_long_record_is_compared_in_means_of_neighbours() -> None:
-    count = 2 * MOST_SAMPLES + 1
+    count = 2 * RECORDS.most_in_force + 1
     t = np.arange(count) * 1e-4
     x = 0.1 * np.sin(2 * np.pi * t)
     force = np.sign(np.cos(2 * np.pi * t)) + 0.1 * np.random.default_rng(1).standard_normal(count)

@@ -6,8 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, functions
+from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
+from separatrix.discovery.decision.stages import function_of_name as functions
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.options import Options
 
 
@@ -34,8 +36,10 @@ def test_a_form_that_its_function_refutes_leads_only_where_it_predicts_better(
     monkeypatch.setattr(functions, "lead", lambda *_: ahead)
     monkeypatch.setattr(functions, "share_with_imperfections", lambda *_: 1.0)
     found = SimpleNamespace(base=form.fitted, screened=SimpleNamespace(tests=1.0))
-    decision = decide.Decision("named", [form], [], [], [found], None, None, function=function)
-    given = functions._compared_with_function(SimpleNamespace(options=Options()), decision)
+    decision = Decision("named", [form], [], [], [found], None, None, function=function)
+    state = SearchState(SearchContext(None, None, None, Options()), form.fitted, decision=decision)
+    assert functions.form_refuted(state)
+    given = functions.table_or_form(state).decision
     assert (given.outcome, [one.name for one in given.accepted]) == ("ambiguous", [first])
     assert [one.name for one in given.rivals] == [{form.name: table, table.name: form}[first].name]
     assert "has another form than restitution_slope" in given.reasons[-1]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 from separatrix.discovery.decision.misfit import predicted_chi2, refuted
-from separatrix.discovery.decision.partial import preferred
 from separatrix.discovery.decision.scoring import ScoredCandidate
+from separatrix.discovery.decision.stages.in_part import preferred
 from separatrix.discovery.fitting.heldout import Prediction, _records_own, ahead, gained, gained_together
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.options import Options

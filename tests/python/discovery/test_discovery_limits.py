@@ -11,7 +11,7 @@ from separatrix.discovery.decision.experiments import d_primes, experiments
 from separatrix.discovery.decision.limits import detectable
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.machine import Free, base_parameters
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -57,7 +57,7 @@ def fitted(stiffness: float, case: str = CASE, begin: float = 0.0) -> Fitted:
     model = Spy(Model.from_text(case))
     free = base_parameters(model, measured_force=False)
     first = np.arange(0, 600, 50)
-    problem = Problem(model, [prepare(record, model)], padded(0 * first, first, first + 50), free)
+    problem = BodyInMotion(model, [prepare(record, model)], padded(0 * first, first, first + 50), free)
     values = np.array(
         [stiffness * one.value if one.path.endswith("stiffness") else one.value for one in free]
     )

@@ -7,16 +7,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from separatrix.discovery.decision import decide, misfit
-from separatrix.discovery.decision.decide import Decision, _without_name
+from separatrix.discovery.decision import misfit
 from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet, unused
+from separatrix.discovery.decision.stages import conclusions
+from separatrix.discovery.decision.state import Decision
 from separatrix.discovery.fitting.base import limit_noise
 from separatrix.discovery.fitting.noise import Noise, white_share
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 
 SAMPLES, SEGMENTS = 50, 20
-BODY = SimpleNamespace(model=SimpleNamespace(parameters={"restoring.stiffness"}), in_force=False)
+BODY = SimpleNamespace(
+    model=SimpleNamespace(parameters={"restoring.stiffness"}), unit=lambda units: units.position
+)
 
 
 def data(sigma: float, scatter: float) -> SimpleNamespace:
@@ -27,7 +30,8 @@ def data(sigma: float, scatter: float) -> SimpleNamespace:
         SimpleNamespace(
             record=SimpleNamespace(name=name),
             signal=np.sin(9 * t) + scatter * one,
-            in_force=False,
+            noise_key="sensor_noise_sigma_m",
+            sensor_noise={},
             sigma=sigma,
             sigma_stated=True,
             resolution=0.0,
@@ -83,14 +87,16 @@ def test_a_machine_without_contacts_has_no_impacts_that_are_not_steady():
 @pytest.mark.parametrize(("training", "held_out", "outcome"), [(1, 1, "none"), (9, 1, ""), (1, 9, "")])
 def test_nothing_is_missing_only_if_all_records_are_explained(monkeypatch, training, held_out, outcome):
     # without imperfections of a rig
-    monkeypatch.setattr(decide, "cleaned_prediction", lambda base, prediction: prediction.fit)
+    monkeypatch.setattr(conclusions, "cleaned_prediction", lambda base, prediction: prediction.fit)
     context = SimpleNamespace(training=data(1, 1), held_out=data(1, 1), options=Options())
-    first = SimpleNamespace(base=SimpleNamespace(fit=fit(training, 1)))
+    problem = SimpleNamespace(locates=False)
+    first = SimpleNamespace(base=SimpleNamespace(problem=problem, fit=fit(training, 1)))
     predicted = SimpleNamespace(problem=None, fit=fit(1, held_out))
     gap = SimpleNamespace(p=0.5, fit=first.base.fit)
     decision = Decision("none", [], [], [], [first], gap, predicted)
-    assert _without_name(context, decision).outcome == (outcome or "not-in-catalogue")
-    assert bool(decision.reasons) == (not outcome)
+    found = conclusions.without_name(context, decision)
+    assert found.outcome == (outcome or "not-in-catalogue")
+    assert bool(found.reasons) == (not outcome)
 
 
 def test_stated_noise_is_doubted_where_the_samples_show_another(monkeypatch):

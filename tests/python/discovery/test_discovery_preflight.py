@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.observations import OfMotion
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.measured.preflight import check_velocity, prepare
 from separatrix.discovery.measured.records import Record, make_record
 from separatrix.discovery.measured.segments import padded
@@ -38,7 +39,7 @@ def driven(t: np.ndarray, **header) -> Record:
 def test_a_measured_crank_angle_counts_from_the_rows_that_it_is_fitted_to():
     model = Model.from_text(CASE)
     record = driven(np.arange(800) / 100, phase=START)
-    training, held_out, _ = _split([record], [], model)
+    training, held_out, _ = _split([record], [], OfMotion(model))
     for part in (*training, *held_out):
         prepared = prepare(part, model)
         angle = prepared.phase + prepared.frequency * (part.t - prepared.origin)
@@ -49,7 +50,7 @@ def test_a_measured_crank_angle_counts_from_the_rows_that_it_is_fitted_to():
 def test_the_end_that_is_held_out_has_two_drive_periods(periods, share):
     model = Model.from_text(CASE)
     t = np.arange(0, periods * 2 * np.pi / RATE, 0.005)
-    training, held_out, chosen = _split([driven(t, phase=START)], [], model)
+    training, held_out, chosen = _split([driven(t, phase=START)], [], OfMotion(model))
     assert chosen == f"the last {share} % of the only record"
     assert training[0].t.size + held_out[0].t.size == t.size
     for part in (*training, *held_out):
@@ -59,7 +60,7 @@ def test_the_end_that_is_held_out_has_two_drive_periods(periods, share):
 def test_a_record_too_short_to_hold_out_its_end_is_refused_with_its_part():
     model = Model.from_text(CASE)
     t = np.arange(0, 3 * 2 * np.pi / RATE, 0.005)
-    training, held_out, _ = _split([driven(t, phase=START)], [], model)
+    training, held_out, _ = _split([driven(t, phase=START)], [], OfMotion(model))
     with pytest.raises(SeparatrixError, match=r"driven, the last 50 %, which are held out: 1\.5\d? drive"):
         prepare(held_out[0], model)
     with pytest.raises(SeparatrixError, match=r"driven, all but the last 50 %, which are held out: 1\."):
@@ -69,7 +70,7 @@ def test_a_record_too_short_to_hold_out_its_end_is_refused_with_its_part():
 def test_a_gap_is_reported_once_where_the_end_of_a_record_is_held_out():
     t = np.arange(800) / 100
     t[200:] += 0.5
-    training, held_out, _ = _split([driven(t)], [], Model.from_text(CASE))
+    training, held_out, _ = _split([driven(t)], [], OfMotion(Model.from_text(CASE)))
     assert sum("gap of" in text for text in training[0].notes) == 1
     assert held_out[0].notes == []
 
@@ -118,7 +119,7 @@ def test_a_measured_force_acts_at_its_time_after_a_gap():
     model = Model.from_text(PUSHED)
     edge = record.pieces[1][0]
     first = np.array([0, edge - 100, edge, record.t.size - 100])
-    problem = Problem(model, [prepare(record, model)], padded(np.zeros(4, int), first, first + 100), [])
+    problem = BodyInMotion(model, [prepare(record, model)], padded(np.zeros(4, int), first, first + 100), [])
     found = problem.evaluate(np.zeros(0), np.column_stack([record.x[first], v[first]]), derivatives=False)
     assert not found.failed.any()
     # linear interpolation between samples is good to 1e-5 of the force

@@ -16,7 +16,7 @@ from separatrix.discovery.fitting.machine import (
     on_other_records,
     sensor_zeros,
 )
-from separatrix.discovery.fitting.problem import Problem, flight_tolerance
+from separatrix.discovery.fitting.one_body import BodyInMotion, flight_tolerance
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import make_record
@@ -43,7 +43,7 @@ upper = 0.55
 
 
 @pytest.fixture
-def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
+def flown(library) -> tuple[BodyInMotion, np.ndarray, np.ndarray]:
     """Two records with v at different drives, all free; values off those of the case, and starts."""
     model = Model.from_text(f"{CASE}\n[effect.sensor_bias]\nbias = {BIAS}\n")
     t = np.arange(1200) / RATE
@@ -66,7 +66,7 @@ def flown(library) -> tuple[Problem, np.ndarray, np.ndarray]:
     record = np.repeat([0, 1], first.size // 2)
     free = base_parameters(model, measured_force=False) + drive_nuisances(model, prepared)
     free += sensor_zeros(free, 2)
-    problem = Problem(model, prepared, padded(record, first, first + LENGTH), free)
+    problem = BodyInMotion(model, prepared, padded(record, first, first + LENGTH), free)
     off = {"nuisance:drive_scale": 1.03, "nuisance:clock": 0.015, "nuisance:phase": 0.02}
     values = np.array([off.get(one.path, 1.01 * one.value) for one in free])
     starts = np.array(

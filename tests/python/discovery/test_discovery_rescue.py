@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from program import CASE
 from separatrix.discovery.fitting.machine import base_parameters
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.fitting.rescue import rescued, solve_starts
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -40,7 +40,7 @@ def grazing_speed(model: Model) -> float:
     return high
 
 
-def problem_of(model: Model, speed: float) -> Problem:
+def problem_of(model: Model, speed: float) -> BodyInMotion:
     """A record of that motion with noise, and the segment in question; the machine is right."""
     x = flown(model, speed).x + NOISE * np.random.default_rng(3).standard_normal(TIMES.size)
     # what follows belongs to no segment
@@ -48,10 +48,10 @@ def problem_of(model: Model, speed: float) -> Problem:
     head = {"drive_ratio": 1.2, "phase": 0.0, "sensor_noise_sigma_m": NOISE}
     record = make_record("record", {"t": np.arange(600) / 250, "x": np.concatenate([x, rest])}, head)
     free = base_parameters(model, measured_force=False)
-    return Problem(model, [prepare(record, model)], padded(*np.array([[0], [0], [TIMES.size]])), free)
+    return BodyInMotion(model, [prepare(record, model)], padded(*np.array([[0], [0], [TIMES.size]])), free)
 
 
-def chi2_and_hits(problem: Problem, starts: np.ndarray) -> tuple[float, int]:
+def chi2_and_hits(problem: BodyInMotion, starts: np.ndarray) -> tuple[float, int]:
     found = problem.evaluate(problem.values, starts, derivatives=False)
     return float(np.sum(found.residual**2)), int(found.hits[0])
 

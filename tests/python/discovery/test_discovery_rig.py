@@ -7,16 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from program import CASE
-from separatrix.discovery.decision.decide import decide
+from separatrix.discovery.decision import plan as plan_module
+from separatrix.discovery.decision.plan import search
 from separatrix.discovery.decision.rounds import SearchContext
-from separatrix.discovery.decision.with_imperfections import decide_with_imperfections, in_words
+from separatrix.discovery.decision.stages import rig_imperfections
+from separatrix.discovery.decision.stages.rig_imperfections import in_words
+from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.heldout import Known, predict
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.rig import (
     Contest,
@@ -56,7 +59,7 @@ def fitted_base(drag: float, curved: float) -> tuple[Fitted, Model]:
 def with_drag(base: Fitted, true: Model) -> Fitted:
     """The same with the drag that it lacks, which is known."""
     old = base.problem
-    problem = Problem(true, old.prepared, old.segments, old.free)
+    problem = BodyInMotion(true, old.prepared, old.segments, old.free)
     return Fitted(("quadratic_drag",), true, problem, minimise(problem, base.fit.values, base.fit.starts), ())
 
 
@@ -227,14 +230,23 @@ def context_of(curved: tuple[float, float, float], drag: float) -> tuple[SearchC
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.008])
-def test_an_effect_that_faults_hide_is_named_beside_them(drag):
+def test_an_effect_that_faults_hide_is_named_beside_them(monkeypatch, drag):
     """They explain many times as much as it does; without it they are all there is."""
     context, fitted = context_of((1.2e-3, -1.2e-3, 1.2e-3), drag)
-    assert decide(context, fitted).outcome != "named"
-    noise = [(one.sigma, one.memory) for one in context.training.prepared]
-    beside, decision = decide_with_imperfections(context, fitted)
-    assert [(one.sigma, one.memory) for one in context.training.prepared] == noise
-    assert (beside is context) == (not drag)
+    noise = []
+    beside = rig_imperfections.beside_imperfections
+
+    def kept(state: SearchState) -> SearchState:
+        assert state.decision.outcome != "named"
+        noise.append([(one.sigma, one.memory) for one in context.training.prepared])
+        return beside(state)
+
+    plan = tuple(replace(one, run=kept) if one.run is beside else one for one in plan_module.PLAN)
+    monkeypatch.setattr(plan_module, "PLAN", plan)
+    found = search(SearchState(context, fitted))
+    decision = found.decision
+    assert noise == [[(one.sigma, one.memory) for one in context.training.prepared]]
+    assert (found.context.training is context.training) == (not drag)
     assert decision.outcome == ("named" if drag else "none")
     if drag:
         (one,) = decision.accepted
@@ -260,6 +272,7 @@ def test_an_effect_that_faults_hide_is_named_beside_them(drag):
 def test_an_imperfection_beyond_its_largest_size_gives_no_name():
     """A sensor that is curved by four standard deviations: what three leave over is no friction."""
     context, fitted = context_of((2e-3, 2e-3, 2e-3), 0.0)
-    beside, decision = decide_with_imperfections(context, fitted)
-    assert beside is context
-    assert decision.outcome != "named"
+    found = search(SearchState(context, fitted))
+    assert found.context.training is context.training
+    assert found.decision.outcome != "named"
+    assert "rig imperfections" in [one.stage for one in found.steps]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision import decide, flexible, scoring, several
+from separatrix.discovery.decision import flexible, scoring, several
 from separatrix.discovery.decision.gates import best_of
 from separatrix.discovery.decision.scoring import (
     ScoredCandidate,
@@ -17,6 +17,8 @@ from separatrix.discovery.decision.scoring import (
     predicts,
     stable,
 )
+from separatrix.discovery.decision.stages import conclusions, function, one_effect
+from separatrix.discovery.decision.state import Choice, Decision, SearchState
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
@@ -38,7 +40,7 @@ def fit(chi2: np.ndarray, decrement: float = 0.0) -> Fit:
 
 
 def fitted(name: str, chi2: np.ndarray) -> Fitted:
-    problem = SimpleNamespace(free=[Free(f"effect.{name}.force", 1.0)])
+    problem = SimpleNamespace(free=[Free(f"effect.{name}.force", 1.0)], locates=False)
     return Fitted((name,) if name else (), None, problem, fit(chi2), (0,))
 
 
@@ -195,13 +197,13 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
     base = fitted("", np.full(COUNT, 100.0))
     found = SimpleNamespace(base=base)
     context = SimpleNamespace(training=None, held_out=None, options=OPTIONS)
-    monkeypatch.setattr(decide, "missed", lambda data, fit, options: misses)
+    monkeypatch.setattr(conclusions, "missed", lambda data, fit, options: misses)
     gap = SimpleNamespace(closable=closable, p=p, mostly="velocity", fit=base.fit)
     effect = SimpleNamespace(training=gain / 2)
-    given = decide._give_up(context, decide.Decision("none", [], [], [], [found], gap, None), effect)
+    given = conclusions.give_up(context, Decision("none", [], [], [], [found], gap, None), effect)
     assert given.outcome == outcome
     # the same gap of the base, and no effect that stands out
-    other = decide._without_name(context, decide.Decision("none", [], [], [], [found], gap, None))
+    other = conclusions.without_name(context, Decision("none", [], [], [], [found], gap, None))
     assert other.outcome == ("none" if gain > 2.5 else outcome)
     (reason,) = given.reasons
     text = f"{np.sqrt(closable / 1000):.2g} of that of a sample (root mean square), p = {p:.2g}"
@@ -216,7 +218,7 @@ def test_an_effect_that_is_not_all_is_a_gap_only_where_something_of_some_size_is
 def test_a_table_of_friction_is_of_two_directions_unless_its_values_are_shared(name, also, two):
     one = fitted(name, np.full(COUNT, 47.0))
     one.problem.free = [Free(f"effect.{name}.force_1", 1.0, also=also)]
-    assert decide._of_two_directions(ScoredCandidate(one, None, 0.0, 0.0, np.zeros(0), 1)) == two
+    assert function._of_two_directions(ScoredCandidate(one, None, 0.0, 0.0, np.zeros(0), 1)) == two
 
 
 @pytest.mark.parametrize("predicts", [True, False])
@@ -227,13 +229,12 @@ def test_a_function_that_helps_no_held_out_record_is_no_name(monkeypatch, predic
         best.gates = dict.fromkeys(("detect", "stable", "converged", "admissible"), True)
         best.gates["hold-out"] = bool(best.held_out > 0)
 
-    monkeypatch.setattr(decide, "ceiling", lambda *_: None)
-    monkeypatch.setattr(decide, "flexible_member", lambda *_: (one, []))
-    monkeypatch.setattr(decide, "pass_gates", pass_gates)
-    monkeypatch.setattr(decide, "score_ceiling", lambda _, best: best.gates.update(adequate=True))
+    monkeypatch.setattr(function, "flexible_member", lambda *_: (one, []))
+    monkeypatch.setattr(function, "pass_gates", pass_gates)
+    monkeypatch.setattr(function, "score_ceiling", lambda _, best: best.gates.update(adequate=True))
     found = SimpleNamespace(base=one.fitted, screened=SimpleNamespace(tests=1.0))
-    context = SimpleNamespace(scales=SimpleNamespace(mass=1.0))
-    assert (decide._shaped(context, found) is not None) == predicts
+    state = SearchState(SimpleNamespace(), one.fitted, one_in=found)
+    assert (function.as_function(state) is not None) == predicts
 
 
 @pytest.mark.parametrize(("left", "named"), [
@@ -247,15 +248,15 @@ def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, left, n
     one = scored(np.full(COUNT, 5.0), np.ones(COUNT))
     prediction = Prediction(None, None, None, None, left[0], 1.0, None)
     one = replace(one, prediction=prediction)
-    monkeypatch.setattr(decide, "cleaned_prediction", lambda *_: left[1])
-    monkeypatch.setattr(decide, "misses", lambda prediction, *_: prediction.fit > 1.1)
-    monkeypatch.setattr(decide, "_shaped", lambda *_: (one, []))
+    monkeypatch.setattr(function, "cleaned_prediction", lambda *_: left[1])
+    monkeypatch.setattr(function, "misses", lambda prediction, *_: prediction.fit > 1.1)
+    monkeypatch.setattr(function, "as_function", lambda *_: Choice(one, []))
     monkeypatch.setattr(
-        decide, "conclude", lambda context, decision, best, rivals: replace(decision, accepted=[best])
+        function, "conclude", lambda context, decision, best, rivals: replace(decision, accepted=[best])
     )
-    gap = decide.Decision("not-in-catalogue", [], [], [], [], None, None)
-    context = SimpleNamespace(options=OPTIONS)
-    assert bool(decide._shape_alone(context, gap, None).accepted) == named
+    gap = Decision("not-in-catalogue", [], [], [], [], None, None)
+    state = SearchState(SimpleNamespace(options=OPTIONS), one.fitted, decision=gap)
+    assert bool(function.function_alone(state).decision.accepted) == named
 
 
 def excess(size: float) -> SimpleNamespace:
@@ -287,7 +288,7 @@ def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatc
     found.score = lambda one, _: ScoredCandidate(
         one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3
     )
-    context = SimpleNamespace(options=OPTIONS, training=None, predict=lambda *_: None)
+    context = SimpleNamespace(options=OPTIONS, training=None, predict=lambda *_: None, report=lambda _: None)
     best = flexible._fit_table(context, found, member, base, True)
     assert best.fitted is few
     assert (few.finer is more) == (lost == 0)
@@ -308,15 +309,15 @@ def test_a_gap_that_a_segment_in_a_wrong_minimum_carries_is_none(monkeypatch, ca
     chi2[3] = 400.0
     gap = SimpleNamespace(p=1e-10, closable=90.0, fit=None)
     left = {COUNT: gap, COUNT - 1: SimpleNamespace(p=0.1, closable=20.0) if carried else gap}
-    monkeypatch.setattr(decide, "ceiling", lambda problem, fit_, mass: left[int(fit_.good.sum())])
-    monkeypatch.setattr(decide, "missed", lambda *_: [])
+    monkeypatch.setattr(conclusions, "ceiling", lambda problem, fit_, mass: left[int(fit_.good.sum())])
+    monkeypatch.setattr(conclusions, "missed", lambda *_: [])
     table, no = np.zeros((COUNT, 1)), np.zeros(COUNT, bool)
     flown = Evaluation(table, table, no, ~no, table, table, [], np.zeros(COUNT, int))
     base = replace(fitted("", chi2), fit=replace(fit(chi2, decrement=40.0), evaluation=flown))
     context = SimpleNamespace(options=OPTIONS, training=None, held_out=None, scales=SimpleNamespace(mass=1.0))
-    decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], gap, None)
+    decision = Decision("none", [], [], [], [SimpleNamespace(base=base)], gap, None)
     best = scored(np.full(COUNT, 1.0), np.zeros(COUNT))
-    assert decide._give_up(context, decision, best).outcome == outcome
+    assert conclusions.give_up(context, decision, best).outcome == outcome
 
 
 @pytest.mark.parametrize("gained", [0.5, 30.0])
@@ -326,9 +327,9 @@ def test_the_base_is_fitted_again_from_a_lower_minimum_though_no_candidate_conve
     one.fitted.fit.decrement = 100.0
     lower = fit(np.full(COUNT, 100.0 - 2 * gained / COUNT))
     fits = iter([base.fit, lower])
-    monkeypatch.setattr(decide, "shared_values", lambda *_: None)
-    monkeypatch.setattr(decide, "minimise", lambda *_, **__: next(fits))
-    found = decide.renewed(SimpleNamespace(), SimpleNamespace(base=base, scored=[one]))
+    monkeypatch.setattr(one_effect, "shared_values", lambda *_: None)
+    monkeypatch.setattr(one_effect, "minimise", lambda *_, **__: next(fits))
+    found = one_effect.renewed(SimpleNamespace(), SimpleNamespace(base=base, scored=[one]))
     assert (found is not None and found.fit is lower) == (gained > 1)
 
 
@@ -459,15 +460,15 @@ def test_a_name_over_a_base_that_is_not_at_its_minimum_needs_the_held_out_record
     monkeypatch, decrement, predicts, outcome
 ):
     """As a contact that is as stiff as a rigid one, from where the base left a wrong minimum."""
-    monkeypatch.setattr(decide, "_gap_of_base", lambda *_: ([], False))
+    monkeypatch.setattr(conclusions, "_gap_of_base", lambda *_: ([], False))
     base = fitted("", np.full(COUNT, 60.0))
     base.fit.decrement = decrement
     best = scored(np.full(COUNT, 5.0), np.zeros(COUNT))
     best.gates = {"hold-out": predicts, "admissible": True, "converged": True}
-    decision = decide.Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
+    decision = Decision("none", [], [], [], [SimpleNamespace(base=base)], None, None)
     options, data = replace(OPTIONS, adequate_chi2=2.0), SimpleNamespace(prepared=[])
     context = SimpleNamespace(options=options, training=data)
-    assert decide.conclude(context, decision, best, []).outcome == outcome
+    assert conclusions.conclude(context, decision, best, []).outcome == outcome
 
 
 def test_forms_of_one_family_leave_the_family_in_no_doubt():
@@ -475,7 +476,7 @@ def test_forms_of_one_family_leave_the_family_in_no_doubt():
         return SimpleNamespace(fitted=SimpleNamespace(names=names), gates={"separate": False} | gates)
 
     def families(best, *rivals, outcome="ambiguous") -> list[str]:
-        return decide.Decision(outcome, [best], [], list(rivals), [], None, None).in_families
+        return Decision(outcome, [best], [], list(rivals), [], None, None).in_families
 
     drag = one("quadratic_drag", adequate=True)
     assert families(drag, one("viscous"), one("friction_curve")) == ["friction over speed"]

@@ -23,7 +23,7 @@ from separatrix.discovery.decision.verdict import _hump, _of_accepted
 from separatrix.discovery.fitting.ceiling import Ceiling, Family
 from separatrix.discovery.fitting.machine import drive_nuisances
 from separatrix.discovery.fitting.members import MEMBERS
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.fitting.smooth import Part
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
@@ -206,7 +206,7 @@ def test_a_noisy_crank_angle_is_fitted_within_its_error(noise):
         1e-4 * np.sqrt(12 / count) / one.record.duration / one.frequency, rel=0.1
     )
     first = np.arange(0, count - 100, 100)
-    problem = Problem(model, prepared, padded(0 * first, first, first + 100), free)
+    problem = BodyInMotion(model, prepared, padded(0 * first, first, first + 100), free)
     values = problem.values
     starts = np.column_stack([one.record.x[first], np.zeros(first.size)])
     off = values.copy()

@@ -16,16 +16,8 @@ import numpy as np
 from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.policy import FIT, SEARCH
 from separatrix.errors import SeparatrixError
-
-_RATIOS = np.linspace(0.6, 1.5, 13)
-# of the drive, or without one of the start
-_SCALES = (0.6, 1.0, 1.6)
-# of the motion of a joint: amplitude, and how many times as fast; step of a derivative over a parameter
-_AMPLITUDES, _RATES = (0.25, 0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 2.0, 4.0)
-_STEP = 1e-5
-# periods before the motion is looked at, periods that are compared, samples in each
-_SETTLING, _PERIODS, _STEPS = 12, 12, 40
 
 
 @dataclass(frozen=True)
@@ -59,14 +51,16 @@ class Experiment:
 def experiments(one: Fitted, others: list[Fitted]) -> list[Experiment]:
     """Feasible experiments, the most informative first; none where the force on the body must be known."""
     first = one.problem.prepared[0]
-    if first.in_force:
+    if one.problem.experiment == "motion of the joint":
         return _along_other_motions(one, others)
-    if first.record.force is not None:
+    if not one.problem.experiment or first.record.force is not None:
         return []
-    ratios = [None] if first.frequency is None else [float(ratio) for ratio in _RATIOS]
+    ratios = (
+        [None] if first.frequency is None else [float(ratio) for ratio in np.linspace(*SEARCH.drive_ratios)]
+    )
     found = []
     for ratio in ratios:
-        for scale in _SCALES:
+        for scale in SEARCH.drive_scales:
             try:
                 apart = d_primes(one, others, ratio, scale)
             except SeparatrixError:
@@ -81,16 +75,22 @@ def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: floa
     """Distance of a machine from others in a record at a drive ratio of the case, in standard errors."""
     first = one.problem.prepared[0]
     frequency = None if ratio is None else one.model.drive_frequency({"drive.ratio": ratio})
-    length = 2 * np.pi / (frequency or first.natural or 2 * np.pi / (first.record.duration / _PERIODS))
+    length = (
+        2
+        * np.pi
+        / (frequency or first.natural or 2 * np.pi / (first.record.duration / SEARCH.compared_periods))
+    )
     values = _values(one, frequency, scale)
     start = _states(one, values, frequency, length, scale)
-    times = np.tile(np.arange(_STEPS) * length / _STEPS, _PERIODS)
-    edges = np.arange(_PERIODS + 1) * _STEPS
+    times = np.tile(
+        np.arange(SEARCH.compared_steps) * length / SEARCH.compared_steps, SEARCH.compared_periods
+    )
+    edges = np.arange(SEARCH.compared_periods + 1) * SEARCH.compared_steps
     paths, directions, prior = _directions(one, values, scale if ratio is not None else 1.0)
     flown = one.model.segments(
         paths, np.array([values[path] for path in paths]), start, edges, times, directions=directions
     )
-    shape = (_PERIODS, _STEPS)
+    shape = (SEARCH.compared_periods, SEARCH.compared_steps)
     slopes = (flown.jacobian / first.sigma).reshape(*shape, -1)
     found = []
     for other in others:
@@ -104,7 +104,7 @@ def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: floa
             found.append(np.nan)
             continue
         # samples of a whole record for each of these
-        seen = np.ptp(first.record.t) / first.record.interval / (usable.sum() * _STEPS)
+        seen = np.ptp(first.record.t) / first.record.interval / (usable.sum() * SEARCH.compared_steps)
         found.append(_left(apart[usable], slopes[usable], directions.shape[0], seen, prior))
     return found
 
@@ -126,8 +126,8 @@ def _states(
 ) -> np.ndarray:
     """States (periods, 3) at the beginnings of the periods that are compared, once the motion has settled."""
     begun = one.fit.starts[0] * (1.0 if frequency else scale)
-    before = _SETTLING if frequency else 0
-    times = np.arange(before + _PERIODS) * length
+    before = SEARCH.settling_periods if frequency else 0
+    times = np.arange(before + SEARCH.compared_periods) * length
     start = np.array([[*begun, 0.0]])
     flown = one.model.segments(
         list(values), np.array(list(values.values())), start, [0, times.size], times, derivatives=False
@@ -178,8 +178,8 @@ def _prior(one: Fitted, indices: list[int]) -> np.ndarray:
 def _along_other_motions(one: Fitted, others: list[Fitted]) -> list[Experiment]:
     """Records of a driven joint along the motion of the first one, larger or smaller, faster or slower."""
     found = []
-    for scale in _AMPLITUDES:
-        for rate in _RATES:
+    for scale in SEARCH.joint_amplitudes:
+        for rate in SEARCH.joint_rates:
             apart = [_apart_in_force(one, other, scale, rate) for other in others]
             found.append(Experiment(None, scale, min(apart), int(np.argmin(apart)), rate))
     return sorted(found, key=lambda experiment: -experiment.d_prime)
@@ -218,6 +218,7 @@ def _moved(one: Fitted, indices: list[int]) -> Iterator[tuple[np.ndarray, float]
     """Values of the machine with one parameter after the other moved by a step."""
     for index in indices:
         free, values = one.problem.free[index], one.fit.values.copy()
-        step = _STEP * free.size * (1 if values[index] + _STEP * free.size <= free.upper else -1)
+        step = FIT.force_step * free.size
+        step = step if values[index] + step <= free.upper else -step
         values[index] += step
         yield values, step

@@ -8,20 +8,11 @@ from separatrix.discovery.decision.gates import weigh_imperfections
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate, admissible, clear_of, margin
 from separatrix.discovery.fitting.ceiling import Ceiling
-from separatrix.discovery.fitting.curves import KNOTS, fit_member, fits_machine, knots_at
+from separatrix.discovery.fitting.curves import fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.refit import WORSE, Fitted, gain_over
-
-# share of the best evidence, or of what free forces explain, from which on a family is tried
-_PROMISING = 0.3
-# share of a gap that more knots must leave for still more to be tried, though they are not worth it yet
-_SATURATED = 0.8
-# the same for a table that is far behind a closed form; share that a table leaves of a gap it does not close
-_SLOW = 0.5
-_LEFT = 0.5
-# log-likelihood by which a table is far behind
-_FAR_BEHIND = 30.0
+from separatrix.discovery.fitting.refit import Fitted, gain_over
+from separatrix.discovery.policy import FIT, SEARCH
 
 
 def flexible_member(
@@ -55,7 +46,7 @@ def _promising(context: SearchContext, found: Round, ceiling: Ceiling) -> list[M
     highest = max([1e-300, *(one.evidence for one in found.scored)])
     shares = {}
     for member in MEMBERS:
-        if not fits_machine(member, found.base.model):
+        if not (found.base.problem.has_tables and fits_machine(member, found.base.model)):
             continue
         allowed = wanted is None or any(
             name == member.effect or effect_of(name).family == member.family for name in wanted
@@ -64,7 +55,7 @@ def _promising(context: SearchContext, found: Round, ceiling: Ceiling) -> list[M
             continue
         closed = [one.evidence for one in found.scored if effect_of(one.name).family == member.family]
         share = max([free.get(member.explains, 0.0) / most, *(one / highest for one in closed)])
-        if share > _PROMISING:
+        if share > SEARCH.family_promise:
             shares[member] = share
     return sorted(shares, key=lambda member: -shares[member])
 
@@ -76,7 +67,7 @@ def _far_tables(found: Round) -> set[str]:
     for effect, _, _, one in found.tables:
         if one is not None:
             best = min(fit.fit.excess for fit in (one.fitted, one.fitted.finer) if fit is not None)
-            closing[effect] = closing.get(effect, False) or best < _LEFT * gap
+            closing[effect] = closing.get(effect, False) or best < SEARCH.table_leaves * gap
     return {effect for effect, closes in closing.items() if not closes}
 
 
@@ -111,22 +102,22 @@ def _fit_table(
         (one.fitted for one in found.scored if one.fitted.fit.converged), default=None, key=_closeness
     )
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
-        for count in KNOTS:
+        for count in FIT.knots:
             knots = knots_at(member, seen, count)
             made = None
             if knots is not None:
                 made = fit_member(context.training, found.base, member, known, knots, alike, ahead)
             if made is None:
                 break
-            context.options.progress(f"fitting {member.effect} on {count} knots", 0.8)
+            context.report(f"fitting {member.effect} on {count} knots")
             if made.fit.good.sum() < context.options.followed * found.base.fit.good.sum():
                 # lost segments would appear as a gain
                 continue
             if not made.fit.converged:
                 # too many knots for these records, no function, or one still far from its shape
-                if best is not None and made.fit.total < best.fitted.fit.total + WORSE:
+                if best is not None and made.fit.total < best.fitted.fit.total + FIT.worse:
                     best.fitted.finer = made
-                if count > KNOTS[0] and _pointless(known, made, ahead):
+                if count > FIT.knots[0] and _pointless(known, made, ahead):
                     break
                 known = min(known, made, key=lambda one: one.fit.excess)
                 if strict:
@@ -159,8 +150,8 @@ def _pointless(one: Fitted, more: Fitted, ahead: Fitted | None) -> bool:
     Where a closed form is far ahead, most of it is nearly as much.
     """
     before, after = (max(0.0, fitted.fit.excess) for fitted in (one, more))
-    far = ahead is not None and gain_over(more, ahead)[0] < -_FAR_BEHIND
-    return after >= (_SLOW if far else _SATURATED) * before
+    far = ahead is not None and gain_over(more, ahead)[0] < -SEARCH.table_far_behind
+    return after >= (SEARCH.knots_pointless_behind if far else SEARCH.knots_pointless) * before
 
 
 def _begun(found: Round, family: str) -> Fitted:

@@ -3,6 +3,7 @@
 """The choice among candidates and the gates that the chosen one has to pass."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from separatrix.discovery.decision.misfit import refuted
 from separatrix.discovery.decision.rounds import SearchContext
@@ -29,13 +30,24 @@ from separatrix.discovery.fitting.rig import (
     weight_of_imperfections,
 )
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import SEARCH
 
-# share of the evidence of the best from which on imperfections of a rig are weighed beside a candidate, and
-# beside how many
-_SHARE = 0.2
-_WEIGHED = 8
-# relative error of what imperfections of a rig explain, from their linearisation
-_UNSURE = 0.1
+
+class Trial(NamedTuple):
+    """A candidate before the gates: the machine without it, candidates that it does not beat clearly."""
+
+    best: ScoredCandidate
+    base: Fitted
+    rivals: list[ScoredCandidate]
+    options: Options
+
+
+class Gate(NamedTuple):
+    """A condition of a name: when it is passed in words, and its test; None where it does not apply."""
+
+    name: str
+    sentence: str
+    test: Callable[[Trial], object]
 
 
 def choice(
@@ -87,8 +99,8 @@ def weigh_imperfections(context: SearchContext, one: ScoredCandidate) -> None:
 def _leading(pool: list[ScoredCandidate], best: ScoredCandidate, predicted: bool) -> list[ScoredCandidate]:
     """Those that imperfections of a rig may have put behind the best, and itself."""
     able = [one for one in pool if one.prediction is not None or not predicted]
-    near = [one for one in able if one.evidence > _SHARE * best.evidence]
-    return [best, *sorted(near, key=lambda one: -one.evidence)[:_WEIGHED]]
+    near = [one for one in able if one.evidence > SEARCH.weighed_share * best.evidence]
+    return [best, *sorted(near, key=lambda one: -one.evidence)[: SEARCH.weighed]]
 
 
 def best_of(pool: list[ScoredCandidate], options: Options) -> tuple[ScoredCandidate, list[ScoredCandidate]]:
@@ -105,32 +117,20 @@ def pass_gates(
     context: SearchContext, best: ScoredCandidate, base: Fitted, rivals: list[ScoredCandidate], tested: float
 ) -> None:
     """Set the p value of a candidate and every gate but the adequacy."""
-    options = context.options
     if best.prediction is None or best.predicted is None:
         best.own = share_with_imperfections(best.fitted, base)
     else:
         predictions = (best.prediction, best.predicted)
         best.own, best.own_predicted = shares_with_imperfections((best.fitted, base), predictions)
     best.p = detection(best, tested, max(1.0, best.fitted.fit.reduced_chi2))
-    best.gates["converged"] = best.settled
-    best.gates["detect"] = (
-        best.p < options.detection_level and _of_some_size(best, options) and not _within_imperfections(best)
-    )
-    if best.prediction is not None:
-        bounds = held_out_bounds(best, options).values()
-        helps = any(low > 0 for low, _ in bounds) or predicts(best, options)
-        helps |= beyond_doubt(best, base, options)
-        best.gates["hold-out"] = bool(helps and all(high > options.harm for _, high in bounds))
-    best.gates["separate"] = not rivals
-    best.gates["admissible"] = admissible(best, base, options)[0]
-    best.gates["stable"] = stable(best, base, options) >= options.inclusion
+    _pass(GATES, Trial(best, base, rivals, context.options))
 
 
 def _within_imperfections(best: ScoredCandidate) -> bool:
     """Whether imperfections of a rig explain a gain within the error of their linearisation."""
     gained = best.training + best.held_out
     own = best.own * best.training + best.own_predicted * best.held_out
-    return own < _UNSURE * (gained - own)
+    return own < SEARCH.linear_error * (gained - own)
 
 
 def _of_some_size(best: ScoredCandidate, options: Options) -> bool:
@@ -146,7 +146,74 @@ def score_ceiling(context: SearchContext, one: ScoredCandidate) -> None:
     """Set the gate of the adequacy: what a flexible machine would still explain."""
     one.ceiling = ceiling(one.fitted.problem, one.fitted.fit, context.scales.mass)
     one.leaves = adequate(one, context.options)
-    one.gates["adequate"] = bool(one.leaves)
-    if one.prediction is not None:
-        closed = one.leaves == LITTLE
-        one.gates["predicted"] = closed or not refuted(one.prediction, one.fitted.fit, context.options)
+    _pass(GATES_OF_REST, Trial(one, one.fitted, [], context.options))
+
+
+def _pass(gates: tuple[Gate, ...], trial: Trial) -> None:
+    """Set those of the gates that apply."""
+    passed = {gate.name: gate.test(trial) for gate in gates}
+    trial.best.gates |= {name: bool(one) for name, one in passed.items() if one is not None}
+
+
+def _detected(trial: Trial) -> bool:
+    best, options = trial.best, trial.options
+    return (
+        best.p < options.detection_level and _of_some_size(best, options) and not _within_imperfections(best)
+    )
+
+
+def _holds_out(trial: Trial) -> bool | None:
+    best, options = trial.best, trial.options
+    if best.prediction is None:
+        return None
+    bounds = held_out_bounds(best, options).values()
+    helps = any(low > 0 for low, _ in bounds) or predicts(best, options)
+    helps |= beyond_doubt(best, trial.base, options)
+    return helps and all(high > options.harm for _, high in bounds)
+
+
+def _predicted(trial: Trial) -> bool | None:
+    best = trial.best
+    if best.prediction is None:
+        return None
+    return best.leaves == LITTLE or not refuted(best.prediction, best.fitted.fit, trial.options)
+
+
+GATES = (
+    Gate("converged", "the fit has reached its minimum", lambda trial: trial.best.settled),
+    Gate(
+        "detect",
+        "the effect has some size, and its gain exceeds chance and instrument imperfections",
+        _detected,
+    ),
+    Gate(
+        "hold-out",
+        "a held-out record is predicted better, and none is predicted clearly worse",
+        _holds_out,
+    ),
+    Gate(
+        "separate",
+        "the evidence clearly exceeds that of every other candidate",
+        lambda trial: not trial.rivals,
+    ),
+    Gate(
+        "admissible",
+        "the parameters have admissible values that differ from zero",
+        lambda trial: admissible(trial.best, trial.base, trial.options)[0],
+    ),
+    Gate(
+        "stable",
+        "the effect pays for its parameters in 90 % of block bootstraps",
+        lambda trial: stable(trial.best, trial.base, trial.options) >= trial.options.inclusion,
+    ),
+)
+"""Gates of every candidate."""
+GATES_OF_REST = (
+    Gate(
+        "adequate", "only noise remains, or at most a hundredth of the gap", lambda trial: trial.best.leaves
+    ),
+    Gate("predicted", "held-out records are matched nearly as well as training records", _predicted),
+)
+"""Gates of a detected candidate: what it leaves."""
+DROP = "drop", "for sets: every effect of the set is needed"
+"""The gate of several effects, set by `several` and `in_part`."""

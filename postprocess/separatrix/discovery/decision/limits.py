@@ -11,11 +11,10 @@ from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import screen, signature
+from separatrix.discovery.policy import SEARCH
 from separatrix.discovery.wording import unit_of
 
 _LADDER = 4.0 ** np.arange(-3, 4)
-# usual sizes (some per cent of the machine's own) up to which a linearised size is reported
-_BELIEVED = 100.0
 _CALIBRATE = "calibrate the sensor at two known positions"
 _ADVICE = {
     frozenset(
@@ -56,7 +55,7 @@ def detectable(context: SearchContext, found: Round) -> dict[str, dict]:
         elif found.screened.live[name][:1].any():
             usual = made.free[made.added[0]].size
             size = context.options.visible * float(found.screened.error[name][0]) * usual
-            if size > _BELIEVED * usual:
+            if size > SEARCH.believed_sizes * usual:
                 size, reason = None, "the base machine can all but imitate it"
         elif not made.linear.any() and not context.options.quick:
             size = _by_ladder(context, found, made)

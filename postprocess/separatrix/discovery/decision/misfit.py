@@ -8,28 +8,14 @@ from scipy.stats import chi2
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, explained
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.noise import noise_of, white_share
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import SEARCH
 from separatrix.discovery.wording import units_of
-
-# reduced chi^2 below which the noise must be smaller than stated
-_TOO_LITTLE = 0.5
-_ENOUGH = 50
-# factor of the scatter over the stated noise that is worth a word
-_DISAGREEMENT = 1.3
-# factor of noise that was measured over what the samples scatter
-_LARGER = 2.0
-# share of the noise that is rounding from which on its size is no known one
-_ROUNDING = 0.2
-
-# segments that may be in a wrong minimum
-MOST_IN_LOCAL_MINIMUM = 3
-# standard deviations of chi^2 that are no chance
-_CHANCE = 4.0
 
 
 def record_chi2(data: Data, fit: Fit) -> dict[int, tuple[float, int]]:
@@ -88,13 +74,15 @@ def misses(prediction: Prediction, fitted: Fit, options: Options) -> bool:
     kept, freedom = _followed(prediction)
     # noise that was overestimated in training is overestimated here too
     size = prediction.fit.chi2[kept].sum() / freedom / min(1.0, fitted.reduced_chi2)
-    return bool(size > max(options.adequate_chi2, 1 + _CHANCE * np.sqrt(2 / freedom)))
+    return bool(size > max(options.adequate_chi2, 1 + SEARCH.chi2_chance * np.sqrt(2 / freedom)))
 
 
 def refuted(prediction: Prediction, fitted: Fit, options: Options) -> bool:
     """Whether held-out records are missed by more than errors of noise or parameters explain."""
     _, freedom = _followed(prediction)
-    return predicted_chi2(prediction, fitted) > max(options.missed_chi2, 1 + _CHANCE * np.sqrt(2 / freedom))
+    return predicted_chi2(prediction, fitted) > max(
+        options.missed_chi2, 1 + SEARCH.chi2_chance * np.sqrt(2 / freedom)
+    )
 
 
 def predicted_chi2(prediction: Prediction, fitted: Fit) -> float:
@@ -112,7 +100,7 @@ def _followed(prediction: Prediction) -> tuple[np.ndarray, float]:
     """Held-out segments without the few that may be in a wrong minimum, and their degrees of freedom."""
     fit, kept = prediction.fit, prediction.good.copy()
     in_local_minimum = suspicious(fit)
-    if in_local_minimum.size <= MOST_IN_LOCAL_MINIMUM:
+    if in_local_minimum.size <= SEARCH.most_in_local_minimum:
         kept[in_local_minimum] = False
     return kept, max(1.0, float((fit.counts - fit.unknowns)[kept].sum()))
 
@@ -122,11 +110,11 @@ def _limit(one: Prepared, options: Options) -> float:
 
     Unstated noise and its memory are estimates themselves, and rounding follows the motion instead of chance.
     """
-    rounding = one.resolution**2 / 12 > _ROUNDING * one.sigma**2
+    rounding = one.resolution**2 / 12 > SEARCH.rounding_share * one.sigma**2
     return one.doubt * (options.adequate_chi2 if one.sigma_stated and not rounding else options.missed_chi2)
 
 
-def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[str]:
+def doubted_noise(data: Data, problem: Likelihood, fit: Fit, mass: float) -> list[str]:
     """Return in words what noise cannot be as stated or measured, by the best machine that was found.
 
     More scatter counts only if the fourth differences of the samples show it too: a machine that lacks
@@ -134,7 +122,7 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
     """
     notes = []
     units = units_of(problem.model.parameters)
-    unit = units.force if problem.in_force else units.position
+    unit = problem.unit(units)
     factors = noise_of(problem, fit, 0, mass).factors
     found = record_chi2(data, fit)
     for number, one in enumerate(data.prepared):
@@ -144,10 +132,10 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
             notes += _more_than_white(one, unit)
             continue
         scatter = min(one.sigma * factors.get(number, 1.0), white_noise(one.signal))
-        if scatter > _DISAGREEMENT * one.sigma:
+        if scatter > SEARCH.noise_disagreement * one.sigma:
             notes.append(f"{_stated(one, unit)} scatter by {scatter:.3g} {unit}")
         size, freedom = found[number]
-        if size < _TOO_LITTLE and freedom > _ENOUGH:
+        if size < SEARCH.too_quiet and freedom > SEARCH.freedom_of_doubt:
             notes.append(
                 f"{_stated(one, unit)} scatter by only {one.sigma * np.sqrt(size):.3g} {unit}: "
                 "what is smaller than the stated noise is overlooked"
@@ -158,8 +146,11 @@ def doubted_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> list[s
 def _more_than_white(one: Prepared, unit: str) -> list[str]:
     """Noise that was measured as far larger than the samples scatter: coloured, or what the machine lacks."""
     white = white_noise(one.signal)
-    key = "force_noise_sigma_n" if one.in_force else "sensor_noise_sigma_m"
-    if one.sigma < _LARGER * white / np.sqrt(white_share(one.memory)) or one.resolution**2 > 3 * one.sigma**2:
+    key = one.noise_key
+    if (
+        one.sigma < SEARCH.noise_larger * white / np.sqrt(white_share(one.memory))
+        or one.resolution**2 > 3 * one.sigma**2
+    ):
         return []
     return [
         f"{one.record.name}: noise of {one.sigma:.3g} {unit} is taken, neighbouring samples scatter by "
@@ -175,6 +166,6 @@ def too_quiet(data: Data, fit: Fit) -> bool:
     """Whether records scatter by far less than their stated noise."""
     found = record_chi2(data, fit)
     return any(
-        data.prepared[number].sigma_stated and size < _TOO_LITTLE and freedom > _ENOUGH
+        data.prepared[number].sigma_stated and size < SEARCH.too_quiet and freedom > SEARCH.freedom_of_doubt
         for number, (size, freedom) in found.items()
     )

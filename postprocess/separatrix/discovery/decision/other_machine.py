@@ -12,31 +12,12 @@ from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import SEARCH
 from separatrix.discovery.wording import number, unit_of
 
 # what is known of a machine before any record, and the factor by which it is not known
 _KNOWN = ("body.mass", "restoring.stiffness", "restoring.moment")
-_FACTOR = 3.0
-# likeness of a measured force to that of the case from which on they are one but for a factor, and the factor
-# from which on units are the likely reason
-_ALIKE, _UNITS = 0.8, 5.0
-# standard error of a mass over itself with which it is known
-_WELL = 0.1
-# share of a force that may be missed where its mass determines its units
-_LITTLE = 0.1
 _BARRIERS = ("contact.upper", "contact.lower")
-# reduced chi^2 of a record that a wrong drive would leave
-_MISSED = 10.0
-# distance of a fitted phase from the stated one that is no error of reading [rad]
-_ANOTHER_PHASE = 0.3
-# orders of harmonics and subharmonics of a drive that a motion may follow
-_ORDERS = (1, 2, 3)
-# share of the power of x that a clear line has
-_CLEAR = 0.5
-# error of the strongest line of a spectrum: share of its frequency, and of the distance of its bins
-_LINE, _BIN = 0.02, 0.5
-# points of the spectrum between two such bins
-_FINER = 8
 
 
 def other_machine(data: Data, fitted: Fitted, options: Options) -> list[str]:
@@ -55,7 +36,11 @@ def other_machine(data: Data, fitted: Fitted, options: Options) -> list[str]:
             continue
         case = model.parameters[one.path].value
         ratio = found / case if case else 1.0
-        far = not 1 / _FACTOR < ratio < _FACTOR if one.path in _KNOWN else abs(found - case) > spread
+        far = (
+            not 1 / SEARCH.other_factor < ratio < SEARCH.other_factor
+            if one.path in _KNOWN
+            else abs(found - case) > spread
+        )
         if far:
             unit = unit_of(one.path, model.parameters[one.path].unit, model.parameters)
             strange.append(f"{one.path} {number(found, 3)} {unit} (case: {number(case, 3)})")
@@ -72,7 +57,7 @@ def other_units(data: Data, model) -> list[str]:
     """
     notes = []
     for one in data.prepared:
-        if not one.in_force:
+        if one.driven is None:
             continue
         motion, at, record = one.driven, one.driven.moves, one.record
         taken = force_needed(model, {}, motion, record.force, record.pieces)[at]
@@ -82,10 +67,10 @@ def other_units(data: Data, model) -> list[str]:
             columns.append(motion.x[at])
         mass, error, missed = _mass(np.stack(columns, axis=1), record.force[at])
         # a force that is missing leans on the acceleration, too
-        of_mass = factor is not None and error < _WELL * mass and missed < _LITTLE
+        of_mass = factor is not None and error < SEARCH.mass_known * mass and missed < SEARCH.force_missed
         if of_mass:
             factor = mass / one.mass
-        if factor is not None and not 1 / _UNITS < factor < _UNITS:
+        if factor is not None and not 1 / SEARCH.unit_factor < factor < SEARCH.unit_factor:
             what = "the mass that force and acceleration give" if of_mass else "the force"
             notes.append(
                 f"{record.name}: {what} is {number(factor, 2)} times that of the machine of the case: "
@@ -97,7 +82,7 @@ def other_units(data: Data, model) -> list[str]:
 def _factor(taken: np.ndarray, measured: np.ndarray) -> float | None:
     """By which one force is the other, None where it is another one."""
     product, size = float(taken @ measured), float(taken @ taken)
-    if size == 0 or product < _ALIKE * np.sqrt(size * float(measured @ measured)):
+    if size == 0 or product < SEARCH.force_alike * np.sqrt(size * float(measured @ measured)):
         return None
     return product / size
 
@@ -120,13 +105,15 @@ def other_drive(data: Data, base: Fitted) -> list[str]:
     notes = []
     for index, (size, _) in record_chi2(data, base.fit).items():
         one = data.prepared[index]
-        if size < _MISSED or one.frequency is None:
+        if size < SEARCH.drive_missed or one.frequency is None:
             continue
         line, apart, share = strongest_line(one)
-        if share < _CLEAR:
+        if share < SEARCH.clear_line:
             continue
-        wanted = [one.frequency * p / q for p in _ORDERS for q in _ORDERS]
-        if all(abs(line - known) > max(_LINE * known, _BIN * apart) for known in wanted):
+        wanted = [one.frequency * p / q for p in SEARCH.drive_orders for q in SEARCH.drive_orders]
+        if all(
+            abs(line - known) > max(SEARCH.line_error * known, SEARCH.line_bin * apart) for known in wanted
+        ):
             notes.append(
                 f"{one.record.name}: x moves mostly at {number(line, 4)} rad/s, the drive is taken to "
                 f"turn at {number(one.frequency, 4)} rad/s: is drive_ratio right?"
@@ -142,7 +129,7 @@ def other_phase(data: Data, fitted: Fitted | Prediction) -> list[str]:
             continue
         prepared = data.prepared[one.record]
         beside = float(np.angle(np.exp(1j * value)))
-        if prepared.phase_known or not prepared.phase_stated or abs(beside) < _ANOTHER_PHASE:
+        if prepared.phase_known or not prepared.phase_stated or abs(beside) < SEARCH.another_phase:
             continue
         notes.append(
             f"{prepared.record.name}: the drive is {number(abs(beside), 2)} rad "
@@ -158,10 +145,10 @@ def strongest_line(one: Prepared) -> tuple[float, float, float]:
     """
     first, last = max(one.record.pieces, key=lambda piece: piece[1] - piece[0])
     x = one.record.x[first:last]
-    power = np.abs(np.fft.rfft((x - x.mean()) * get_window("hann", x.size), _FINER * x.size)) ** 2
-    power[:_FINER] = 0.0
+    power = np.abs(np.fft.rfft((x - x.mean()) * get_window("hann", x.size), SEARCH.finer_bins * x.size)) ** 2
+    power[: SEARCH.finer_bins] = 0.0
     peak = int(np.argmax(power))
     # a Hann window spreads a line over two of its bins on either side
-    share = power[max(0, peak - 2 * _FINER) : peak + 2 * _FINER + 1].sum() / power.sum()
+    share = power[max(0, peak - 2 * SEARCH.finer_bins) : peak + 2 * SEARCH.finer_bins + 1].sum() / power.sum()
     apart = 2 * np.pi / (x.size * one.record.interval)
-    return peak * apart / _FINER, apart, float(share)
+    return peak * apart / SEARCH.finer_bins, apart, float(share)

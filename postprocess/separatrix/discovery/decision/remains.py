@@ -13,13 +13,10 @@ import numpy as np
 
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
-
-# size over the noise of a sample from which on the dependence of the remaining gap is reported
-_WORTH_WORDS = 0.2
+from separatrix.discovery.policy import SEARCH
 
 
 @dataclass
@@ -40,7 +37,7 @@ class Remains:
         )
         left = (
             "what remains is below the noise of a sample"
-            if self.size < _WORTH_WORDS
+            if self.size < SEARCH.worth_words
             else (f"what remains is {self.size:.2g} times the noise of a sample")
         )
         rest = f", mostly a force that depends on {self.depends_on}" if self.depends_on else ""
@@ -75,7 +72,7 @@ def _remains(
 ) -> Remains:
     closed = closed_share(_fit_of(before), _fit_of(after))
     size = float(np.sqrt(max(0.0, _fit_of(after).sample_chi2 - 1)))
-    if size < _WORTH_WORDS or isinstance(after.problem, CoordinateProblem):
+    if size < SEARCH.worth_words or after.problem.locates:
         # with several bodies, forces at several locations explain what remains
         return Remains(use, closed, size, "")
     return Remains(use, closed, size, (known or ceiling(after.problem, after.fit, mass)).mostly)

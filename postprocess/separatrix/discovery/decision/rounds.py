@@ -11,7 +11,7 @@ from separatrix.discovery.fitting.catalogue import ON_REQUEST, Candidate, Scales
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
-from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of, names_for
+from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.locations import SensedScales
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import solve_scaled
@@ -27,22 +27,7 @@ from separatrix.discovery.fitting.refit import (
 from separatrix.discovery.fitting.rig import cleaned, with_imperfections
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.options import Options
-
-_CERTAIN_REFITS = 5
-_RELATED = 0.7
-# log-likelihood that a candidate must promise to be worth a refit, where the base is good already
-_WORTH = 1.0
-_FEWEST = 2
-_BAD = 1.3
-# number of leading candidates that are tried again from the best, and their least gain
-_CROSSED = 4
-_WORTH_CROSSING = 5.0
-_SHARE = 0.3
-# share of the best gain from which on an effect that is absent at no size is tried: one form of it predicts
-# little of the others
-_CURVED = 0.05
-# behind the best by less than so many separations: fitted to the end
-_NEAR = 3.0
+from separatrix.discovery.policy import SEARCH
 
 
 @dataclass
@@ -53,6 +38,13 @@ class SearchContext:
     held_out: Data | None
     scales: Scales | SensedScales
     options: Options
+    # the part of all work that the present stage is
+    span: tuple[float, float] = (0.0, 1.0)
+
+    def report(self, text: str, part: float = 0.0) -> None:
+        """Report what begins, a part of the present stage being over."""
+        first, last = self.span
+        self.options.progress(text, first + (last - first) * part)
 
     def predict(self, fitted: Fitted, other: Prediction | None = None) -> Prediction | None:
         """Score the held-out records, also from the end of an `other` prediction of them."""
@@ -103,8 +95,6 @@ def run_round(
     context: SearchContext,
     base: Fitted,
     predicted: Prediction | None,
-    first: float,
-    last: float,
     earlier: Round | None = None,
     everything: bool = False,
     without: frozenset[str] = frozenset(),
@@ -123,7 +113,7 @@ def run_round(
         known_alone = [replace(one, imperfections=None) for one in earlier.scored]
         found = replace(earlier, predicted=predicted, scored=known_alone)
     else:
-        found = _screened(context, base, predicted, first)
+        found = _screened(context, base, predicted)
     known = {one.name: one.fitted for one in earlier.scored} if earlier else {}
     ends = [one for one in found.scored if one.fitted.fit.converged]
     rival = max(ends, key=lambda one: one.training).fitted if ends else None
@@ -136,7 +126,7 @@ def run_round(
     ranked = list(known)
     chosen.sort(key=lambda name: ranked.index(name) if name in ranked else len(ranked))
     for number, name in enumerate(chosen):
-        options.progress(f"fitting {name}", first + (last - first) * number / len(chosen))
+        context.report(f"fitting {name}", number / len(chosen))
         fitted = refit(
             context.training,
             base,
@@ -160,13 +150,13 @@ def run_round(
     return found
 
 
-def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None, at: float) -> Round:
+def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None) -> Round:
     """All candidates on top of a machine and what they would do, none of them fitted yet."""
     options = context.options
     free = with_values(base.problem.free, base.fit.values)
     candidates: dict[str, Candidate] = {}
     absent: dict[str, str] = {}
-    every = names_for(base.model, options.candidates)
+    every = base.problem.effects(options.candidates)
     for name in every:
         if name in base.names:
             continue
@@ -175,15 +165,16 @@ def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None
         if name in ON_REQUEST and not options.candidates:
             absent[name] = ON_REQUEST[name]
             continue
-        if base.problem.in_force and effect_of(name).acts != "flight":
-            absent[name] = "it does nothing to the force along a known motion"
+        why = base.problem.cannot_show(effect_of(name))
+        if why:
+            absent[name] = why
             continue
         made = candidate_of(base.model, free, base.names, name, context.scales)
         if isinstance(made, str):
             absent[name] = made
         else:
             candidates[name] = made
-    options.progress(f"screening {len(candidates)} effects", at)
+    context.report(f"screening {len(candidates)} effects")
     shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
@@ -225,7 +216,7 @@ def _beaten_by_noise(fitted: Fitted, base: Fitted) -> bool:
 
 def _fair(context: SearchContext, found: Round) -> None:
     """Let the base predict from the starts of the best candidate too, and compare all with that."""
-    if found.predicted is None or not found.scored or found.scored[0].held_out < _WORTH:
+    if found.predicted is None or not found.scored or found.scored[0].held_out < SEARCH.worth_a_refit:
         return
     fairer = context.predict(found.base, found.scored[0].prediction)
     if fairer.score[fairer.good].sum() <= found.predicted.score[found.predicted.good].sum():
@@ -239,7 +230,7 @@ def _carry_on(context: SearchContext, found: Round) -> None:
     """Fit the candidates near the best to convergence and let them predict, whatever the screen promised."""
     order = found.scored
     for index, one in enumerate(order):
-        near = order[0].evidence - one.evidence < _NEAR * context.options.separation
+        near = order[0].evidence - one.evidence < SEARCH.near * context.options.separation
         done = one.fitted.fit.converged
         if near and not (done and (one.prediction is not None or context.held_out is None)):
             fitted = one.fitted
@@ -253,13 +244,13 @@ def _carry_on(context: SearchContext, found: Round) -> None:
 def _cross(context: SearchContext, found: Round) -> None:
     """Try the leaders again from the machine of the best: it may have left a minimum of theirs."""
     order = found.scored
-    if len(order) < 2 or context.options.quick or order[0].training < _WORTH_CROSSING:
+    if len(order) < 2 or context.options.quick or order[0].training < SEARCH.worth_crossing:
         return
     best = order[0].fitted
-    for index in range(1, min(_CROSSED, len(order))):
+    for index in range(1, min(SEARCH.crossed, len(order))):
         one = order[index]
         behind = order[0].evidence - one.evidence
-        if behind < context.options.separation or one.evidence < _SHARE * order[0].evidence:
+        if behind < context.options.separation or one.evidence < SEARCH.crossed_share * order[0].evidence:
             continue
         better = crossed(context.training, one.fitted, best, found.candidates[one.name])
         if better is not one.fitted:
@@ -274,9 +265,9 @@ def _same_motion(context: SearchContext, found: Round) -> None:
     """
     order = found.scored
     best = next((one for one in order if effect_of(one.name).confused), None)
-    if best is None or context.options.quick or best.training < _WORTH_CROSSING:
+    if best is None or context.options.quick or best.training < SEARCH.worth_crossing:
         return
-    if best.evidence < _SHARE * order[0].evidence:
+    if best.evidence < SEARCH.crossed_share * order[0].evidence:
         return
     for index, one in enumerate(order):
         behind = best.evidence - one.evidence
@@ -292,19 +283,25 @@ def _same_motion(context: SearchContext, found: Round) -> None:
 def choose(base: Fitted, screened: Screened, options: Options, everything: bool = False) -> list[str]:
     """Names to refit, best first; all of them where the base is too bad for the linear screen."""
     order = sorted(filter(screened.seen, screened.names), key=lambda name: -screened.gain[name])
-    bad = base.fit.reduced_chi2 > _BAD and not options.quick
-    if everything or (bad and cleaned(base.problem, base.fit).reduced_chi2 > _BAD):
+    bad = base.fit.reduced_chi2 > SEARCH.bad_base and not options.quick
+    if everything or (bad and cleaned(base.problem, base.fit).reduced_chi2 > SEARCH.bad_base):
         return order
     return [
         name
         for index, name in enumerate(order)
-        if (index < _CERTAIN_REFITS and (screened.gain[name] > _WORTH or index < _FEWEST))
+        if (
+            index < SEARCH.certain_refits
+            and (screened.gain[name] > SEARCH.worth_a_refit or index < SEARCH.fewest_refits)
+        )
         or (
-            screened.gain[name] > _WORTH
+            screened.gain[name] > SEARCH.worth_a_refit
             and not options.quick
             and (
-                any(screened.cosine(name, other) > _RELATED for other in order[:3])
-                or (not screened.live[name].any() and screened.gain[name] > _CURVED * screened.gain[order[0]])
+                any(screened.cosine(name, other) > SEARCH.related for other in order[:3])
+                or (
+                    not screened.live[name].any()
+                    and screened.gain[name] > SEARCH.curved_share * screened.gain[order[0]]
+                )
             )
         )
     ]

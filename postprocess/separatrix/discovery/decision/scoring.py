@@ -16,22 +16,10 @@ from separatrix.discovery.fitting.locations import usual_speed
 from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.rig import share_with_imperfections
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import SEARCH
 
-_BLOCKS = 2
-# fewer segments than this have no distribution of their own to draw from
-_FEW = 5
-# share of the mean information on an effect below which a segment has none
-_SILENT = 0.01
-# log-likelihood of an effect that no held-out record can show
-_DOUBTLESS = 10.0
-# p value of so many segments in which a held-out record is predicted better
-_CHANCE = 0.05
-# share of what imperfections of a rig do that is not linear
-_LINEAR = 0.2
 # what imperfections add where they were not weighed
 _NO_IMPERFECTIONS = (0.0, 0.0)
-# share of a gain that a step may still promise of a fit that ended at a kink, as of a body that sticks
-_KINK_SHARE = 0.01
 
 
 @dataclass
@@ -67,7 +55,11 @@ class ScoredCandidate:
     def settled(self) -> bool:
         """Whether the fit is at its end: converged, or at a kink from where little of the gain is missing."""
         fit = self.fitted.fit
-        kink = fit.exhausted and not fit.in_local_minimum and fit.decrement < _KINK_SHARE * 2 * self.training
+        kink = (
+            fit.exhausted
+            and not fit.in_local_minimum
+            and fit.decrement < SEARCH.kink_share * 2 * self.training
+        )
         return bool(fit.converged or kink)
 
     @property
@@ -143,7 +135,7 @@ def held_out_bounds(one: ScoredCandidate, options: Options) -> dict[int, tuple[f
     for number in np.unique(one.prediction.record):
         here = one.prediction.record == number
         parts = one.held_out_parts[here & informative] / one.prediction.misfit
-        if parts.size < _FEW:
+        if parts.size < SEARCH.few_segments:
             whole = float(one.held_out_parts[here].sum()) / one.prediction.misfit
             bounds[int(number)] = (whole - options.separation, whole + options.separation)
             continue
@@ -168,7 +160,7 @@ def predicts(one: ScoredCandidate, options: Options) -> bool:
         if parts.sum() <= least:
             continue
         better = int(np.sum(parts > 0))
-        if parts.sum() > parts.max() or binom.sf(better - 1, parts.size, 0.5) < _CHANCE:
+        if parts.sum() > parts.max() or binom.sf(better - 1, parts.size, 0.5) < SEARCH.better_segments_p:
             return True
     return False
 
@@ -184,7 +176,7 @@ def beyond_doubt(one: ScoredCandidate, base: Fitted, options: Options) -> bool:
     alike = float(np.abs(parts).sum()) < options.separation * misfit
     expected = float(_held_out_information(one).sum()) / 2
     silent = expected < options.separation and float(parts.sum()) > options.harm * misfit
-    doubtless = one.training - one.parameters > _DOUBTLESS * misfit
+    doubtless = one.training - one.parameters > SEARCH.doubtless * misfit
     return bool(compared and (alike or silent) and base.fit.converged and doubtless)
 
 
@@ -203,7 +195,7 @@ def _informative(one: ScoredCandidate) -> np.ndarray:
     informative = np.zeros(information.size, bool)
     for number in np.unique(prediction.record):
         here = prediction.record == number
-        informative[here] = information[here] > _SILENT * information[here].mean()
+        informative[here] = information[here] > SEARCH.silent_segment * information[here].mean()
     return informative & (one.held_out_parts != 0)
 
 
@@ -219,9 +211,9 @@ def _information(
 def _block_sums(parts: np.ndarray, random: np.random.Generator, count: int) -> np.ndarray:
     """Totals of resampled series of the same length, drawn in blocks of neighbours (circular)."""
     n = parts.size
-    blocks = -(-n // _BLOCKS)
+    blocks = -(-n // SEARCH.bootstrap_block)
     first = random.integers(0, n, (count, blocks))
-    index = (first[:, :, None] + np.arange(_BLOCKS)) % n
+    index = (first[:, :, None] + np.arange(SEARCH.bootstrap_block)) % n
     return parts[index].sum(axis=(1, 2))
 
 
@@ -241,10 +233,10 @@ def stable(one: ScoredCandidate, base: Fitted, options: Options) -> float:
     if not added.size:
         return 0.0
     information = _information(one.fitted, fit.reduced.matrix, added)
-    informative = information > _SILENT * information.mean()
+    informative = information > SEARCH.silent_segment * information.mean()
     rest = min(0.0, float(parts[~informative].sum()))
     proven = one.held_out_parts.size and gain - one.parameters > options.separation
-    if informative.sum() < _FEW:
+    if informative.sum() < SEARCH.few_segments:
         predicted = one.held_out_parts.sum() / one.prediction.misfit if proven else 0.0
         others = parts[informative].sum() - parts[informative].max(initial=0.0)
         return float(others + rest + predicted > one.parameters)
@@ -293,7 +285,7 @@ def clear_of(best: ScoredCandidate, other: ScoredCandidate, options: Options) ->
     fitted = best.fitted_evidence - other.fitted_evidence
     if any(best.imperfections or _NO_IMPERFECTIONS) and any(other.imperfections or _NO_IMPERFECTIONS):
         # both have them already, as far as they are linear
-        unsure = _LINEAR * max(sum(best.imperfections), sum(other.imperfections))
+        unsure = SEARCH.not_linear * max(sum(best.imperfections), sum(other.imperfections))
         return over >= least and min(fitted, over - fitted) > -max(least, unsure)
     if over < least or min(fitted, over - fitted) <= -least:
         return False

@@ -22,12 +22,7 @@ from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.refit import Fitted, hopeless, refit, warm_started_by
 from separatrix.discovery.fitting.screen import screen, signature
-
-_PAIRS = 6
-# share of what is left of the gap that an effect must close for another one to be looked for on top of it
-_CLOSES = 0.5
-# share of the evidence of an effect alone from which on another of its family replaces it in a trial
-_SHARE = 0.3
+from separatrix.discovery.policy import SEARCH
 
 
 def with_more(
@@ -71,12 +66,12 @@ def _grown(context: SearchContext, rounds: list[Round], found: ScoredCandidate) 
     limit = hopeless(first.base)
     # an effect that alone is far from the records, as a soft barrier for hard impacts, is no second effect
     lost = frozenset(one.name for one in first.scored if one.fitted.fit.far_off(limit))
-    rounds.append(run_round(context, found.fitted, found.prediction, 0.8, 0.9, without=lost))
+    rounds.append(run_round(context, found.fitted, found.prediction, without=lost))
     sets = [over_base(context, first.base, first.predicted, one) for one in rounds[-1].scored]
     if len(found.fitted.names) > 1:
         return sets
     tried = {frozenset(one.fitted.names) for one in sets}
-    for _, *pair in pair_gains(first)[:_PAIRS]:
+    for _, *pair in pair_gains(first)[: SEARCH.pairs]:
         if frozenset(pair) not in tried and lost.isdisjoint(pair):
             made = fit_set(context, first, pair)
             if made is not None:
@@ -93,7 +88,7 @@ def _swapped(
     alone = {one.name: one for one in first.scored}
     for name in whole.fitted.names:
         rest = [other for other in whole.fitted.names if other != name]
-        least = _SHARE * alone[name].evidence if name in alone else -np.inf
+        least = SEARCH.swapped_share * alone[name].evidence if name in alone else -np.inf
         for one in first.scored:
             of_family = effect_of(one.name).family == effect_of(name).family
             if one.name in whole.fitted.names or not of_family or one.evidence < least:
@@ -111,7 +106,7 @@ def _closes_most(before: ScoredCandidate, after: ScoredCandidate) -> bool:
     shares = [closed_share(before.fitted.fit, after.fitted.fit)]
     if before.prediction is not None and after.prediction is not None:
         shares.append(closed_share(before.prediction, after.prediction))
-    return all(share is None or share > _CLOSES for share in shares)
+    return all(share is None or share > SEARCH.closes_of_rest for share in shares)
 
 
 def _warm_started_by(

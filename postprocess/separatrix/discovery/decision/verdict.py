@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.experiments import experiments
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
@@ -15,25 +14,22 @@ from separatrix.discovery.decision.other_machine import other_drive, other_machi
 from separatrix.discovery.decision.remains import Remains, remains_of
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import LARGER_NOISE, LITTLE, ScoredCandidate
+from separatrix.discovery.decision.stages.rig_imperfections import in_words
+from separatrix.discovery.decision.state import Decision, Step
 from separatrix.discovery.decision.where import Map, sentences, where_maps
-from separatrix.discovery.decision.with_imperfections import in_words
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_effects import effect_of, location_of
+from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
-from separatrix.discovery.fitting.refit import WORSE, Fitted
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import Function, Part
-from separatrix.discovery.measured.sensors import SensedPrepared
+from separatrix.discovery.policy import FIT, SEARCH
 from separatrix.discovery.wording import unit_of, units_of
 from separatrix.version import __version__
-
-# experiments that are reported, rivals that they should separate
-_EXPERIMENTS, _RIVALS = 5, 4
 
 
 @dataclass
@@ -44,6 +40,7 @@ class Findings:
     base: Fitted
     decision: Decision
     held_out_chosen: str
+    steps: tuple[Step, ...] = ()
     maps: list[Map] = field(default_factory=list)
 
 
@@ -72,14 +69,17 @@ def verdict_of(findings: Findings) -> dict:
         "where": sentences(findings.maps),
         "gap": _gap(findings),
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
-        "locations": _locations(final, named, decision),
+        "locations": findings.base.problem.locations(
+            [*named, *(name for names in decision.alternatives for name in names)]
+        ),
         "families": [effect_of(name).family for name in final.names],
         "function": _function(decision.function, final),
         "character": [one.as_dict() for one in decision.characters],
         "gates": best.gates if best else {},
         "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
-        "reasons": decision.reasons,
+        "reasons": list(decision.reasons),
+        "search": [one._asdict() for one in findings.steps],
         "asked_for": None if context.options.candidates is None else list(context.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
         "detectable": detectable(context, first),
@@ -101,30 +101,15 @@ def verdict_of(findings: Findings) -> dict:
     }
 
 
-def _locations(final: Fitted, named: list[str], decision: Decision) -> dict[str, str]:
-    """Locations of the effects of the verdict in a machine of several bodies, in words; none of one body."""
-    if not isinstance(final.problem, CoordinateProblem):
-        return {}
-    structure = decision.rounds[0].base.problem.structure
-    every = [*named, *(name for names in decision.alternatives for name in names)]
-    found = {}
-    for name in every:
-        where = location_of(name)
-        known = [one.text() for one in structure.locations if one.name == where or where in one.joints]
-        found[name] = known[0] if known else where
-    return found
-
-
 def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     """What to measure next where the name is in doubt: known advice, experiments by their d'."""
     if findings.decision.outcome != "ambiguous":
         return {"separating_experiment": "", "experiments": []}
-    if isinstance(final.problem, CoordinateProblem):
-        # experiments are flown by one body
+    if not final.problem.experiment:
         return {"separating_experiment": "", "experiments": []}
-    others = rivals[:_RIVALS] or [findings.base]
+    others = rivals[: SEARCH.experiment_rivals] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))
-    found = [one for one in experiments(final, others) if one.d_prime > 1][:_EXPERIMENTS]
+    found = [one for one in experiments(final, others) if one.d_prime > 1][: SEARCH.experiments]
     # a name that no held-out record confirms needs one that does, also where it has rivals
     use = "training" if findings.decision.accepted[0].gates.get("hold-out", True) else "held out"
     texts = [f"{one.text(name, names)}{'; hold it out' if use == 'held out' else ''}" for one in found]
@@ -214,7 +199,7 @@ def _candidate(one: ScoredCandidate) -> dict:
         "evidence": one.evidence,
         "reduced_chi2": fit.sample_chi2,
         # a fit worse than the base has not found its minimum, which includes the effect of size zero
-        "converged": fit.converged and one.training > -WORSE,
+        "converged": fit.converged and one.training > -FIT.worse,
         "starts": one.fitted.tries,
         "values": {
             one.fitted.problem.free[i].path: one.fitted.problem.free[i].physical(fit.values[i])
@@ -235,11 +220,10 @@ def _notes(findings: Findings) -> list[str]:
     notes += in_words(fits[0][2])
     for _, data, fitted in fits:
         notes += other_phase(data, fitted)
-        if isinstance(fitted.problem, CoordinateProblem):
-            continue
-        notes += doubted_noise(data, fitted.problem, fitted.fit, context.scales.mass)
-    several = isinstance(findings.base.problem, CoordinateProblem)
-    notes += [] if several else other_machine(context.training, fits[0][2], context.options)
+        if fitted.problem.one_signal:
+            notes += doubted_noise(data, fitted.problem, fitted.fit, context.scales.mass)
+    if findings.base.problem.one_signal:
+        notes += other_machine(context.training, fits[0][2], context.options)
     notes += other_units(context.training, findings.base.model)
     if findings.decision.outcome in ("not-in-catalogue", "characterised"):
         notes += other_drive(context.training, findings.base)
@@ -317,8 +301,8 @@ def _records(findings: Findings) -> list[dict]:
                     "sensor_bias": machine.get(SENSOR_BIAS),
                 }
             )
-            if isinstance(one, SensedPrepared):
-                found[-1]["sensors"] = {sensor.name: sensor.sigma for sensor in one.sensors}
+            if one.sensor_noise:
+                found[-1]["sensors"] = one.sensor_noise
     return found
 
 

@@ -6,28 +6,18 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
-from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances, sensor_zeros
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.noise import noise_of
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import cleaned
-from separatrix.discovery.fitting.sensed import SensedData, joint_parameters, measure_sensors
 from separatrix.discovery.measured.signals import white_noise
-
-_PHASES = 12
-_RENEWED = 0.03
-_RENEWED_MEMORY = 0.06
-# reduced chi^2 above which correlated residuals are due to the model rather than the noise
-_MISFIT = 1.5
-# share of the segments
-_HARDLY_ANY = 0.1
-# noise of a held-out record over what the sensor of the training records would leave there
-_SAME_SENSOR = 1.5
+from separatrix.discovery.policy import FIT
 
 
 def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can determine; sets noise and memory of the records."""
-    free = _free(data, model)
+    free = data.unknowns(model)
     find_phases(data, model, free)
     values = np.array([one.value for one in free])
     problem, fit = fit_stages(data, model, free, values, stages=[0, 1])
@@ -57,28 +47,17 @@ def _follows_better(fit: Fit, best: Fit) -> bool:
     A fit that follows no segment has no misfit.
     """
     kept, now = best.good.sum(), fit.good.sum()
-    if kept < _HARDLY_ANY * best.good.size:
+    if kept < FIT.hardly_any * best.good.size:
         return bool(now > kept)
     return bool(now >= kept and fit.total < best.total)
 
 
-def _free(data: Data, model) -> list[Free]:
-    """What is free in the base machine."""
-    if isinstance(data, SensedData):
-        forces = any(sensor.kind == "F" for one in data.prepared for sensor in one.sensors)
-        return joint_parameters(model, forces) + drive_nuisances(model, data.prepared)
-    force = any(one.record.force is not None for one in data.prepared)
-    free = base_parameters(model, force, data.prepared[0].in_force) + drive_nuisances(model, data.prepared)
-    return free + sensor_zeros(free, len(data.prepared))
-
-
-def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
+def measure_noise(data: Data, problem: Likelihood, fit: Fit, mass: float) -> None:
     """Set what the records do not state.
 
     The fit must have been made without memory.
     """
-    if isinstance(data, SensedData):
-        measure_sensors(data, problem, fit)
+    if data.measured_by_sensor(problem, fit):
         return
     found = noise_of(problem, fit, 0, mass)
     factors = found.factors
@@ -87,7 +66,7 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
         measured = prepared.sigma * factors.get(number, 1.0)
         if not prepared.sigma_stated:
             prepared.sigma = max(measured, prepared.resolution / np.sqrt(12))
-    if not problem.in_force and any(one.record.v is not None for one in data.prepared):
+    if problem.channels > 1:
         # products of velocities in condensed blocks are not kept
         memory = found.memory if found.of_samples else None
         speeds = noise_of(problem, fit, 1, mass, memory).factors
@@ -97,24 +76,26 @@ def measure_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> None:
     scatter = np.median([data.prepared[i].sigma ** 2 for i in factors] or [1.0])
     misfit = fit.reduced_chi2 * before / max(scatter, 1e-300)
     # with memory of the noise, values of blocks scatter by more than samples: that is no misfit
-    known = found.of_samples or misfit < _MISFIT
+    known = found.of_samples or misfit < FIT.misfit_of_memory
     if not known and found.memory:
         # nor are small imperfections of a rig
-        known = misfit * cleaned(problem, fit).reduced_chi2 / fit.reduced_chi2 < _MISFIT
+        known = misfit * cleaned(problem, fit).reduced_chi2 / fit.reduced_chi2 < FIT.misfit_of_memory
     for prepared in data.prepared:
         prepared.memory = found.memory if known else 0.0
         prepared.memory_error = found.error
 
 
-def renew_noise(data: Data, problem: Problem, fit: Fit, mass: float) -> bool:
+def renew_noise(data: Data, problem: Likelihood, fit: Fit, mass: float) -> bool:
     """Measure the noise anew by a better fit; whether it changed enough to matter (else it stays)."""
     before = [one.noise for one in data.prepared]
     for one in data.prepared:
         one.memory = 0.0
     measure_noise(data, problem, again(problem, fit), mass)
     changed = any(
-        abs(one.noise[0] - memory) > _RENEWED_MEMORY
-        or any(abs(np.log(now / was)) > _RENEWED for now, was in zip(one.noise[1:], sizes, strict=True))
+        abs(one.noise[0] - memory) > FIT.memory_renewed
+        or any(
+            abs(np.log(now / was)) > FIT.noise_renewed for now, was in zip(one.noise[1:], sizes, strict=True)
+        )
         for one, (memory, *sizes) in zip(data.prepared, before, strict=True)
     )
     if not changed:
@@ -132,7 +113,7 @@ def find_phases(data: Data, model, free: list[Free]) -> None:
     values = np.array([one.value for one in free])
     trials = []
     original = [one.phase for one in data.prepared]
-    for turn in np.arange(_PHASES) * 2 * np.pi / _PHASES:
+    for turn in np.arange(FIT.phases) * 2 * np.pi / FIT.phases:
         for i in missing:
             data.prepared[i].phase = float(turn)
         problem, fit = fit_stages(data, model, free, values, stages=[0], most=4)
@@ -144,7 +125,7 @@ def find_phases(data: Data, model, free: list[Free]) -> None:
     for one, phase in zip(data.prepared, original, strict=True):
         one.phase = phase
     for column, i in enumerate(missing):
-        data.prepared[i].phase = float(best[column] * 2 * np.pi / _PHASES)
+        data.prepared[i].phase = float(best[column] * 2 * np.pi / FIT.phases)
 
 
 def limit_noise(source: Data, target: Data) -> bool:
@@ -152,7 +133,7 @@ def limit_noise(source: Data, target: Data) -> bool:
 
     A missing effect would hide in the noise of records that are too short to measure the noise again.
     """
-    if isinstance(source, SensedData):
+    if any(one.sensor_noise for one in source.prepared):
         # nothing of theirs is measured on short records alone
         return False
     shares = [one.sigma / white for one in source.prepared if (white := white_noise(one.signal)) > 0]
@@ -160,7 +141,7 @@ def limit_noise(source: Data, target: Data) -> bool:
     limited = False
     for one in target.prepared:
         sensor = max(coloured * white_noise(one.signal), one.resolution / np.sqrt(12))
-        if not one.sigma_stated and one.sigma > _SAME_SENSOR * sensor > 0:
+        if not one.sigma_stated and one.sigma > FIT.same_sensor * sensor > 0:
             one.sigma, limited = sensor, True
     return limited
 

@@ -5,15 +5,17 @@
 A size to start from is a few per cent of the machine's own forces, lengths and speeds in the records.
 """
 
-import re
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
+from separatrix.cases import toml
 from separatrix.discovery.fitting.machine import Free, bounds_of
-from separatrix.errors import SeparatrixError
+from separatrix.discovery.policy import FIT
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.library import Effect, effects
 
 
@@ -31,9 +33,13 @@ class Scales:
     highest: float
     interval: float
 
+    @property
+    def frequency(self) -> float:
+        """Angular frequency of the motion [rad/s]."""
+        return self.speed / self.length
+
 
 Starts = Callable[[Scales], dict[str, list[float]]]
-_FAR = 20.0
 
 
 def _asymmetry(scales: Scales) -> dict[str, list[float]]:
@@ -87,6 +93,21 @@ All else that is known of an effect stands in the tables of laws, which the libr
 """
 
 
+def names_of_body(asked: tuple[str, ...] | None) -> list[str]:
+    """Names of all effects that one body may lack, of those that were asked for."""
+    refuse_unknown(asked, STARTS)
+    return [name for name in STARTS if not asked or name in asked]
+
+
+def refuse_unknown(asked: tuple[str, ...] | None, known: Iterable[str]) -> None:
+    """Refuse effects that a machine cannot have."""
+    unknown = [name for name in asked or () if name not in known]
+    if unknown:
+        raise SeparatrixError(
+            f"effects: found {', '.join(unknown)}, allowed for this machine {', '.join(known)}", USAGE
+        )
+
+
 @dataclass(frozen=True)
 class Candidate:
     """Effects added to a machine: its model, what is free, and the values to start from."""
@@ -125,7 +146,7 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
         path = f"effect.{name}.{key}"
         lower, upper = bounds_of(extended.parameters[path])
         if key in effect.sizes:
-            ends = np.log([min(sizes[key]) / _FAR, max(sizes[key]) * _FAR])
+            ends = np.log([min(sizes[key]) / FIT.far_start, max(sizes[key]) * FIT.far_start])
             added.append(Free(path, float(np.log(value)), *ends, 0.1, positive=True))
         else:
             added.append(Free(path, value, lower, upper, abs(value) or 1.0))
@@ -145,25 +166,30 @@ def _opened(model, name: str, sizes: dict[str, list[float]], scales: Scales):
         ends = (max(sizes["position"]) + reach, model.parameters["contact.upper"].value)
     else:
         ends = (model.parameters["contact.lower"].value, min(sizes["position"]) - reach)
-    return type(model).from_text(within_barriers(model.to_text({}), *ends))
+    return within_barriers(model, *ends)
 
 
-def within_barriers(text: str, lower: float, upper: float) -> str:
-    """A resolved case in which positions to start from lie between the barriers."""
-    table, axis, lines = "", "", []
-    for line in text.splitlines():
-        header = re.fullmatch(r"\[+(.*?)\]+", line.strip())
-        key, equals, value = (part.strip() for part in line.partition("="))
-        if header:
-            table, axis = header.group(1), ""
-        elif equals and key == "name":
-            axis = value.strip('"')
-        if equals and ((table == "axis" and axis == "x0" and key in ("from", "to")) or key == "x0"):
-            numbers = re.findall(r"[-+0-9.eE]+", value)
-            kept = [repr(float(np.clip(float(number), lower, upper))) for number in numbers]
-            line = f"{key} = [{', '.join(kept)}]" if value.startswith("[") else f"{key} = {kept[0]}"
-        lines.append(line)
-    return "\n".join(lines) + "\n"
+def within_barriers(model, lower: float, upper: float):
+    """The model with positions to start from that lie between the barriers."""
+    text = model.to_text({})
+    settings = [
+        f"{path}={toml(np.clip(found, lower, upper).tolist())}"
+        for path, found in _positions(tomllib.loads(text))
+    ]
+    return type(model).from_settings(text, "case", settings)
+
+
+def _positions(table: dict, within: str = "") -> Iterator[tuple[str, float | list[float]]]:
+    """Positions to start from in a case, by the path of their key."""
+    for key, value in table.items():
+        path = f"{within}{key}"
+        if isinstance(value, dict):
+            yield from _positions(value, f"{path}.")
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            for number, one in enumerate(value, start=1):
+                yield from _positions(one, f"{path}[{number}].")
+        elif key == "x0" or (key in ("from", "to") and table.get("name") == "x0"):
+            yield path, value
 
 
 def _starts(effect: Effect, sizes: dict[str, list[float]], added: list[Free]) -> list[np.ndarray]:

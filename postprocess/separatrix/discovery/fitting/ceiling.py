@@ -12,26 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.joint_forces import families_of
-from separatrix.discovery.fitting.motions import (
-    after_impacts,
-    impacts_at,
-    knots_of,
-    products,
-    scaled_motion,
-    splines,
-)
-from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.response import force_columns, kick_columns
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.rig import cleaned
 from separatrix.discovery.fitting.screen import project
-
-_PIECES = 5
-_USABLE = 1e-6
-# share of the gain of free forces from which on a force of one variable closes most of the gap
-_MOST = 0.5
+from separatrix.discovery.policy import FIT
 
 
 @dataclass
@@ -66,18 +51,15 @@ class Ceiling:
     def mostly(self) -> str:
         """The dependence of a force that explains most of what any force does; '' if none does."""
         free = max(one.gain for one in self.families)
-        of_one = [one for one in self.families if one.name != "pieces" and one.gain > _MOST * free]
+        of_one = [one for one in self.families if one.name != "pieces" and one.gain > FIT.mostly * free]
         return max(of_one, key=lambda one: one.gain).name if of_one else ""
 
 
-def ceiling(problem: Problem, fit: Fit, mass: float) -> Ceiling:
+def ceiling(problem: Likelihood, fit: Fit, mass: float) -> Ceiling:
     """Try every family on what imperfections of a rig leave of the residuals of a fit."""
     fit = cleaned(problem, fit)
     families = []
-    made = (
-        families_of(problem, fit) if isinstance(problem, CoordinateProblem) else _families(problem, fit, mass)
-    )
-    for name, columns in made.items():
+    for name, columns in problem.families(fit, mass).items():
         gain, rank = _gain(fit, columns)
         families.append(Family(name, gain, rank, float(chi2.sf(gain, rank)) if rank else 1.0))
     gain, rank = _piecewise_gain(problem, fit, mass)
@@ -92,18 +74,18 @@ def _gain(fit: Fit, columns: np.ndarray) -> tuple[float, int]:
     # relative to what the columns were before anything was projected out
     size = np.sqrt(np.maximum(np.diag(matrix)[p:], 1e-300))
     values, vectors = np.linalg.eigh(left / np.outer(size, size))
-    usable = values > _USABLE
+    usable = values > FIT.usable
     parts = vectors[:, usable].T @ (score / size)
     return float(np.sum(parts**2 / values[usable])), int(usable.sum())
 
 
-def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int]:
+def _piecewise_gain(problem: Likelihood, fit: Fit, mass: float) -> tuple[float, int]:
     """Forces of each segment by itself, constant over fifths of it; common parameters stay."""
     inside = problem.segments.inside
     lengths = inside.sum(axis=1)
-    piece = np.minimum(np.arange(inside.shape[1])[None, :] * _PIECES // lengths[:, None], _PIECES - 1)
-    forces = (piece[:, :, None] == np.arange(_PIECES)) * inside[:, :, None].astype(float)
-    columns = force_columns(problem, fit, forces, mass)
+    piece = np.minimum(np.arange(inside.shape[1])[None, :] * FIT.pieces // lengths[:, None], FIT.pieces - 1)
+    forces = (piece[:, :, None] == np.arange(FIT.pieces)) * inside[:, :, None].astype(float)
+    columns = problem.force_columns(fit, forces, mass)
     reduced = fit.normal_equations(columns)
     size = np.sqrt(np.maximum(np.einsum("kii->ki", reduced.matrix), 1e-300))
     scaled = reduced.matrix / (size[:, :, None] * size[:, None, :])
@@ -112,48 +94,3 @@ def _piecewise_gain(problem: Problem, fit: Fit, mass: float) -> tuple[float, int
     parts = (vectors.transpose(0, 2, 1) @ (reduced.gradient / size)[:, :, None])[:, :, 0]
     gain = float(np.sum(np.where(usable, parts**2 / np.where(usable, values, 1), 0)))
     return gain, max(0, int(usable.sum()) - int((~fit.at_bound).sum()))
-
-
-def _families(problem: Problem, fit: Fit, mass: float) -> dict[str, np.ndarray]:
-    state = scaled_motion(problem, fit)
-    good = problem.segments.inside & fit.good[:, None]
-    x, v, phase, time = state["x"], state["v"], state["phase"], state["time"]
-    sign = np.sign(v)
-    one = np.ones_like(x)
-    forces = {
-        "speed": splines(v, knots_of(v[good], 7), good),
-        "position": splines(x, knots_of(x[good], 7), good),
-        "speed and position": products(
-            splines(v, knots_of(v[good], 4), good), splines(x, knots_of(x[good], 4), good)
-        ),
-        "time": np.stack(
-            [time * f for f in (one, x, v, sign)] + [time**2 * f for f in (one, x, sign)], axis=2
-        ),
-    }
-    if phase is not None:
-        waves = [f(n * phase) for n in (1, 2, 3) for f in (np.sin, np.cos)]
-        forces["phase"] = np.stack(
-            waves + [f(n * phase) for n in (4, 5, 6) for f in (np.sin, np.cos)], axis=2
-        )
-        forces["phase and state"] = np.stack([w * f for w in waves[:4] for f in (x, v, sign)], axis=2)
-    since = after_impacts(problem, fit)
-    known = good & np.isfinite(since)
-    if known.sum() > 100:
-        forces["time since impact"] = splines(since, knots_of(since[known], 12), known)
-    made = {name: force_columns(problem, fit, values, mass) for name, values in forces.items()}
-    kicks = impact_kicks(problem, fit, state)
-    if kicks is not None:
-        made["impacts"] = kick_columns(problem, fit, kicks)
-    return made
-
-
-def impact_kicks(problem: Problem, fit: Fit, state: dict) -> np.ndarray | None:
-    """Changes of the speed after an impact: a cubic of the speed before, and with time and its square."""
-    before, at = impacts_at(problem, fit)
-    if np.count_nonzero(at) < 4:
-        return None
-    speed = before / state["speed"]
-    scale = 0.1 * state["speed"]
-    return scale * np.stack(
-        [at * speed**n for n in range(4)] + [at * state["time"], at * state["time"] ** 2], axis=2
-    )

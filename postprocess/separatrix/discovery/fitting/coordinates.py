@@ -5,21 +5,35 @@
 import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.hypotheses import Hypothesis
+from separatrix.discovery.fitting.joint_effects import location_of, names_at_joints
+from separatrix.discovery.fitting.joint_forces import families_of, imperfection_columns_of
+from separatrix.discovery.fitting.joint_hypotheses import SensedMotion, hypotheses_at, motion_at
+from separatrix.discovery.fitting.joint_response import columns_of
+from separatrix.discovery.fitting.joint_sensors import joint_force
 from separatrix.discovery.fitting.machine import Free
+from separatrix.discovery.fitting.noise import Left, left_of_motion
 from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.measured.bodies import Structure, structure_of
+from separatrix.discovery.fitting.regions import Region, regions_of_joints
+from separatrix.discovery.measured.bodies import structure_of
 from separatrix.discovery.measured.segments import Segments, padded_table
 from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
-
-_TOLERANCE = 1e-10
-# share of the sampling interval, and of a radian of the drive, over which an acceleration is the slope of v
-_SHARE, _INSTANT = 0.25, 1e-3
-# relative step of a parameter of a joint by which its force is differentiated
-_STEP = 1e-6
+from separatrix.discovery.policy import FIT
+from separatrix.discovery.wording import Units
+from separatrix.library import Effect
 
 
 class CoordinateProblem(Problem):
     """Records of several sensors cut into segments, a structure, and what is free."""
+
+    exact = False
+    fits_imperfections = False
+    has_memories = False
+    has_tables = False
+    one_signal = False
+    locates = True
+    experiment = ""
 
     def __init__(self, model, prepared: list[SensedPrepared], segments: Segments, free: list[Free]) -> None:
         """Collect what every evaluation needs."""
@@ -48,51 +62,81 @@ class CoordinateProblem(Problem):
 
     def _part(self, number: int) -> dict:
         """The segments of one record as lists for the simulator."""
-        prepared = self.prepared[number]
-        rows = np.flatnonzero(self.segments.record == number)
-        first, last = self.segments.first[rows], self.segments.last[rows]
-        offsets = np.concatenate([[0], np.cumsum(last - first)])
-        samples = np.concatenate(
-            [np.arange(a, b) for a, b in zip(first, last, strict=True)] or [np.zeros(0, int)]
-        )
-        starts = prepared.record.t[first]
-        times = prepared.record.t[samples] - np.repeat(starts, last - first)
-        instant = 0.0
+        prepared, instant = self.prepared[number], 0.0
         if any(one.kind == "a" for one in prepared.sensors):
             radian = 1 / prepared.frequency if prepared.frequency else np.inf
-            instant = min(_SHARE * prepared.record.interval, _INSTANT * radian)
-        return {
-            "rows": rows,
-            "offsets": offsets,
-            "times": times,
-            "starts": starts,
-            "inside": self.segments.inside[rows],
-            "samples": samples,
-            "instant": instant,
-        }
+            instant = min(FIT.slope_share * prepared.record.interval, FIT.slope_angle * radian)
+        return super()._part(number) | {"instant": instant}
 
     def _driven_at(self, frequency: float, chosen: dict[str, float]) -> dict[str, float]:
         """Every harmonic drive turns at the frequency of the record."""
         return dict.fromkeys(self._frequencies, frequency)
 
-    def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
-        """No ratio of frequencies here."""
-        raise AssertionError
+    def _follow_drive(self, number: int, values: np.ndarray, chosen: dict, chain: np.ndarray) -> None:
+        """Derivatives of the frequencies of the drives by the clock of the record."""
+        paths = list(chosen)
+        for j, one in enumerate(self.free):
+            if one.path == "nuisance:clock" and one.record == number:
+                for path in self._frequencies:
+                    chain[paths.index(path), j] = self.prepared[number].frequency
 
-    def _chain(self, number: int, values: np.ndarray) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
-        """Paths, their values, which free parameters move them, and in which directions (one row each)."""
-        active, given, moves, directions = self._active(number, values, derivatives=True)
-        clock = [
-            j for j, one in enumerate(self.free) if one.path == "nuisance:clock" and one.record == number
-        ]
-        if not clock or self.prepared[number].frequency is None:
-            return active, given, moves, directions
-        chain = np.zeros((len(self.free), len(active)))
-        chain[moves] = directions
-        for path in self._frequencies:
-            chain[clock[0], active.index(path)] = self.prepared[number].frequency
-        moves = chain.any(axis=1)
-        return active, given, moves, chain[moves]
+    def effects(self, asked: tuple[str, ...] | None) -> list[str]:
+        """Effects with their locations, of those that were asked for."""
+        return names_at_joints(self.model, asked)
+
+    def cannot_show(self, effect: Effect) -> str:
+        """Why an effect would change nothing here; '' if it may."""
+        return ""
+
+    def imitating(self, motion: Evaluation) -> None:
+        """Sensors show a part of a motion only."""
+
+    def observed(self, fit: Fit) -> np.ndarray:
+        """The position of the body that is watched."""
+        return fit.evaluation.x
+
+    def unit(self, units: Units) -> str:
+        """Its unit."""
+        return units.position
+
+    def force_columns(self, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
+        """Columns of forces on each body by itself."""
+        return columns_of(self, fit, forces)
+
+    def families(self, fit: Fit, mass: float) -> dict[str, np.ndarray]:
+        """Columns of free forces by what they depend on, and where."""
+        return families_of(self, fit)
+
+    def imperfection_columns(self, fit: Fit, usual: float | None = None) -> np.ndarray:
+        """Columns of imperfections of one standard deviation along a fit."""
+        return imperfection_columns_of(self, fit)
+
+    def left_of_noise(self, fit: Fit, channel: int, mass: float) -> tuple[Left, list[Left], float]:
+        """Residuals from which the noise is measured."""
+        return left_of_motion(self, fit, channel, mass)
+
+    def motion(self, fit: Fit, data: object, mass: float, natural: float) -> SensedMotion:
+        """The motion of a fit, along which hypotheses are tried."""
+        return motion_at(self, fit, data)
+
+    def hypotheses(self, training: SensedMotion) -> list[Hypothesis]:
+        """Dependences of a missing force, and where it acts."""
+        return list(hypotheses_at(training))
+
+    def regions(self, fit: Fit, mass: float, units: Units) -> list[Region]:
+        """Bins of the motion at each location in which a missing force is estimated."""
+        return regions_of_joints(self, fit)
+
+    def locations(self, names: list[str]) -> dict[str, str]:
+        """Where effects act, in words."""
+        found = {}
+        for name in names:
+            where = location_of(name)
+            known = [
+                one.text() for one in self.structure.locations if one.name == where or where in one.joints
+            ]
+            found[name] = known[0] if known else where
+        return found
 
     def _evaluate_record(
         self,
@@ -105,12 +149,9 @@ class CoordinateProblem(Problem):
     ) -> None:
         prepared, n = self.prepared[number], self.structure.n
         derivatives, by_start_alone = wanted
-        if derivatives:
-            active, given, moves, directions = self._chain(number, values)
-            if by_start_alone:
-                moves, directions = np.zeros_like(moves), directions[:0]
-        else:
-            active, given, moves, directions = self._active(number, values, derivatives=False)
+        active, given, moves, directions = self._active(number, values, derivatives)
+        if derivatives and by_start_alone:
+            moves, directions = np.zeros_like(moves), directions[:0]
         rows, inside = part["rows"], part["inside"]
         angle = self.crank_angle(number, values, part["starts"])
         start = np.column_stack([starts[rows], angle])
@@ -153,17 +194,6 @@ class CoordinateProblem(Problem):
                     padded_table(by_parameter / sensor.sigma, inside)
                 )
 
-    def _crank_slopes(self, number: int, part: dict) -> np.ndarray:
-        """Derivatives of the crank angles at the starts by the free parameters."""
-        crank = np.zeros((part["starts"].size, len(self.free)))
-        prepared = self.prepared[number]
-        for j, one in enumerate(self.free):
-            if one.path == "nuisance:phase" and one.record == number:
-                crank[:, j] = 1
-            elif one.path == "nuisance:clock" and one.record == number:
-                crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
-        return crank
-
     def _fly(self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, directions) -> tuple:
         """Motion and Jacobian at the samples and, for accelerations, one and two instants later."""
         instant = part["instant"]
@@ -180,7 +210,7 @@ class CoordinateProblem(Problem):
             times,
             derivatives=directions is not None,
             directions=directions,
-            tolerance=_TOLERANCE,
+            tolerance=FIT.tolerance_of_bodies,
         )
         motion = [result.motion[k::each] for k in range(each)]
         jacobian = None if directions is None else [result.jacobian[k::each] for k in range(each)]
@@ -212,53 +242,3 @@ class CoordinateProblem(Problem):
         if jacobian is None:
             return found, None
         return found, sum(w * one[:, n + body] for w, one in zip(weights, jacobian, strict=True))
-
-
-def joint_force(
-    structure: Structure,
-    path: str,
-    motion: list[np.ndarray],
-    jacobian: list[np.ndarray] | None,
-    chosen: tuple,
-    model,
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """Force of a spring or soft contact [N] and its derivatives; positive: it pulls its second end back."""
-    joint = structure.joint(path)
-    active, given, directions = chosen
-    n = structure.n
-    s, u = motion[0][:, :n] @ joint.row, motion[0][:, n:] @ joint.row
-    own = {
-        name.rpartition(".")[2]: parameter.value
-        for name, parameter in model.parameters.items()
-        if name.startswith(f"{path}.")
-    }
-    indices = {name.rpartition(".")[2]: i for i, name in enumerate(active) if name.startswith(f"{path}.")}
-    own |= {key: given[i] for key, i in indices.items()}
-    force, by_extension, by_speed = _force(joint.law, own, s, u)
-    if jacobian is None:
-        return force, None
-    slopes = by_extension[:, None] * np.einsum("kij,i->kj", jacobian[0][:, :n], joint.row)
-    slopes += by_speed[:, None] * np.einsum("kij,i->kj", jacobian[0][:, n:], joint.row)
-    for key, i in indices.items():
-        step = _STEP * max(abs(own[key]), 1e-6)
-        moved = (_force(joint.law, {**own, key: own[key] + step}, s, u)[0] - force) / step
-        slopes[:, : len(directions)] += moved[:, None] * directions[:, i]
-    return force, slopes
-
-
-def _force(law: str, own: dict[str, float], s: np.ndarray, u: np.ndarray) -> tuple:
-    """Force of a joint and its slopes over extension and speed."""
-    if law in ("linear", "polynomial"):
-        extension = s - own.get("free_length", 0.0)
-        k, k2, k3, c = (own.get(key, 0.0) for key in ("stiffness", "quadratic", "cubic", "damping"))
-        force = k * extension + k2 * extension**2 + k3 * extension**3 + c * u
-        return force, k + 2 * k2 * extension + 3 * k3 * extension**2, np.full(s.shape, c)
-    k, c = own["stiffness"], own.get("damping", 0.0)
-    force, by_extension, by_speed = np.zeros(s.shape), np.zeros(s.shape), np.zeros(s.shape)
-    for key, side in (("upper", 1.0), ("lower", -1.0)):
-        depth = side * (s - own.get(key, side * np.inf))
-        push = k * depth + side * c * u
-        touches = (depth > 0) & ((push > 0) | (own.get("tension", 0.0) > 0))
-        force[touches] = side * push[touches]
-        by_extension[touches], by_speed[touches] = k, c
-    return force, by_extension, by_speed

@@ -11,30 +11,18 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, beaten, values_of
 from separatrix.discovery.fitting.shapes import through
-from separatrix.discovery.measured.bodies import is_structure
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
-
-KNOTS = (3, 5, 8, 12)
-"""Numbers of knots that are tried, one after the other."""
-# impacts per knot
-_IMPACTS = 3
-# least range of the variable beside its largest value
-_NARROW = 0.05
-# weight of even knots; the rest is that of the quantiles of the motion
-_EVEN = 0.5
 
 
 def fits_machine(member: Member, model) -> bool:
     """Whether a machine has what the table changes."""
-    if is_structure(model):
-        # its joints have no tables
-        return False
     needs = effects()[member.effect].needs
     has = all(
         any(path == need or path.startswith(f"{need}.") for path in model.parameters)
@@ -46,7 +34,7 @@ def fits_machine(member: Member, model) -> bool:
 
 def knots_at(member: Member, seen: np.ndarray, count: int) -> np.ndarray | None:
     """Knots over the seen values, half of the way from even ones to their quantiles; None for too few."""
-    if seen.size < _IMPACTS * count or not np.ptp(seen) > _NARROW * np.max(np.abs(seen)):
+    if seen.size < FIT.impacts_per_knot * count or not np.ptp(seen) > FIT.narrow * np.max(np.abs(seen)):
         return None
     return knots_over(member, seen, count)
 
@@ -60,7 +48,9 @@ def knots_over(member: Member, seen: np.ndarray, count: int) -> np.ndarray:
         return seen[-1] * np.arange(1, count + 1) / count
     first = 0.0 if member.from_zero else seen[0]
     even = np.linspace(first, seen[-1], count)
-    return _EVEN * even + (1 - _EVEN) * np.quantile(np.append(first, seen), np.linspace(0, 1, count))
+    return FIT.even_knots * even + (1 - FIT.even_knots) * np.quantile(
+        np.append(first, seen), np.linspace(0, 1, count)
+    )
 
 
 def fit_member(
@@ -124,7 +114,7 @@ def with_table(
     knots: np.ndarray,
     begun: list[np.ndarray],
     alike: bool,
-) -> tuple[object, Problem, np.ndarray] | None:
+) -> tuple[object, Likelihood, np.ndarray] | None:
     """The base machine with a table in place of an effect, its problem, and the values that it begins from.
 
     `begun`: the function at the knots, for each direction; None where there is no such machine.

@@ -10,33 +10,17 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from separatrix.discovery.fitting.catalogue import Scales
 from separatrix.discovery.fitting.fit import Fit, minimise
-from separatrix.discovery.fitting.machine import Free
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.fitting.machine import Free, base_parameters, drive_nuisances, sensor_zeros
+from separatrix.discovery.fitting.one_body import BodyInForce, BodyInMotion
 from separatrix.discovery.fitting.rescue import rescued, suspicious
 from separatrix.discovery.measured.condense import condense, stride
-from separatrix.discovery.measured.driven import driven
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
 from separatrix.discovery.measured.signals import jumps, white_noise
-from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.discovery.measured.smoother import Smoothed, impact_table, reversals, smooth, stick_intervals
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
-
-# lengths of the stages over that of the longest segments
-STAGES = (0.2, 0.5, 1.0)
-FEWEST = 10
-"""Samples of a segment at least."""
-# share of wrong segments up to which the others determine the machine
-_FEW = 0.25
-# natural periods that a segment may last where the drive is slow
-_MOST_NATURAL_PERIODS = 1.5
-# squares by which a fit is far behind another, whatever its suspicious segments may gain
-_SQUARES_BEHIND = 60.0
-# standard errors within which the smoother gives the time of an impact
-_TIMES = 3.0
-# share of the mean time between impacts within which nothing is compared beside one, at most
-_BESIDE = 0.03
-# standard errors of the speed within which a body may be at rest
-_SLOW = 3.0
 
 
 @dataclass
@@ -48,7 +32,7 @@ class Data:
     stages: list[Segments]
     # starts of the longest segments by the base machine, tried where another machine is in a local minimum
     base_starts: np.ndarray | None = None
-    # what imperfections of the rig add to the longest segments where they are fitted, as in a `Problem`
+    # what imperfections of the rig add to the longest segments where they are fitted, as in a `Likelihood`
     imperfections: dict[tuple[str, int | None], np.ndarray] | None = None
 
     @property
@@ -56,10 +40,35 @@ class Data:
         """Number of the stage with the longest segments."""
         return len(self.stages) - 1
 
-    def problem(self, model, stage: int, free: list[Free]) -> Problem:
+    def problem(self, model, stage: int, free: list[Free]) -> Likelihood:
         """The fit of a model to the segments of a stage."""
         imperfections = self.imperfections if stage == self.last else None
-        return Problem(model, self.prepared, self.stages[stage], free, imperfections)
+        kind = BodyInMotion if self.prepared[0].driven is None else BodyInForce
+        return kind(model, self.prepared, self.stages[stage], free, imperfections)
+
+    def unknowns(self, model) -> list[Free]:
+        """What is free in the base machine."""
+        force = any(one.record.force is not None for one in self.prepared)
+        free = base_parameters(model, force, self.prepared[0].near_mass) + drive_nuisances(
+            model, self.prepared
+        )
+        return free + sensor_zeros(free, len(self.prepared))
+
+    def measured_by_sensor(self, problem: Likelihood, fit: Fit) -> bool:
+        """Whether the noise of each sensor was measured by itself."""
+        return False
+
+    def details(self, number: int) -> dict[str, tuple[np.ndarray, dict]]:
+        """What was measured of a record, for the file of details, with attributes."""
+        prepared, smoothed = self.prepared[number], self.smoothed[number]
+        columns = "t x v_before v_after v_before_error v_after_error"
+        return prepared.details() | {
+            "smoothed": (smoothed.state, {}),
+            "smoothed_error": (np.sqrt(np.einsum("kii->ki", smoothed.covariance)), {}),
+            "impacts": (impact_table(smoothed), {"columns": columns}),
+            "reversals": (reversals(smoothed), {}),
+            "stick": (np.array(stick_intervals(smoothed)).reshape(-1, 2), {}),
+        }
 
     def with_imperfections(self, imperfections: dict[tuple[str, int | None], np.ndarray]) -> "Data":
         """The same records with imperfections of the rig, whose noise may be measured anew."""
@@ -112,13 +121,17 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
         if seconds is not None:
             length = seconds / record.interval
         elif one.period_samples is not None:
-            length = periods * min(one.period_samples, _MOST_NATURAL_PERIODS * _natural_samples(one))
+            length = periods * min(one.period_samples, FIT.most_natural_periods * _natural_samples(one))
         else:
             length = periods * oscillation
-        lengths.append(int(np.clip(length, FEWEST, record.t.size / 3)))
+        lengths.append(int(np.clip(length, FIT.fewest_segments, record.t.size / 3)))
     stages = [
-        cut([one.samples for one in prepared], smoothed, [max(FEWEST, int(share * n)) for n in lengths])
-        for share in STAGES
+        cut(
+            [one.samples for one in prepared],
+            smoothed,
+            [max(FIT.fewest_segments, int(share * n)) for n in lengths],
+        )
+        for share in FIT.stage_lengths
     ]
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
@@ -134,8 +147,9 @@ def _natural_samples(one: Prepared) -> float:
 def _smoothed(one: Prepared, oscillation: float) -> Smoothed:
     """Smooth a record; one that is sampled far faster than it moves is thinned, and condensed."""
     record = one.record
-    if one.in_force:
-        return _known_motion(one, oscillation)
+    known = one.known_motion(oscillation)
+    if known is not None:
+        return known
     period = min(one.period_samples or np.inf, _natural_samples(one), oscillation)
     every = stride(period, record.t.size)
     if every == 1:
@@ -169,24 +183,18 @@ def _blind(one: Prepared, seen: Smoothed) -> np.ndarray | None:
     blind = np.zeros(v.size, bool)
     single = samples.size == 1
     rows = jumps(v, max(one.velocity_sigma, white_noise(one.record.v)))
-    longest = _BESIDE * (samples.t[-1] - samples.t[0]) / max(1, rows.size)
+    longest = FIT.beside_impact * (samples.t[-1] - samples.t[0]) / max(1, rows.size)
     for row in rows:
         if not (single[row] and single[row + 1]):
             continue
         near = seen.nearest(samples.t[row : row + 1])[0]
-        late = _TIMES * np.sqrt(seen.covariance[near, 0, 0]) / np.max(np.abs(v[row : row + 2]))
+        late = (
+            FIT.impact_time_errors * np.sqrt(seen.covariance[near, 0, 0]) / np.max(np.abs(v[row : row + 2]))
+        )
         late = min(late, longest)
         first, last = np.searchsorted(samples.t, [samples.t[row + 1] - late, samples.t[row] + late])
         blind[min(first, row) : max(last, row + 2)] = True
     return blind & single
-
-
-def _known_motion(one: Prepared, oscillation: float) -> Smoothed:
-    """Smooth a record whose force is compared, and keep its motion."""
-    record = one.record
-    found = smooth(record.t, record.x, one.motion_sigma, oscillation, stride(oscillation, record.t.size))
-    one.driven = driven(found, record.v, one.velocity_sigma, one.mass, record.pieces)
-    return found
 
 
 def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.ndarray, float]:
@@ -194,7 +202,7 @@ def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.
     hit, slow = np.zeros(at.size, bool), np.zeros(at.size, bool)
     hit[seen.impacts] = True
     hit[np.minimum(seen.impacts + 1, at.size - 1)] = True
-    slow |= np.abs(seen.v) < _SLOW * np.sqrt(seen.covariance[:, 1, 1])
+    slow |= np.abs(seen.v) < FIT.at_rest_errors * np.sqrt(seen.covariance[:, 1, 1])
     slow[:-1] |= seen.v[:-1] * seen.v[1:] <= 0
     for shift in (-1, 1):
         slow |= np.roll(slow, shift)
@@ -230,7 +238,7 @@ def fit_stages(
     begin: tuple[int, Fit] | None = None,
     fixed: np.ndarray | None = None,
     rival: Fit | None = None,
-) -> tuple[Problem, Fit]:
+) -> tuple[Likelihood, Fit]:
     """Fit at each stage in turn, from short segments to long ones: Huber's loss, then squares at the last.
 
     The starts of a `rival` at the last stage are tried for suspicious segments, unless it is far ahead.
@@ -257,7 +265,7 @@ def fit_stages(
 
 def polished(
     data: Data,
-    problem: Problem,
+    problem: Likelihood,
     fit: Fit,
     stage: int,
     most: int,
@@ -279,7 +287,7 @@ def polished(
     if not suspects.size:
         return fit
     versions = [fit]
-    if suspects.size <= _FEW * fit.counts.size:
+    if suspects.size <= FIT.few_wrong * fit.counts.size:
         versions.append(_without(problem, fit, suspects, most, fixed))
         if rival is not None and _behind(versions[-1], rival, suspects):
             return fit
@@ -297,10 +305,10 @@ def _behind(fit: Fit, rival: Fit, suspects: np.ndarray) -> bool:
     """Whether a fit is far behind another one on all but the suspects."""
     both = fit.good & rival.good
     both[suspects] = False
-    return bool((fit.chi2 - rival.chi2)[both].sum() > _SQUARES_BEHIND + fit.decrement)
+    return bool((fit.chi2 - rival.chi2)[both].sum() > FIT.squares_behind + fit.decrement)
 
 
-def _without(problem: Problem, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:
+def _without(problem: Likelihood, fit: Fit, suspects: np.ndarray, most: int, fixed: np.ndarray | None) -> Fit:
     """The machine fitted to the other segments, evaluated on all."""
     kept = np.setdiff1d(np.arange(problem.segments.count), suspects)
     part = problem.of_segments(kept)

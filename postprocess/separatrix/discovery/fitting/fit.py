@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.normal_equations import (
     Blocks,
     Reduced,
@@ -14,32 +15,7 @@ from separatrix.discovery.fitting.normal_equations import (
     eliminate,
     gauss_newton_step,
 )
-from separatrix.discovery.fitting.problem import Problem
-
-_HUBER = 1.5
-_TOLERANCE = 0.02
-_NEAR = 0.25
-_KINK = 4.0
-_STRONGEST = 1e8
-_FINE = 0.03
-# damping of the first step
-_MILD = 1e-4
-# gain that is negligible, also as a share of chi^2, and number of such steps in a row that end a fit; a
-# patient fit uses the tolerance instead
-_LITTLE = 0.1
-_LITTLE_SHARE = 3e-5
-_WITHOUT_GAIN = 2
-_PATIENT_WITHOUT_GAIN = 4
-# decrement at which a fit that only starts another one ends
-_ROUGH = 0.5
-# derivatives are kept while a step gains its promise within this share and the decrement falls by this factor
-_AS_PROMISED = 0.25
-_FALLS = 10.0
-# iterations before a fit may be abandoned; distance behind at which it is, in squares and in decrements
-_FEWEST_ITERATIONS = 3
-_LOST = 100.0
-_OVER = 5.0
-_SPARED = 3
+from separatrix.discovery.policy import FIT
 
 
 @dataclass
@@ -72,7 +48,11 @@ class Fit:
         Where a body sticks, chi^2 has kinks: a step that promises more and gains nothing at any length ends
         there too, within two standard errors.
         """
-        most = max(_NEAR, 1e-4 * self.total, _KINK * max(1.0, self.reduced_chi2) if self.exhausted else 0.0)
+        most = max(
+            FIT.fit_near,
+            1e-4 * self.total,
+            FIT.fit_kink * max(1.0, self.reduced_chi2) if self.exhausted else 0.0,
+        )
         return bool(self.decrement < most and self.good.any() and not self.in_local_minimum)
 
     def normal_equations(self, *columns: np.ndarray) -> Reduced:
@@ -136,17 +116,17 @@ class Fit:
         """Whether chi^2 is what noise alone would leave, within so many standard deviations or 3 %."""
         if self.freedom <= 0:
             return False
-        return self.reduced_chi2 < 1 + max(_FINE, deviations * np.sqrt(2 / self.freedom))
+        return self.reduced_chi2 < 1 + max(FIT.like_noise, deviations * np.sqrt(2 / self.freedom))
 
 
 def minimise(
-    problem: Problem,
+    problem: Likelihood,
     values: np.ndarray,
     starts: np.ndarray,
     *,
     robust: bool = False,
     most: int = 25,
-    tolerance: float = _TOLERANCE,
+    tolerance: float = FIT.fit_tolerance,
     fixed: np.ndarray | None = None,
     hopeless: float | None = None,
     patient: bool = False,
@@ -161,34 +141,34 @@ def minimise(
     far more than it can still gain is abandoned. `begun`: the evaluation at values and starts, if known.
     """
     movable = np.ones(values.size, bool) if fixed is None else ~fixed
-    tolerance = max(tolerance, _ROUGH) if rough else tolerance
+    tolerance = max(tolerance, FIT.fit_rough) if rough else tolerance
     descent = _Descent(problem, values, starts, movable, robust, begun)
     iterations = without_gain = 0
     begun_anew = exhausted = False
-    most_without_gain = _PATIENT_WITHOUT_GAIN if patient else _WITHOUT_GAIN
+    most_without_gain = FIT.fit_patience if patient else FIT.fit_without_gain
     while iterations < most:
         iterations += 1
         if not descent.look(tolerance, rough):
             break
-        if beat is not None and iterations > _FEWEST_ITERATIONS and descent.behind(beat):
+        if beat is not None and iterations > FIT.fit_fewest and descent.behind(beat):
             break
-        mild = descent.damping <= _MILD
+        mild = descent.damping <= FIT.fit_mild
         if not descent.step():
             exhausted = mild or begun_anew
             if exhausted:
                 break
-            descent.damping, begun_anew = _MILD, True
+            descent.damping, begun_anew = FIT.fit_mild, True
             continue
-        little = tolerance if patient else max(_LITTLE, _LITTLE_SHARE * descent.before)
+        little = tolerance if patient else max(FIT.fit_little, FIT.fit_little_share * descent.before)
         without_gain = without_gain + 1 if descent.gain < little else 0
         if without_gain >= most_without_gain:
             exhausted = begun_anew
             if exhausted:
                 break
-            descent.damping, without_gain, begun_anew = _MILD, most_without_gain - 1, True
+            descent.damping, without_gain, begun_anew = FIT.fit_mild, most_without_gain - 1, True
         elif not without_gain:
             begun_anew = False
-        if hopeless is not None and iterations > _FEWEST_ITERATIONS and descent.hopeless(hopeless):
+        if hopeless is not None and iterations > FIT.fit_fewest and descent.hopeless(hopeless):
             break
     if not rough:
         descent.renew()
@@ -205,7 +185,7 @@ class _Descent:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: Likelihood,
         values: np.ndarray,
         starts: np.ndarray,
         movable: np.ndarray,
@@ -217,7 +197,7 @@ class _Descent:
         self.upper = np.array([one.upper for one in problem.free])
         self.values, self.starts = np.clip(values, self.lower, self.upper), starts
         self.current = problem.evaluate(self.values, starts) if begun is None else begun
-        self.damping = _MILD
+        self.damping = FIT.fit_mild
         self.gain = self.before = self.decrement = 0.0
         # decrement of the step before, where the derivatives are those of an earlier point
         self.kept: float | None = None
@@ -240,7 +220,7 @@ class _Descent:
             more = self.decrement >= max(tolerance, 1e-5 * cost)
             if self.kept is None or (rough and not more):
                 return more
-            if more and self.decrement * _FALLS <= self.kept:
+            if more and self.decrement * FIT.fit_falls <= self.kept:
                 return True
             self.renew()
 
@@ -249,7 +229,7 @@ class _Descent:
         while True:
             good = ~self.current.failed & self.current.steady
             before = _costs(self.current, self.scale, self.robust)
-            while self.damping < _STRONGEST:
+            while self.damping < FIT.fit_strongest:
                 start_step, step, promised = gauss_newton_step(self.blocks, self.open, self.damping)
                 tried = np.clip(self.values + step, self.lower, self.upper)
                 trial = self.problem.evaluate(tried, self.starts + start_step, derivatives=False)
@@ -274,7 +254,7 @@ class _Descent:
         alike = np.array_equal(trial.hits, self.current.hits) and np.array_equal(
             trial.failed, self.current.failed
         )
-        if alike and abs(self.gain - promised) < _AS_PROMISED * promised:
+        if alike and abs(self.gain - promised) < FIT.fit_as_promised * promised:
             old = self.current
             self.current = replace(
                 trial,
@@ -293,18 +273,20 @@ class _Descent:
         A few segments may be in a wrong minimum and are left out.
         """
         squares = np.sort(_costs(self.current, self.scale, robust=False)[self.inside.any(axis=1)])
-        return bool(squares[:-_SPARED].sum() - beat > max(_LOST, _OVER * self.decrement))
+        return bool(
+            squares[: -FIT.fit_spared].sum() - beat > max(FIT.fit_lost, FIT.fit_over * self.decrement)
+        )
 
     def hopeless(self, limit: float) -> bool:
         """Whether steps gain little far above the wanted chi^2."""
         return bool(self.gain < 0.02 * self.before and self.before > limit * max(1, self.count))
 
 
-def blocking(problem: Problem, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+def blocking(problem: Likelihood, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Segments that lose more by a Gauss-Newton step than it promises in total, and so block it."""
     descent = _Descent(problem, values, starts, np.ones(values.size, bool), False, None)
     descent.look(0.0, rough=False)
-    start_step, step, promised = gauss_newton_step(descent.blocks, descent.open, _MILD)
+    start_step, step, promised = gauss_newton_step(descent.blocks, descent.open, FIT.fit_mild)
     tried = np.clip(descent.values + step, descent.lower, descent.upper)
     trial = problem.evaluate(tried, starts + start_step, derivatives=False)
     lost = _costs(trial, 1.0, robust=False) - _costs(descent.current, 1.0, robust=False)
@@ -318,7 +300,7 @@ def without_segments(fit: Fit, rows: np.ndarray) -> Fit:
     return replace(fit, evaluation=replace(fit.evaluation, steady=steady))
 
 
-def again(problem: Problem, fit: Fit) -> Fit:
+def again(problem: Likelihood, fit: Fit) -> Fit:
     """The same values and starts, evaluated with the noise as it is known now."""
     current = problem.evaluate(fit.values, fit.starts)
     found = _finished(problem, fit.values, fit.starts, current, fit.movable, fit.iterations)
@@ -358,7 +340,7 @@ def _weights(current: Evaluation, robust: bool) -> tuple[np.ndarray, float]:
     used = current.used * (current.steady & ~current.failed)[:, None]
     size = np.abs(current.residual)
     inside = used > 0
-    scale = _HUBER * max(1.0, 1.4826 * float(np.median(size[inside])) if inside.any() else 1.0)
+    scale = FIT.huber * max(1.0, 1.4826 * float(np.median(size[inside])) if inside.any() else 1.0)
     if robust:
         used = used * np.minimum(1, scale / np.maximum(size, 1e-300))
     return used, scale

@@ -11,11 +11,9 @@ import numpy as np
 
 from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.measured.preflight import even_interval
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
-# time of a flight [s], and the share of the time in which the usual force would stop the body
-_INSTANT, _SHARE = 1e-7, 1e-2
-_TOLERANCE = 1e-12
 _DAHL = "effect.dahl.stiffness"
 _OVER_POSITION = ("effect.position_dependent_friction.", "effect.friction_position_curve.")
 
@@ -37,13 +35,13 @@ def _accelerations(model, values: dict[str, float], motion: Driven, measured: np
     rows = np.flatnonzero(motion.moves)
     mass = _value(model, values, "body.mass")
     usual = (np.ptp(measured) + mass * np.max(np.abs(motion.a), initial=0.0)) / mass
-    time = np.minimum(_INSTANT, _SHARE * np.abs(motion.v[rows]) / max(usual, 1e-300))
+    time = np.minimum(FIT.instant, FIT.instant_share * np.abs(motion.v[rows]) / max(usual, 1e-300))
     start = np.column_stack([motion.x[rows], motion.v[rows], np.zeros(rows.size)])
     series = np.append(measured, measured[-1])
     flown = model.segments(
         list(values), np.array(list(values.values())), start, 2 * np.arange(rows.size + 1),
         np.column_stack([np.zeros(rows.size), time]).ravel(), force=(rows.astype(float), 1.0, series),
-        derivatives=False, tolerance=_TOLERANCE,
+        derivatives=False, tolerance=FIT.force_tolerance,
     )  # fmt: skip
     if np.any(flown.reason != 0):
         raise SeparatrixError("a position or speed of the record that the machine cannot have")

@@ -15,11 +15,8 @@ from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.fitting.refit import Fitted, gain_over
+from separatrix.discovery.policy import FIT
 from separatrix.library import effects
-
-# standard errors from zero within which a law is doubtful; log-likelihood that the effect must have gained
-_DOUBTFUL = 1.96
-_WORTH = 1.0
 
 
 def halves(
@@ -35,7 +32,7 @@ def halves(
     units = {effect.parameters[key].unit for key in effect.amplitudes}
     if len(units) < 2 or len(units) != len(paths) or not whole.fit.converged:
         return
-    if gain_over(whole, base)[0] < _WORTH or (doubtful and not _doubtful(whole)):
+    if gain_over(whole, base)[0] < FIT.worth_halving or (doubtful and not _doubtful(whole)):
         return
     for path in paths:
         # the value fitted may be none for the case as it is written, whose friction was fitted too
@@ -56,4 +53,4 @@ def halves(
 def _doubtful(whole: Fitted) -> bool:
     """Whether the interval of one of the added parameters has zero."""
     error = np.sqrt(np.diag(whole.covariance))
-    return any(abs(whole.fit.values[i]) < _DOUBTFUL * error[i] for i in whole.added)
+    return any(abs(whole.fit.values[i]) < FIT.doubtful_law * error[i] for i in whole.added)

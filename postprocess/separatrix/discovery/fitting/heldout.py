@@ -16,13 +16,11 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free, drive_amplitudes, on_other_records
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.rescue import suspicious
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
-
-# reduced chi^2 above which errors of the machine are larger than the noise
-_MISFIT = 1.5
 
 
 @dataclass
@@ -32,7 +30,7 @@ class Prediction:
     score: np.ndarray
     good: np.ndarray
     record: np.ndarray
-    problem: Problem
+    problem: Likelihood
     fit: Fit
     # reduced chi^2 of the training records, at least 1
     misfit: float
@@ -133,7 +131,7 @@ def gained(one: Prediction, other: Prediction) -> np.ndarray:
     meaningless, and the difference of squared errors counts (Diebold and Mariano), both machines as fitted.
     The machine that all candidates are compared with chooses the measure, so that gains are comparable.
     """
-    wrong = other.misfit > _MISFIT
+    wrong = other.misfit > FIT.misfit_of_errors
     parts = 0.5 * (other.fit.chi2 - one.fit.chi2) if wrong else one.score - other.score
     return np.where(one.good & other.good, parts, 0.0)
 
@@ -150,7 +148,7 @@ def ahead(
     both = one.good & other.good
     if rows is not None:
         both &= rows
-    if (max(one.misfit, other.misfit) if misfit is None else misfit) > _MISFIT:
+    if (max(one.misfit, other.misfit) if misfit is None else misfit) > FIT.misfit_of_errors:
         return float(0.5 * (other.fit.chi2 - one.fit.chi2)[both].sum())
     return _density(one, both) - _density(other, both)
 

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from separatrix.discovery.fitting.catalogue import STARTS, Candidate, Scales, candidate
+from separatrix.discovery.fitting.catalogue import Candidate, Scales, candidate, refuse_unknown
 from separatrix.discovery.fitting.locations import LocationScales, SensedScales
 from separatrix.discovery.fitting.machine import Free, bounds_of
 from separatrix.discovery.measured.bodies import (
@@ -21,16 +21,13 @@ from separatrix.discovery.measured.bodies import (
     Location,
     Structure,
     edited,
-    is_structure,
     structure_of,
 )
-from separatrix.errors import USAGE, SeparatrixError
+from separatrix.discovery.policy import FIT
+from separatrix.errors import SeparatrixError
 from separatrix.library import Effect, effects
 
 AT = "@"
-_FAR = 20.0
-# share of the usual impact speed above which a stop yields
-_YIELDS = 0.5
 # keys that a spring with free play in series must not have
 _NO_PLAY = ("free_length", "modulation", "modulation_cosine", "modulation_sine")
 
@@ -192,7 +189,7 @@ JOINT_EFFECTS = {
             "restitution_falloff", "restitution that falls with the impact speed", "restitution over "
             "impact speed",
             _relaw("newton_power", yield_speed=1.0, falloff=0.0),
-            lambda s: {"falloff": [0.05], "yield_speed": [_YIELDS * s.impact_speed, 0.1 * s.impact_speed]},
+            lambda s: {"falloff": [0.05], "yield_speed": [FIT.yields * s.impact_speed, 0.1 * s.impact_speed]},
             ("falloff",), ("yield_speed",), ("contact", "newton"), "barrier",
         ),
         JointEffect(
@@ -223,16 +220,9 @@ def location_of(name: str) -> str:
     return name.partition(AT)[2]
 
 
-def names_for(model, asked: tuple[str, ...] | None) -> list[str]:
-    """Names of all effects that a machine may lack, of those that were asked for."""
-    known = JOINT_EFFECTS if is_structure(model) else STARTS
-    unknown = [name for name in asked or () if name not in known]
-    if unknown:
-        raise SeparatrixError(
-            f"effects: found {', '.join(unknown)}, allowed for this machine {', '.join(known)}", USAGE
-        )
-    if not is_structure(model):
-        return [name for name in STARTS if not asked or name in asked]
+def names_at_joints(model, asked: tuple[str, ...] | None) -> list[str]:
+    """Names of all effects that a machine of several bodies may lack, of those that were asked for."""
+    refuse_unknown(asked, JOINT_EFFECTS)
     structure = structure_of(model)
     return [
         f"{kind}{AT}{location}"
@@ -267,14 +257,9 @@ def candidate_of(
     ends = joint.ends if joint else structure.location(where).ends
     location = Location(where, ends, joint.row if joint else structure.location(where).row, ())
     size = scales.at(where)
-    if size is None:
-        return "nothing moves there in these records"
-    if row.acts == "barrier" and not size.impact_speed > 0:
-        return "there are no impacts in these records"
-    if row.moved and where in scales.measured:
-        return "the force of this joint is measured, which would be that of two"
-    if row.of[0] == "friction" and not size.friction > 0:
-        return "there is no friction"
+    why = _cannot_act(row, size, where in scales.measured)
+    if why:
+        return why
     path = ""
 
     def change(case: dict) -> None:
@@ -286,26 +271,13 @@ def candidate_of(
         extended = edited(model, change)
     except SeparatrixError as reason:
         return str(reason)
-    added = []
     goes_over = {f"{joint.path}.{key}": f"{path}.{key}" for key in row.moved} if joint else {}
     whole = [replace(one, path=goes_over.get(one.path, one.path)) for one in free]
     whole = [one for one in whole if one.is_nuisance or one.path in extended.parameters]
     own = {f"{path}.{key}" for key in keys}
     if any(one.path in own for one in whole):
         return "the base machine has it, and it is fitted"
-    for key, values in keys.items():
-        parameter = extended.parameters[f"{path}.{key}"]
-        if key in row.sizes:
-            ends = np.log([min(values) / _FAR, max(values) * _FAR])
-            mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
-            start = float(np.log(values[0]))
-            added.append(Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror))
-        else:
-            lower, upper = bounds_of(parameter)
-            if key == "static_force":
-                # -1 stands for the force of sliding
-                lower = 0.0
-            added.append(Free(f"{path}.{key}", values[0], lower, upper, abs(values[0])))
+    added = [_free(row, key, values, path, extended) for key, values in keys.items()]
     at = tuple(range(len(whole), len(whole) + len(added)))
     linear = np.array([key in row.amplitudes for key in keys])
     choices = []
@@ -318,6 +290,32 @@ def candidate_of(
     # what a form starts from must be a machine, whatever the joint of the case has
     extended = _with_starts(extended, added)
     return Candidate((*names, name), extended, whole + added, at, starts, forms, linear)
+
+
+def _cannot_act(row: JointEffect, size: LocationScales | None, measured: bool) -> str:
+    """Why an effect makes no sense at a joint whose force may be measured; '' if it does."""
+    if size is None:
+        return "nothing moves there in these records"
+    if row.acts == "barrier" and not size.impact_speed > 0:
+        return "there are no impacts in these records"
+    if row.moved and measured:
+        return "the force of this joint is measured, which would be that of two"
+    if row.of[0] == "friction" and not size.friction > 0:
+        return "there is no friction"
+    return ""
+
+
+def _free(row: JointEffect, key: str, values: list[float], path: str, model) -> Free:
+    """A parameter of an effect, from the first of its usual sizes."""
+    if key in row.sizes:
+        ends = np.log([min(values) / FIT.far_joint_start, max(values) * FIT.far_joint_start])
+        mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
+        start = float(np.log(values[0]))
+        return Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror)
+    lower, upper = bounds_of(model.parameters[f"{path}.{key}"])
+    # -1 stands for the force of sliding
+    lower = 0.0 if key == "static_force" else lower
+    return Free(f"{path}.{key}", values[0], lower, upper, abs(values[0]))
 
 
 def _with_starts(model, added: list[Free]):

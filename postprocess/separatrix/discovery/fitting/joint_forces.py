@@ -8,22 +8,14 @@ what is not a missing effect.
 
 import numpy as np
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.joint_response import columns_of, sigmas_of
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import clock_of, knots_of, splines
-
-_KNOTS, _HARMONICS = 6, 3
-_ALL_HARMONICS = 6
-# impacts of a contact from which on its kicks are tried
-_FEWEST_IMPACTS = 4
-POWERS = 4
-"""Number of powers of the speed before an impact in kicks, from 0 on."""
-IMPERFECTION_SIZE = 5e-4
-"""Standard deviation of an imperfection of a rig over the signal: half of the largest usual one."""
+from separatrix.discovery.policy import FIT
 
 
-def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
+def families_of(problem: Likelihood, fit: Fit) -> dict[str, np.ndarray]:
     """Columns of families of forces by name: over speed, extension and time at locations, phase, kicks."""
     structure, n = problem.structure, problem.structure.n
     good = problem.segments.inside & fit.good[:, None]
@@ -35,15 +27,15 @@ def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
         if not np.std(s[good]) > 0:
             continue
         over = {
-            "speed": splines(u, knots_of(u[good], _KNOTS), good),
-            "extension": splines(s, knots_of(s[good], _KNOTS), good),
+            "speed": splines(u, knots_of(u[good], FIT.free_knots), good),
+            "extension": splines(s, knots_of(s[good], FIT.free_knots), good),
             "time": np.stack([time, time * u / np.std(u[good]), time * np.sign(u)], axis=2)
             * good[:, :, None],
         }
         for name, forces in over.items():
             found[f"{name} at {location.name}"] = columns_of(problem, fit, forces, location.row)
     if phase is not None:
-        waves = [f(k * phase) for k in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
+        waves = [f(k * phase) for k in range(1, FIT.free_harmonics + 1) for f in (np.sin, np.cos)]
         forces = np.stack(waves, axis=2) * good[:, :, None]
         for body, row in zip(structure.names, np.eye(n), strict=True):
             found[f"phase at {body}"] = columns_of(problem, fit, forces, row)
@@ -52,7 +44,7 @@ def families_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     return found
 
 
-def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
+def kicks_of(problem: Likelihood, fit: Fit) -> dict[str, np.ndarray]:
     """Kicks at the impacts of each contact by its path: a cubic of the speed before."""
     structure = problem.structure
     times = problem.sample_times()
@@ -63,12 +55,12 @@ def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
             row = rows[int(segment)]
             j = int(np.searchsorted(times[row][problem.segments.inside[row]], time))
             if j < problem.segments.inside[row].sum() and before > 0:
-                table = tables.setdefault(int(contact), np.zeros((*times.shape, POWERS)))
-                table[row, j] = -side * before ** np.arange(POWERS)
+                table = tables.setdefault(int(contact), np.zeros((*times.shape, FIT.kick_powers)))
+                table[row, j] = -side * before ** np.arange(FIT.kick_powers)
     found = {}
     for contact, table in tables.items():
         hit = np.any(table != 0, axis=2)
-        if np.count_nonzero(hit) < _FEWEST_IMPACTS:
+        if np.count_nonzero(hit) < FIT.impacts_of_kicks:
             continue
         name = problem.model.contacts[contact]
         path = name if "." in name else f"contact.{name}"
@@ -76,7 +68,7 @@ def kicks_of(problem: CoordinateProblem, fit: Fit) -> dict[str, np.ndarray]:
     return found
 
 
-def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
+def imperfection_columns_of(problem: Likelihood, fit: Fit) -> np.ndarray:
     """Columns of small imperfections of a rig: slightly nonlinear sensors, further harmonics of a drive."""
     count, length = problem.segments.inside.shape
     good = problem.segments.inside & fit.good[:, None]
@@ -96,7 +88,7 @@ def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
         for power in (2, 3):
             table = np.zeros((count, fit.evaluation.residual.shape[1], 1))
             sigma = sigmas_of(problem, name)[:, None]
-            table[:, part, 0] = seen * IMPERFECTION_SIZE * deviation * u**power / sigma
+            table[:, part, 0] = seen * FIT.imperfection_size * deviation * u**power / sigma
             columns.append(table)
     _, phase = clock_of(problem, fit)
     n = problem.structure.n
@@ -109,7 +101,9 @@ def imperfection_columns_of(problem: CoordinateProblem, fit: Fit) -> np.ndarray:
         speeds = fit.evaluation.motion[:, :, n + index]
         rates = np.diff(speeds, axis=1)[usable] / steps[usable]
         usual = problem.structure.mass[index] * float(np.median(np.abs(rates))) / 0.6745
-        waves = [f(k * phase) for k in range(1, _ALL_HARMONICS + 1) for f in (np.sin, np.cos)]
-        forces = IMPERFECTION_SIZE * usual * np.stack(waves, axis=2) * good[:, :, None]
+        waves = [
+            f(k * phase) for k in range(1, FIT.imperfect_harmonics_of_bodies + 1) for f in (np.sin, np.cos)
+        ]
+        forces = FIT.imperfection_size * usual * np.stack(waves, axis=2) * good[:, :, None]
         columns.append(columns_of(problem, fit, forces, np.eye(n)[index]))
     return problem.whitened(np.concatenate(columns, axis=2))

@@ -8,14 +8,13 @@ being the derivative of the motion by the start, and a sensor by its derivatives
 
 import numpy as np
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
-
-_LOST = 1e-9
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.policy import FIT
 
 
 def columns_of(
-    problem: CoordinateProblem,
+    problem: Likelihood,
     fit: Fit,
     forces: np.ndarray,
     rows: np.ndarray | None = None,
@@ -51,13 +50,13 @@ def columns_of(
     return found * (fit.evaluation.used > 0)[:, :, None]
 
 
-def sigmas_of(problem: CoordinateProblem, name: str) -> np.ndarray:
+def sigmas_of(problem: Likelihood, name: str) -> np.ndarray:
     """Noise of a sensor by segment, infinite where a record lacks it."""
     known = [one.sensor(name) for one in problem.prepared]
     return np.array([np.inf if one is None else one.sigma for one in known])[problem.segments.record]
 
 
-def back_to_start(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def back_to_start(problem: Likelihood, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Change of the start (segments, length, 2 n, n) equivalent to speeds at a sample, and its validity."""
     transition, n = fit.evaluation.transition, problem.structure.n
     inside = problem.segments.inside & fit.good[:, None]
@@ -67,7 +66,7 @@ def back_to_start(problem: CoordinateProblem, fit: Fit) -> tuple[np.ndarray, np.
     lengths, speeds = moved[:, :n].std(), moved[:, n:].std()
     size = np.concatenate([np.full(n, lengths or 1.0), np.full(n, speeds or 1.0)])
     scaled = np.where(finite[:, :, None, None], transition, np.eye(2 * n)) * size / size[:, None]
-    alive = np.logical_and.accumulate(finite & (np.abs(np.linalg.det(scaled)) > _LOST), axis=1)
+    alive = np.logical_and.accumulate(finite & (np.abs(np.linalg.det(scaled)) > FIT.lost_memory), axis=1)
     scaled[~alive] = np.eye(2 * n)
     inverse = np.linalg.inv(scaled) * size[:, None] / size
     back = inverse[:, :, :, n:]

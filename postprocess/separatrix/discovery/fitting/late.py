@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
 DELAY = "effect.sensor_delay.delay"
-# share of the time of a first sample over which the acceleration of the start is taken
-_SHORT = 1e-3
 
 
 @dataclass
@@ -47,7 +46,7 @@ def flown_late(
     segment = np.repeat(np.arange(len(start)), np.diff(first))
     if abs(delay) > np.max(times, initial=0.0):
         raise SeparatrixError(f"{DELAY}: found {delay:.3g} s, allowed less than a segment lasts")
-    short = _SHORT * np.minimum.reduceat(np.where(times > 0, times, np.inf), first[:-1])
+    short = FIT.late_share * np.minimum.reduceat(np.where(times > 0, times, np.inf), first[:-1])
     prompt = times + delay
     every = np.concatenate([times, np.maximum(prompt, 0.0), short])
     owner = np.concatenate([segment, segment, np.arange(len(start))])

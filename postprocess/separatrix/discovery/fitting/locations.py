@@ -6,14 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.measured.bodies import Structure, structure_of
-
-# extension or speed over the largest at any location, below which nothing moves there
-_STILL = 1e-9
-# share of the friction of the case below which a fitted one does not determine its size
-_LOST_FRICTION = 0.1
+from separatrix.discovery.policy import FIT
 
 
 @dataclass(frozen=True)
@@ -38,6 +34,8 @@ class SensedScales:
     locations: dict[str, LocationScales | None]
     # divisor of forces, which act on the coordinates themselves
     mass: float = 1.0
+    # no one angular frequency: hypotheses of several bodies need none [rad/s]
+    frequency: float = 1.0
     # joints whose force is a column
     measured: frozenset[str] = frozenset()
 
@@ -46,7 +44,7 @@ class SensedScales:
         return self.locations.get(name)
 
 
-def location_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
+def location_scales(problem: Likelihood, fit: Fit) -> SensedScales:
     """Measure all locations along the motion of a fit."""
     structure = structure_of(problem.model)
     inside = problem.segments.inside & fit.good[:, None]
@@ -66,7 +64,7 @@ def location_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
     for name, row in rows.items():
         length = float(np.std(motion[:, :n] @ row))
         speed = float(np.sqrt(np.mean((motion[:, n:] @ row) ** 2)))
-        if length <= _STILL * largest:
+        if length <= FIT.still * largest:
             found[name] = None
             continue
         mass = 1 / float(row @ (row / structure.mass))
@@ -83,17 +81,17 @@ def location_scales(problem: CoordinateProblem, fit: Fit) -> SensedScales:
     return SensedScales(found, measured=frozenset(one.of for one in sensors if one.kind == "F"))
 
 
-def _friction(problem: CoordinateProblem, fit: Fit, name: str) -> float:
+def _friction(problem: Likelihood, fit: Fit, name: str) -> float:
     """Force of a friction as fitted, of the case where the fit has all but lost it; 0 of other joints [N]."""
     path = f"{name}.force"
     if not name.startswith("friction."):
         return 0.0
     of_case = problem.model.parameters[path].value
     fitted = problem.machine_values(0, fit.values).get(path, of_case)
-    return fitted if fitted > _LOST_FRICTION * of_case else of_case
+    return fitted if fitted > FIT.lost_friction * of_case else of_case
 
 
-def _impact_speed(problem: CoordinateProblem, fit: Fit, structure: Structure, name: str) -> float:
+def _impact_speed(problem: Likelihood, fit: Fit, structure: Structure, name: str) -> float:
     """Usual speed of impacts of a contact, 0 without any."""
     contacts = [f"contact.{one}" if "." not in one else one for one in problem.model.contacts]
     if name not in contacts:
@@ -106,7 +104,7 @@ def _impact_speed(problem: CoordinateProblem, fit: Fit, structure: Structure, na
     return float(np.median(speeds)) if speeds.size else 0.0
 
 
-def usual_speed(problem: CoordinateProblem, fit: Fit, path: str) -> float:
+def usual_speed(problem: Likelihood, fit: Fit, path: str) -> float:
     """Root mean square of the speed along a joint in the segments that are followed [m/s]."""
     good = problem.segments.inside & fit.good[:, None]
     speeds = fit.evaluation.motion[good][:, problem.structure.n :] @ problem.structure.joint(path).row

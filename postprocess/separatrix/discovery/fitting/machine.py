@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from separatrix.discovery.policy import FIT
+
 # not fitted: a scale of all forces, or a parameter equivalent to an offset force
 _FIXED = (
     "body.gravity",
@@ -26,8 +28,6 @@ _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}
 _NEVER_ZERO = ("stiffness", "mass", "moment", "velocity")
 _UNBOUNDED = 1e100
-# factor by which the mass may differ from that of the case where the force is compared
-_MASS_FACTOR = 5.0
 
 
 @dataclass(frozen=True)
@@ -91,11 +91,10 @@ class Free:
         return self.path.startswith(IMPERFECTION)
 
 
-def base_parameters(model, measured_force: bool, in_force: bool = False) -> list[Free]:
+def base_parameters(model, measured_force: bool, near_mass: bool = False) -> list[Free]:
     """The parameters of the base machine that a record can determine.
 
-    Where the force is compared (`in_force`) the mass stays near that of the case, as a slow joint hardly
-    determines it.
+    With `near_mass` the mass stays near that of the case, as a slow joint hardly determines it.
     """
     free = []
     for path, parameter in model.parameters.items():
@@ -107,8 +106,8 @@ def base_parameters(model, measured_force: bool, in_force: bool = False) -> list
         lower, upper = bounds_of(parameter)
         if path.endswith(_NEVER_ZERO):
             lower = max(lower, 1e-3 * value)
-        if in_force and path == "body.mass":
-            lower, upper = value / _MASS_FACTOR, value * _MASS_FACTOR
+        if near_mass and path == "body.mass":
+            lower, upper = value / FIT.mass_factor, value * FIT.mass_factor
         free.append(Free(path, value, lower, upper, abs(value) or 1.0, varies=path == SENSOR_BIAS))
     return free
 

@@ -9,12 +9,8 @@ import numpy as np
 
 from separatrix.discovery.fitting.motions import extensions
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.policy import FIT
 from separatrix.library import effects
-
-# share of the largest speed below which bounces die out and carry little information
-_SLOW = 0.03
-# time over which a force is measured, in natural periods or seconds
-_INSTANT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,7 @@ def _impact_speeds(fitted: Fitted) -> np.ndarray:
         for rows in [impacts[:, 0].astype(int)]
     ]
     speeds = np.sort(np.concatenate(found)) if found else np.zeros(0)
-    return speeds[speeds > _SLOW * speeds.max(initial=0)]
+    return speeds[speeds > FIT.dying_bounce * speeds.max(initial=0)]
 
 
 def _speeds(fitted: Fitted) -> np.ndarray:
@@ -82,7 +78,7 @@ def _sliding_positions(fitted: Fitted) -> np.ndarray:
     """Positions of the fitted motion at the samples where it slides [m]."""
     inside = _inside(fitted)
     x, speed = fitted.fit.evaluation.x[inside], np.abs(fitted.fit.evaluation.v[inside])
-    return np.sort(x[speed > _SLOW * speed.max(initial=0)])
+    return np.sort(x[speed > FIT.dying_bounce * speed.max(initial=0)])
 
 
 def _everywhere(fitted: Fitted) -> np.ndarray:
@@ -186,7 +182,7 @@ def restitution_at(model, values: dict[str, float], speeds: np.ndarray) -> np.nd
     barrier = there.get("contact.upper" if side > 0 else "contact.lower", np.inf)
     if abs(barrier) >= 1e100:
         return None
-    time = _INSTANT / max(1.0, model.drive_frequency({}))
+    time = FIT.force_time / max(1.0, model.drive_frequency({}))
     start = np.column_stack([barrier - side * speeds * time, side * speeds, 0 * speeds])
     times = np.tile([0.0, 2 * time], speeds.size)
     flown = model.segments(
@@ -221,7 +217,7 @@ def friction_at(
     x = np.median(known.fit.evaluation.x[known.problem.segments.inside & known.fit.good[:, None]])
     # at rest there is no direction
     v = direction * np.maximum(speeds, 1e-3 * np.max(speeds))
-    time = _INSTANT / max(1.0, known.model.drive_frequency({}))
+    time = FIT.force_time / max(1.0, known.model.drive_frequency({}))
     start = np.column_stack([np.full(v.size, x), v, 0 * v])
     first, times = 2 * np.arange(v.size + 1), np.tile([0.0, time], v.size)
     ends = [

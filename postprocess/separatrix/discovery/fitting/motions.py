@@ -6,16 +6,15 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicSpline
 
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.policy import FIT
 from separatrix.library import effects
 
 # crank angles at which the position of the foot of the spring is computed
 _ANGLES = np.linspace(0, 2 * np.pi, 65)
-# time over which a force is measured, in natural periods or seconds
-_INSTANT = 1e-5
 
 
-def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
+def scaled_motion(problem: Likelihood, fit: Fit) -> dict[str, np.ndarray | None]:
     """Position, velocity, crank angle and time (-1 to 1) at the samples, scaled to about 1.
 
     Without any simulated segment nothing is scaled.
@@ -31,7 +30,7 @@ def scaled_motion(problem: Problem, fit: Fit) -> dict[str, np.ndarray | None]:
     return {"x": (x - middle) / size, "v": v / speed, "phase": phase, "time": time, "speed": speed}
 
 
-def clock_of(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray | None]:
+def clock_of(problem: Likelihood, fit: Fit) -> tuple[np.ndarray, np.ndarray | None]:
     """Time of the samples, -1 to 1 over a record, and crank angle; None without a drive."""
     shape = problem.segments.inside.shape
     time, phase = np.zeros(shape), None
@@ -51,7 +50,7 @@ def products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one[..., :, None] * other[..., None, :]).reshape(*one.shape[:2], -1)
 
 
-def extensions(problem: Problem, fit: Fit) -> np.ndarray | None:
+def extensions(problem: Likelihood, fit: Fit) -> np.ndarray | None:
     """Extension of the spring at the samples [m]; None without a linear spring or where it is unknown."""
     if "restoring.stiffness" not in problem.model.parameters:
         return None
@@ -70,7 +69,7 @@ def extensions(problem: Problem, fit: Fit) -> np.ndarray | None:
     return found
 
 
-def _slack_positions(problem: Problem, fit: Fit, number: int) -> np.ndarray:
+def _slack_positions(problem: Likelihood, fit: Fit, number: int) -> np.ndarray:
     """Positions at which the spring is slack [m], at the crank angles `_ANGLES` of a record.
 
     They follow from the force on a body in the middle of the motion when only the spring acts; NaN where the
@@ -86,7 +85,7 @@ def _slack_positions(problem: Problem, fit: Fit, number: int) -> np.ndarray:
         # free play is no force of its own, but shifts these positions by half of it
         if path == "effect.backlash.gap":
             values[path] = 0.0
-    time = _INSTANT / max(1.0, model.drive_frequency({}))
+    time = FIT.slack_time / max(1.0, model.drive_frequency({}))
     start = np.column_stack([np.full(_ANGLES.size, x), np.zeros(_ANGLES.size), _ANGLES])
     flown = model.segments(
         list(values), np.array(list(values.values())), start, 2 * np.arange(_ANGLES.size + 1),
@@ -100,7 +99,7 @@ def _slack_positions(problem: Problem, fit: Fit, number: int) -> np.ndarray:
     return x + pulled
 
 
-def impacts_at(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def impacts_at(problem: Likelihood, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Speed before the impact, and its direction after it, at the first sample after each impact."""
     inside = problem.segments.inside
     before, at = np.zeros(inside.shape), np.zeros(inside.shape)
@@ -119,7 +118,7 @@ def impacts_at(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return before, at
 
 
-def after_impacts(problem: Problem, fit: Fit) -> np.ndarray:
+def after_impacts(problem: Likelihood, fit: Fit) -> np.ndarray:
     """Time since the last impact of the segment at each sample [s], not a number before the first."""
     _, at = impacts_at(problem, fit)
     times = problem.sample_times()

@@ -16,25 +16,16 @@ import numpy as np
 from scipy.signal import lfilter
 
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.response import force_columns, standardised
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.fitting.response import standardised
 from separatrix.discovery.measured.condense import Samples, expected_left
+from separatrix.discovery.policy import FIT
 
 _MEMORIES = np.linspace(-0.2, 0.9, 45)
-_PIECES = 4
-# samples of a piece of a measured force, and powers of time that are taken from it
-_SHORT, _POWERS = 16, 3
-_LEAST = 0.04
-# segments that determine the size of the noise
-_FEWEST = 4
-# memory of a force beyond which it is that of the joint and not of the sensor
-_MOST = 0.8
-_SURE = 3.5
-_OUTLIER = 2.5
 
 
 @dataclass
-class _Left:
+class Left:
     """What is left of pieces of records: power, products of neighbours; both of noise by memory (rows)."""
 
     record: np.ndarray
@@ -57,20 +48,16 @@ class Noise:
     of_samples: bool = False
 
 
-def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float | None = None) -> Noise:
+def noise_of(problem: Likelihood, fit: Fit, channel: int, mass: float, known: float | None = None) -> Noise:
     """Size and memory of the noise of one channel of all records; the memory may be `known`."""
-    condensed = [] if problem.in_force else _of_blocks(problem, channel)
-    if problem.in_force:
-        left = _of_short_pieces(problem, fit)
-    else:
-        left = _joined([_of_segments(problem, fit, channel, mass), *condensed])
+    left, condensed, most = problem.left_of_noise(fit, channel, mass)
     # a row of blocks stands for all of one length
-    if left.record.size < _FEWEST and not condensed:
+    if left.record.size < FIT.noise_segments and not condensed:
         return Noise({}, 0.0)
     memory, error = _memory_of(_joined(condensed) if condensed else left)
     if known is not None:
         memory = known
-    if problem.in_force and memory > _MOST:
+    if memory > most:
         memory = 0.0
     factors = {}
     for number in np.unique(left.record):
@@ -80,7 +67,20 @@ def noise_of(problem: Problem, fit: Fit, channel: int, mass: float, known: float
     return Noise(factors, memory, error, bool(condensed))
 
 
-def _memory_of(left: _Left) -> tuple[float, float]:
+def left_of_motion(
+    problem: Likelihood, fit: Fit, channel: int, mass: float
+) -> tuple[Left, list[Left], float]:
+    """Residuals of a motion; those of condensed blocks; the memory above which it is not that of a sensor."""
+    condensed = _of_blocks(problem, channel)
+    return _joined([_of_segments(problem, fit, channel, mass), *condensed]), condensed, np.inf
+
+
+def left_of_force(problem: Likelihood, fit: Fit) -> tuple[Left, list[Left], float]:
+    """The same of a force."""
+    return _of_short_pieces(problem, fit), [], FIT.most_memory
+
+
+def _memory_of(left: Left) -> tuple[float, float]:
     """Correlation of neighbours of noise that leaves as much, 0 if it may be chance; its standard error."""
     # each record in its own size
     size = np.ones(left.record.size)
@@ -94,7 +94,7 @@ def _memory_of(left: _Left) -> tuple[float, float]:
     freedom = left.freedom.sum()
     slope = float(np.interp(memory, _MEMORIES, np.gradient(ratio, _MEMORIES)))
     error = float(np.sqrt((1 - memory**2) / freedom)) / max(slope, 1e-3)
-    return (0.0 if memory < max(_LEAST, _SURE / np.sqrt(freedom)) else memory), error
+    return (0.0 if memory < max(FIT.least_memory, FIT.memory_sure / np.sqrt(freedom)) else memory), error
 
 
 def white_share(memory: float) -> float:
@@ -102,12 +102,12 @@ def white_share(memory: float) -> float:
     return float(np.polyval([2, -16, 56, -112, 70], memory)) / 70
 
 
-def _joined(parts: list[_Left]) -> _Left:
+def _joined(parts: list[Left]) -> Left:
     names = ("record", "power", "product", "freedom", "powers", "products")
-    return _Left(*(np.concatenate([getattr(one, name) for one in parts], axis=-1) for name in names))
+    return Left(*(np.concatenate([getattr(one, name) for one in parts], axis=-1) for name in names))
 
 
-def _of_blocks(problem: Problem, channel: int) -> list[_Left]:
+def _of_blocks(problem: Likelihood, channel: int) -> list[Left]:
     """Residuals of condensed blocks, a row for all blocks of one length in a record."""
     found = []
     for number, prepared in enumerate(problem.prepared):
@@ -118,7 +118,7 @@ def _of_blocks(problem: Problem, channel: int) -> list[_Left]:
         parts = [_of_length(samples, size, channel, sigma) for size in samples.lengths]
         columns = [np.array(column) for column in zip(*parts, strict=True)]
         record = np.full(len(parts), number)
-        found.append(_Left(record, *columns[:3], columns[3].T, columns[4].T))
+        found.append(Left(record, *columns[:3], columns[3].T, columns[4].T))
     return found
 
 
@@ -133,21 +133,21 @@ def _of_length(samples: Samples, size: int, channel: int, sigma: float) -> tuple
     return squares, product, samples.freedom[rows].sum(), expected[:, 0], expected[:, 1]
 
 
-def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left:
+def _of_segments(problem: Likelihood, fit: Fit, channel: int, mass: float) -> Left:
     """Residuals of segments of samples with their starts and forces projected out."""
     segments = problem.segments
     length = segments.inside.shape[1]
     counts = segments.inside.sum(axis=1)
-    piece = np.minimum(np.arange(length)[None, :] * _PIECES // counts[:, None], _PIECES - 1)
+    piece = np.minimum(np.arange(length)[None, :] * FIT.noise_pieces // counts[:, None], FIT.noise_pieces - 1)
     part = slice(channel * length, (channel + 1) * length)
-    fitting = fit.good & (counts >= 2 * (_PIECES + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
+    fitting = fit.good & (counts >= 2 * (FIT.noise_pieces + 2)) & np.any(fit.evaluation.used[:, part], axis=1)
     condensed = np.array([one.samples.condensed for one in problem.prepared])
     rows = np.flatnonzero(fitting & ~condensed[segments.record])
     if not rows.size:
         none = np.zeros(0)
-        return _Left(none.astype(int), none, none, none, *np.zeros((2, _MEMORIES.size, 0)))
-    forces = (piece[:, :, None] == np.arange(_PIECES)) * segments.inside[:, :, None].astype(float)
-    columns = np.concatenate([fit.evaluation.by_start, force_columns(problem, fit, forces, mass)], axis=2)
+        return Left(none.astype(int), none, none, none, *np.zeros((2, _MEMORIES.size, 0)))
+    forces = (piece[:, :, None] == np.arange(FIT.noise_pieces)) * segments.inside[:, :, None].astype(float)
+    columns = np.concatenate([fit.evaluation.by_start, problem.force_columns(fit, forces, mass)], axis=2)
     columns, residual = columns[rows, part], fit.evaluation.residual[rows, part]
     if channel == 0:
         columns = np.concatenate([columns, _bent_sensor(problem, fit)[rows]], axis=2)
@@ -162,7 +162,7 @@ def _of_segments(problem: Problem, fit: Fit, channel: int, mass: float) -> _Left
     return _without_outliers(segments.record[rows], cleaned, freedom, basis, counts[rows])
 
 
-def _bent_sensor(problem: Problem, fit: Fit) -> np.ndarray:
+def _bent_sensor(problem: Likelihood, fit: Fit) -> np.ndarray:
     """Square and cube of the position, (segments, samples, 2): errors of a slightly nonlinear sensor.
 
     They have kinks where the speed jumps, unlike forces, and would appear as memory of the noise.
@@ -172,34 +172,34 @@ def _bent_sensor(problem: Problem, fit: Fit) -> np.ndarray:
     return u[:, :, None] ** np.array([2, 3])
 
 
-def _of_short_pieces(problem: Problem, fit: Fit) -> _Left:
+def _of_short_pieces(problem: Likelihood, fit: Fit) -> Left:
     """Residuals of short pieces of measured forces less a parabola in time each.
 
     A force shows every kink of a law at once; pieces with large residuals of a wrong machine are left out.
     """
-    length = problem.segments.inside.shape[1] // _SHORT * _SHORT
-    pieces = fit.evaluation.residual[:, :length].reshape(-1, _SHORT)
-    used = fit.evaluation.used[:, :length].reshape(-1, _SHORT).all(axis=1)
-    record = np.repeat(problem.segments.record, length // _SHORT)[used]
-    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, _SHORT), _POWERS))[0]
+    length = problem.segments.inside.shape[1] // FIT.noise_samples * FIT.noise_samples
+    pieces = fit.evaluation.residual[:, :length].reshape(-1, FIT.noise_samples)
+    used = fit.evaluation.used[:, :length].reshape(-1, FIT.noise_samples).all(axis=1)
+    record = np.repeat(problem.segments.record, length // FIT.noise_samples)[used]
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, FIT.noise_samples), FIT.noise_powers))[0]
     cleaned = pieces[used] - pieces[used] @ basis @ basis.T
-    count = np.full(record.size, _SHORT)
+    count = np.full(record.size, FIT.noise_samples)
     whole = np.broadcast_to(basis, (record.size, *basis.shape))
-    return _without_outliers(record, cleaned, (count - _POWERS).astype(float), whole, count)
+    return _without_outliers(record, cleaned, (count - FIT.noise_powers).astype(float), whole, count)
 
 
 def _without_outliers(
     record: np.ndarray, cleaned: np.ndarray, freedom: np.ndarray, basis: np.ndarray, counts: np.ndarray
-) -> _Left:
+) -> Left:
     """Powers of the residuals, without pieces that the model misses altogether."""
     power = np.sum(cleaned**2, axis=1)
     share = power / freedom
     kept = np.zeros(record.size, bool)
     for number in np.unique(record):
-        kept |= (record == number) & (share < _OUTLIER * np.median(share[record == number]))
+        kept |= (record == number) & (share < FIT.noise_outlier * np.median(share[record == number]))
     product = np.sum(cleaned[:, 1:] * cleaned[:, :-1], axis=1)
     expected = _expected(basis[kept], counts[kept])
-    return _Left(record[kept], power[kept], product[kept], freedom[kept], *expected)
+    return Left(record[kept], power[kept], product[kept], freedom[kept], *expected)
 
 
 def _expected(basis: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,42 +1,28 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The short-segment likelihood: residuals of all segments and their derivatives, from the simulator."""
+"""What the likelihoods of all observations share: segments, noise, free parameters, imperfections."""
 
 from functools import cached_property
 
 import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
-from separatrix.discovery.fitting.forces import force_argument, force_needed
-from separatrix.discovery.fitting.late import DELAY, Flown, flown_late
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
 from separatrix.discovery.measured.preflight import Prepared
-from separatrix.discovery.measured.segments import Segments, padded, padded_table, seeing
+from separatrix.discovery.measured.segments import Segments, padded, seeing
 from separatrix.errors import SeparatrixError
-
-# tolerance of the adaptive flight, relative to the position from the origin: a third quicker than 1e-9; share
-# of the noise that its error may be for a small motion far from the origin; limit of rounding
-_TOLERANCE = 1e-8
-_NOISE_SHARE = 0.01
-_ROUNDING = 1e-14
-# relative step of a parameter by which the force of a known motion is differentiated
-_STEP = 1e-5
-
-
-def flight_tolerance(prepared: Prepared) -> float:
-    """Return the relative tolerance of flights whose errors are far below the noise of a record."""
-    farthest = np.max(np.abs(prepared.samples.x), initial=0.0)
-    allowed = _NOISE_SHARE * prepared.sigma
-    if allowed >= _TOLERANCE * farthest:
-        return _TOLERANCE
-    return float(max(_ROUNDING, allowed / farthest))
 
 
 class Problem:
-    """Records cut into segments, a model, and what is free."""
+    """Records cut into segments, a model, and what is free; a part of each `Likelihood`."""
 
-    # unknowns of a start: x and v
+    # numbers of a start, and those of them that are fitted
     starts = 2
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of each segment."""
+        return self.starts
 
     def __init__(
         self,
@@ -57,7 +43,6 @@ class Problem:
         self.segments = segments
         self.free = free
         self.amplitudes = drive_amplitudes(model)
-        self.in_force = prepared[0].in_force
         self._parts = [self._part(number) for number in range(len(prepared))]
 
     def of_segments(self, rows: np.ndarray) -> "Problem":
@@ -73,15 +58,6 @@ class Problem:
         """The same records with another model, or other segments without imperfections of the rig."""
         found = type(self)(model, self.prepared, self.segments if segments is None else segments, free)
         found.imperfections = self.imperfections if segments is None else {}
-        return found
-
-    def imitating(self, motion: Evaluation) -> "Problem":
-        """The same problem with a computed motion in place of x and v as they were measured."""
-        found = self.like(self.model, self.free)
-        for part in found._parts:
-            part["x"] = motion.x[part["rows"]][part["inside"]]
-            if part["v"] is not None:
-                part["v"] = motion.v[part["rows"]][part["inside"]]
         return found
 
     def left_over(self) -> tuple[np.ndarray, np.ndarray]:
@@ -114,11 +90,6 @@ class Problem:
         inside = self.segments.inside
         return inside if self.channels == 1 else np.hstack([inside, seeing(self.segments, samples)])
 
-    @property
-    def channels(self) -> int:
-        """How many of x and v are compared."""
-        return 2 if not self.in_force and any(part["v"] is not None for part in self._parts) else 1
-
     def _known_nuisances(self) -> list[tuple[int, float, np.ndarray]]:
         """Indices and errors of nuisances of known size, and the segments that share their residual.
 
@@ -142,7 +113,6 @@ class Problem:
 
     def _part(self, number: int) -> dict:
         """The segments of one record as lists for the simulator."""
-        record = self.prepared[number].record
         fitted = self.prepared[number].samples
         rows = np.flatnonzero(self.segments.record == number)
         first, last = self.segments.first[rows], self.segments.last[rows]
@@ -158,11 +128,7 @@ class Problem:
             "times": times,
             "starts": starts,
             "inside": self.segments.inside[rows],
-            "x": fitted.x[samples],
-            "v": None if fitted.v is None else fitted.v[samples],
             "samples": samples,
-            "force": None if self.in_force else force_argument(record, fitted.offset[first]),
-            "tolerance": flight_tolerance(self.prepared[number]),
         }
 
     def evaluate(
@@ -185,10 +151,8 @@ class Problem:
             v=np.zeros(shape),
             impacts=[None] * len(self._parts),
             hits=np.zeros(count, int),
-            unknowns=self.starts,
+            unknowns=self.unknowns,
         )
-        if self.in_force:
-            out.unknowns, out.force = 0, np.zeros(shape)
         if derivatives:
             out.by_start = np.zeros((count, width, self.starts))
             out.by_parameter = np.zeros((count, width, len(self.free)))
@@ -196,12 +160,7 @@ class Problem:
         for number, part in enumerate(self._parts):
             if part["rows"].size:
                 try:
-                    if self.in_force:
-                        self._compare_force(number, part, values, derivatives, out)
-                    else:
-                        self._evaluate_record(
-                            number, part, values, starts, (derivatives, by_start_alone), out
-                        )
+                    self._evaluate_record(number, part, values, starts, (derivatives, by_start_alone), out)
                 except SeparatrixError:
                     # values that together make no machine
                     out.failed[part["rows"]] = True
@@ -229,9 +188,7 @@ class Problem:
             if memory == 0:
                 continue
             rows = np.flatnonzero(self.segments.record == number)
-            links = prepared.samples.links(memory)[self.segments.index[rows]][:, 1:]
-            if self.in_force:
-                links *= prepared.driven.moves[self.segments.index[rows]][:, :-1]
+            links = self._links(prepared, rows)
             for first in range(0, self.channels * length, length):
                 known = self.compared[rows, first : first + length]
                 link = links * (known[:, 1:] & known[:, :-1])
@@ -241,6 +198,10 @@ class Problem:
                 table[rows, first : first + length] = part
         table[:, : self.compared.shape[1]][~self.compared] = 0
         return table
+
+    def _links(self, prepared: Prepared, rows: np.ndarray) -> np.ndarray:
+        """Correlation of each sample of these segments with the one before."""
+        return prepared.samples.links(prepared.memory)[self.segments.index[rows]][:, 1:]
 
     def _add_imperfections(self, values: np.ndarray, out: Evaluation) -> None:
         """What imperfections of the rig add to residuals and derivatives."""
@@ -290,107 +251,6 @@ class Problem:
                 found[rows, channel] = part * sigma[:, :, None]
         return found
 
-    def _evaluate_record(
-        self,
-        number: int,
-        part: dict,
-        values: np.ndarray,
-        starts: np.ndarray,
-        wanted: tuple[bool, bool],
-        out: Evaluation,
-    ) -> None:
-        prepared = self.prepared[number]
-        derivatives, by_start_alone = wanted
-        active, given, moves, directions = self._active(number, values, derivatives)
-        if derivatives and by_start_alone:
-            moves, directions = np.zeros_like(moves), directions[:0]
-        start = np.column_stack([starts[part["rows"]], self.crank_angle(number, values, part["starts"])])
-        seen = self._simulate(number, part, active, given, start, directions)
-        result = seen.shown
-        rows, inside = part["rows"], part["inside"]
-        length = inside.shape[1]
-        failed = np.asarray(result.reason) != 0
-        finite = padded_table(np.isfinite(result.x) & np.isfinite(result.v), inside)
-        failed |= np.any(inside & (finite == 0), axis=1)
-        out.failed[rows] = failed
-        out.x[rows] = padded_table(result.x, inside)
-        out.v[rows] = padded_table(result.v, inside)
-        out.hits[rows] = result.impacts
-        hits = result.impact
-        out.impacts[number] = np.column_stack(
-            [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side]
-        )
-        jacobians = (None, None)
-        if derivatives:
-            out.steady[rows] = np.asarray(result.steady, bool)
-            jacobians = self._derivatives(number, part, moves, seen)
-            n = len(directions)
-            out.transition[rows, :, 0, :] = padded_table(result.jacobian[:, n : n + 2], inside)
-            out.transition[rows, :, 1, :] = padded_table(result.velocity_jacobian[:, n : n + 2], inside)
-        spread = prepared.samples.spread(prepared.memory)[part["samples"]]
-        for channel, (measured, computed, size) in enumerate(
-            ((part["x"], result.x, prepared.sigma), (part["v"], seen.v, prepared.velocity_sigma))
-        ):
-            if measured is None:
-                continue
-            columns = slice(channel * length, (channel + 1) * length)
-            sigma = size * spread
-            out.residual[rows, columns] = np.nan_to_num(padded_table((measured - computed) / sigma, inside))
-            out.used[rows, columns] = self.compared[rows, columns]
-            if derivatives:
-                by_start, by_parameter = jacobians[channel]
-                out.by_start[rows, columns] = np.nan_to_num(padded_table(by_start / sigma[:, None], inside))
-                out.by_parameter[rows, columns] = np.nan_to_num(
-                    padded_table(by_parameter / sigma[:, None], inside)
-                )
-
-    def _compare_force(
-        self, number: int, part: dict, values: np.ndarray, derivatives: bool, out: Evaluation
-    ) -> None:
-        """Residuals of the force of a record, whose motion is known."""
-        prepared, rows, inside, at = self.prepared[number], part["rows"], part["inside"], part["samples"]
-        motion, record, length = prepared.driven, prepared.record, inside.shape[1]
-
-        def needed(chosen: np.ndarray) -> np.ndarray:
-            machine = self.machine_values(number, chosen)
-            return force_needed(self.model, machine, motion, record.force, record.pieces)[at]
-
-        force, sigma, used = needed(values), prepared.deviation(at), motion.moves[at]
-        for table, at_samples in ((out.x, motion.x[at]), (out.v, motion.v[at]), (out.force, force)):
-            table[rows] = padded_table(at_samples, inside)
-        out.used[rows, :length] = padded_table(used.astype(float), inside)
-        out.residual[rows, :length] = padded_table(used * (record.force[at] - force) / sigma, inside)
-        if derivatives:
-            slopes = np.zeros((at.size, values.size))
-            for j, one in enumerate(self.free):
-                # nearly linear; derivatives of so short a flight are not exact for all effects
-                step = _STEP * one.size * (1 if values[j] + _STEP * one.size <= one.upper else -1)
-                moved = values + step * (np.arange(values.size) == j)
-                slopes[:, j] = (needed(moved) - force) / (step * sigma)
-            out.by_parameter[rows, :length] = padded_table(slopes, inside)
-
-    def _simulate(
-        self,
-        number: int,
-        part: dict,
-        active: list[str],
-        given: np.ndarray,
-        start: np.ndarray,
-        directions: np.ndarray | None,
-    ) -> Flown:
-        more = {} if part["force"] is None else {"force": part["force"]}
-        more |= {
-            "derivatives": directions is not None,
-            "directions": directions,
-            "tolerance": part["tolerance"],
-        }
-        flight = (active, given, start, part["offsets"], part["times"])
-        if DELAY in active and part["v"] is not None and self.prepared[number].frequency is not None:
-            frequency = self.model.drive_frequency(dict(zip(active, given, strict=True)))
-            return flown_late(self.model, *flight, frequency, **more)
-        result = self.model.segments(*flight, **more)
-        return Flown(result, result.v, result.velocity_jacobian)
-
     def machine_values(self, number: int, values: np.ndarray) -> dict[str, float]:
         """Values of the machine as it was during record `number`."""
         chosen = {
@@ -411,12 +271,6 @@ class Problem:
         if zero is not None:
             chosen[SENSOR_BIAS] = zero + chosen.get(SENSOR_BIAS, self.model.parameters[SENSOR_BIAS].value)
         return chosen
-
-    def _driven_at(self, frequency: float, chosen: dict[str, float]) -> dict[str, float]:
-        """What makes the drive of the machine with the chosen values turn at a frequency [rad/s]."""
-        ratio = self.model.parameters["drive.ratio"].value
-        frequency_of_ratio = self.model.drive_frequency(chosen | {"drive.ratio": ratio})
-        return {"drive.ratio": ratio * frequency / frequency_of_ratio}
 
     def _nuisance(self, path: str, number: int, values: np.ndarray, absent: float | None) -> float | None:
         for one, value in zip(self.free, values, strict=True):
@@ -459,42 +313,18 @@ class Problem:
             elif not one.is_nuisance:
                 for path, slope in one.slopes(values[j]).items():
                     chain[active.index(path), j] = slope
-        if "drive.ratio" in chosen and self.prepared[number].frequency is not None:
-            row = active.index("drive.ratio")
-            for j, one in enumerate(self.free):
-                chain[row, j] = self._ratio_slope(one, values[j], number, chosen) * one.slope(values[j])
+        if self.prepared[number].frequency is not None:
+            self._follow_drive(number, values, chosen, chain)
         moves = chain.any(axis=0)
         return active, given, moves, chain.T[moves]
 
-    def _ratio_slope(self, one: Free, value: float, number: int, chosen: dict[str, float]) -> float:
-        """How drive.ratio follows a parameter, so that the frequency stays that of the record."""
-        ratio = chosen["drive.ratio"]
-        if one.path == "nuisance:clock" and one.record == number:
-            return ratio / (1 + value)
-        if one.path not in ("restoring.stiffness", "restoring.moment", "body.mass"):
-            return 0.0
-        step = 1e-5 * abs(chosen[one.path])
-        ends = [
-            self.model.drive_frequency({**chosen, one.path: chosen[one.path] + sign * step})
-            for sign in (1, -1)
-        ]
-        slope = (ends[0] - ends[1]) / (2 * step)
-        return -ratio * slope / (0.5 * (ends[0] + ends[1]))
-
-    def _derivatives(self, number: int, part: dict, moves: np.ndarray, seen: Flown) -> list:
-        """Derivatives of x and v by the start, and by the free parameters through machine and crank."""
-        n = np.count_nonzero(moves)
-        prepared = self.prepared[number]
+    def _crank_slopes(self, number: int, part: dict) -> np.ndarray:
+        """Derivatives of the crank angles at the starts by the free parameters."""
         crank = np.zeros((part["starts"].size, len(self.free)))
+        prepared = self.prepared[number]
         for j, one in enumerate(self.free):
             if one.path == "nuisance:phase" and one.record == number:
                 crank[:, j] = 1
             elif one.path == "nuisance:clock" and one.record == number:
                 crank[:, j] = prepared.frequency * (part["starts"] - prepared.origin)
-        crank = np.repeat(crank, np.diff(part["offsets"]), axis=0)
-        found = []
-        for whole in (seen.shown.jacobian, seen.velocity_jacobian):
-            by_parameter = whole[:, n + 2 : n + 3] * crank
-            by_parameter[:, moves] += whole[:, :n]
-            found.append((whole[:, n : n + 2], by_parameter))
-        return found
+        return crank

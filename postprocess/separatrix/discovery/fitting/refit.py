@@ -7,40 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from separatrix.discovery.fitting.catalogue import Candidate
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.data import Data, fit_stages, polished
 from separatrix.discovery.fitting.fit import Fit, blocking, minimise
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.screen import Screened
-
-# a linearised estimate that reaches this share of its promise needs no other start
-_DELIVERED = 0.8
-# reduced chi^2 of the base beyond which the linearised estimate promises nothing
-_BAD = 1.3
-_HOPELESS = 4.0
-# log-likelihood by which a candidate is far behind
-_BEATEN = 15.0
-# segments that may be in a wrong minimum
-_SPARED = 3
-# share of segments that one fit may follow more than another without being better
-_FEW = 0.1
-# log-likelihood by which a name is too far behind another one of the same motion to be at its minimum; share
-# of the size of that one from which its own size is extrapolated
-_FAR_BEHIND, _FIRST_SHARE = 6.0, 0.1
-# log-likelihood by which a machine that contains the base may be worse than it
-WORSE = 1.0
-# share of chi^2 by which two fits of one minimum may differ
-_SAME = 1e-3
-# share of chi^2 by which two fits far behind may differ for another start to be needless
-_ALIKE = 0.05
-# reduced chi^2 of the base up to which a start from it is trusted
-_NEAR_BASE = 10.0
-# share of the gap of the base that a rival has closed for another effect to need only one start
-_MOST_CLOSED = 0.5
-# usual sizes beyond which a linearised estimate is not believed
-_FARTHEST = 25.0
+from separatrix.discovery.policy import FIT
 
 
 @dataclass
@@ -49,7 +22,7 @@ class Fitted:
 
     names: tuple[str, ...]
     model: object
-    problem: Problem
+    problem: Likelihood
     fit: Fit
     added: tuple[int, ...]
     tries: int = 1
@@ -113,10 +86,10 @@ def refit(
         best.tries = tries
         if agreed:
             break
-        promised = base.fit.reduced_chi2 < _BAD and kind == "linear"
+        promised = base.fit.reduced_chi2 < FIT.bad_screen and kind == "linear"
         if (promised or best.fit.like_noise(1)) and _delivers(best, base, candidate, screened):
             break
-        if settled and gain_over(best, rival)[0] < -_BEATEN:
+        if settled and gain_over(best, rival)[0] < -FIT.beaten:
             break
         if _enough(best, base, candidate, rival):
             break
@@ -133,9 +106,9 @@ def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | N
     their cost where the first is worse than no effect, or far behind a rival that closes most of the gap, or
     on top of an effect.
     """
-    if base.fit.reduced_chi2 > _NEAR_BASE:
+    if base.fit.reduced_chi2 > FIT.near_base:
         return False
-    converged, worse = found.fit.converged, gain_over(found, base)[0] < -WORSE
+    converged, worse = found.fit.converged, gain_over(found, base)[0] < -FIT.worse
     if candidate.linear.all():
         return converged and not worse
     if (worse and converged) or (base.added and (worse or converged)):
@@ -144,13 +117,13 @@ def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | N
         return False
     if rival is None or not rival.fit.converged:
         return False
-    closed = rival.fit.excess < (1 - _MOST_CLOSED) * base.fit.excess
-    return closed and gain_over(found, rival)[0] < -2 * _BEATEN
+    closed = rival.fit.excess < (1 - FIT.most_closed) * base.fit.excess
+    return closed and gain_over(found, rival)[0] < -2 * FIT.beaten
 
 
 def hopeless(base: Fitted) -> float:
     """Reduced chi^2 from which on a candidate is abandoned."""
-    return _HOPELESS * max(1.0, base.fit.reduced_chi2)
+    return FIT.hopeless * max(1.0, base.fit.reduced_chi2)
 
 
 def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
@@ -158,14 +131,14 @@ def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) ->
 
     A fit that stays worse has not found its minimum.
     """
-    if not candidate.linear.any() or gain_over(best, base)[0] > -WORSE:
+    if not candidate.linear.any() or gain_over(best, base)[0] > -FIT.worse:
         return best
     values = _absent(_base_values(base, candidate), candidate)
     problem = data.problem(candidate.model, data.last, candidate.free)
     fit = minimise(problem, values, base.fit.starts)
     found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added, best.tries + 1)
     best = found if _better(found, best) else best
-    if gain_over(best, base)[0] > -WORSE:
+    if gain_over(best, base)[0] > -FIT.worse:
         return best
     return replace(best, fit=replace(best.fit, in_local_minimum=True))
 
@@ -180,7 +153,7 @@ def _absent(values: np.ndarray, candidate: Candidate) -> np.ndarray:
 def beaten(one: Fitted, rival: Fitted) -> bool:
     """Whether a fit is far behind even without the segments in which it is furthest behind."""
     parts = np.sort(gain_over(one, rival)[1])
-    return bool(parts[_SPARED:].sum() < -2 * _BEATEN)
+    return bool(parts[FIT.spared :].sum() < -2 * FIT.beaten)
 
 
 def carried_on(data: Data, candidate: Candidate, known: Fitted, patient: bool = False) -> Fitted:
@@ -201,15 +174,15 @@ def _delivers(found: Fitted, base: Fitted, candidate: Candidate, screened: Scree
     """Whether a fit gained what the screen promised, as far as the base is good enough for a promise."""
     if not found.fit.converged:
         return False
-    believed = screened is not None and base.fit.reduced_chi2 < _BAD
+    believed = screened is not None and base.fit.reduced_chi2 < FIT.bad_screen
     promised = screened.gain.get(candidate.names[-1], 0.0) if believed else 0.0
-    return gain_over(found, base)[0] >= _DELIVERED * promised
+    return gain_over(found, base)[0] >= FIT.delivered * promised
 
 
 def _same_minimum(one: Fitted, other: Fitted) -> bool:
     """Whether two fits follow the same segments as closely."""
     both = one.fit.good.sum() == other.fit.good.sum()
-    return bool(both and abs(gain_over(one, other)[0]) < max(WORSE, _SAME * one.fit.total))
+    return bool(both and abs(gain_over(one, other)[0]) < max(FIT.worse, FIT.same_minimum * one.fit.total))
 
 
 def _agree(kinds: set[str], one: Fitted, other: Fitted, base: Fitted, rival: Fitted | None) -> bool:
@@ -222,17 +195,17 @@ def _agree(kinds: set[str], one: Fitted, other: Fitted, base: Fitted, rival: Fit
         return True
     if one.fit.far_off(hopeless(base)) and other.fit.far_off(hopeless(base)):
         return True
-    alike = abs(one.fit.total - other.fit.total) < _ALIKE * one.fit.total
+    alike = abs(one.fit.total - other.fit.total) < FIT.alike_behind * one.fit.total
     known = [base] if rival is None or not rival.fit.converged else [base, rival]
     return alike and any(
-        all(gain_over(fitted, ahead)[0] < -2 * _BEATEN for fitted in (one, other)) for ahead in known
+        all(gain_over(fitted, ahead)[0] < -2 * FIT.beaten for fitted in (one, other)) for ahead in known
     )
 
 
 def _better(one: Fitted, other: Fitted) -> bool:
     """Whether a fit follows clearly more segments, or as many and those more closely."""
     counts = [fitted.fit.good.sum() for fitted in (one, other)]
-    if abs(counts[0] - counts[1]) > _FEW * max(counts):
+    if abs(counts[0] - counts[1]) > FIT.followed_more * max(counts):
         return bool(counts[0] > counts[1])
     return gain_over(one, other)[0] > 0
 
@@ -245,13 +218,13 @@ def _try(
     values: np.ndarray,
     most: int,
     beat: float | None = None,
-) -> tuple[Problem, Fit]:
+) -> tuple[Likelihood, Fit]:
     """One start: at full length from the fitted base, or through the stages; far: from the case."""
     if kind == "linear":
         problem = data.problem(candidate.model, data.last, candidate.free)
         fit = minimise(problem, values, base.fit.starts, most=most, beat=beat)
         absent = _absent(values, candidate)
-        if fit.total > base.fit.total + 2 * WORSE and not np.array_equal(absent, values):
+        if fit.total > base.fit.total + 2 * FIT.worse and not np.array_equal(absent, values):
             # the linearised size threw it out of the minimum of the base, which it contains
             other = minimise(problem, absent, base.fit.starts, most=most, beat=beat)
             if not other.converged:
@@ -289,7 +262,7 @@ def imitating(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     others = ~np.isin(np.arange(own.size), candidate.added)
     sized = minimise(one.problem, own, other.fit.starts, most=8, fixed=others, rough=True)
     found = _from(data, found, sized.values, other)
-    if gain_over(other, found)[0] < _FAR_BEHIND or isinstance(one.problem, CoordinateProblem):
+    if gain_over(other, found)[0] < FIT.imitated_behind:
         return found
     return _imitated(data, found, other, candidate)
 
@@ -302,14 +275,17 @@ def _imitated(data: Data, one: Fitted, other: Fitted, candidate: Candidate) -> F
     """
     known = _absent(_base_values(other, candidate), candidate)
     theirs = other.fit.values.copy()
-    theirs[list(other.added)] *= _FIRST_SHARE
+    theirs[list(other.added)] *= FIT.imitated_share
     motion = other.problem.evaluate(theirs, other.fit.starts, derivatives=False)
     # this motion excludes imperfections of the rig
     imperfections = np.array([free.is_imperfection for free in one.problem.free])
     begun = np.where(imperfections, 0.0, known)
-    fit = minimise(one.problem.imitating(motion), begun, other.fit.starts, most=8, fixed=imperfections)
-    starts = other.fit.starts + (fit.starts - other.fit.starts) / _FIRST_SHARE
-    values = known + (fit.values - begun) / _FIRST_SHARE
+    imitating = one.problem.imitating(motion)
+    if imitating is None:
+        return one
+    fit = minimise(imitating, begun, other.fit.starts, most=8, fixed=imperfections)
+    starts = other.fit.starts + (fit.starts - other.fit.starts) / FIT.imitated_share
+    values = known + (fit.values - begun) / FIT.imitated_share
     lower, upper = (
         np.array([getattr(free, side) for free in one.problem.free]) for side in ("lower", "upper")
     )
@@ -360,7 +336,7 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
         if live.any():
             sizes = np.array([candidate.free[i].size for i in candidate.added])
             guess[live] += screened.step[name] * sizes[live]
-            far = _FARTHEST * np.where(candidate.linear, sizes, np.inf)
+            far = FIT.farthest * np.where(candidate.linear, sizes, np.inf)
             guess = np.clip(np.clip(guess, -far, far), lower, upper)
             # away from zero, where its other parameters could not move
             guess = np.where((guess == 0) & candidate.linear, 0.01 * sizes, guess)

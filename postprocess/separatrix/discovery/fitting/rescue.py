@@ -6,34 +6,24 @@ import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.policy import FIT
 
-# reduced chi^2 of a segment, over that of the median one, that looks like a wrong minimum
-_SUSPECT = 1.7
-_MOST_SEGMENTS = 12
-_ITERATIONS = 15
-# starts of one segment that are followed for each number of impacts, and how many such numbers
-_FOLLOWED = 2
-_NUMBERS = 4
-_LEAST_GAIN = 0.01
-_STRONGEST = 1e3
 # starts tried, in standard errors of the smoother
 _TRIED = np.array([(i, j) for i in (0, -4, -2, 2, 4) for j in (0, -3, -1.5, 1.5, 3)], float)
-# the same, one coordinate at a time, of starts of several
-_ALONE = (-4.0, -2.0, 2.0, 4.0)
 
 
 def suspicious(fit: Fit) -> np.ndarray:
     """Segments that are fitted far worse than the others or not at all, worst first."""
     reduced = fit.chi2 / np.maximum(1, fit.counts)
     usual = max(1.0, float(np.median(reduced[fit.good]))) if fit.good.any() else 1.0
-    suspects = np.flatnonzero((reduced > _SUSPECT * usual) | ~fit.good)
+    suspects = np.flatnonzero((reduced > FIT.suspect * usual) | ~fit.good)
     badness = np.where(fit.evaluation.failed, np.inf, reduced)
-    return suspects[np.argsort(-badness[suspects], kind="stable")][:_MOST_SEGMENTS]
+    return suspects[np.argsort(-badness[suspects], kind="stable")][: FIT.most_rescued]
 
 
 def rescued(
-    problem: Problem, fit: Fit, suspects: np.ndarray, guesses: list[np.ndarray], spread: np.ndarray
+    problem: Likelihood, fit: Fit, suspects: np.ndarray, guesses: list[np.ndarray], spread: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Starts of all segments, the suspects improved where possible, and which were.
 
@@ -69,7 +59,7 @@ def _around(width: int) -> np.ndarray:
     """Steps of a start that are tried, in standard errors."""
     if width == _TRIED.shape[1]:
         return _TRIED
-    alone = [size * row for row in np.eye(width) for size in _ALONE]
+    alone = [size * row for row in np.eye(width) for size in FIT.rescue_alone]
     return np.array([np.zeros(width), *alone])
 
 
@@ -83,12 +73,14 @@ def _promising(evaluation: Evaluation, tries: int) -> np.ndarray:
     kept = []
     for first in range(0, cost.size, tries):
         mine = first + np.argsort(cost[first : first + tries], kind="stable")
-        for count in list(dict.fromkeys(hits[mine]))[:_NUMBERS]:
-            kept.extend(mine[hits[mine] == count][:_FOLLOWED])
+        for count in list(dict.fromkeys(hits[mine]))[: FIT.rescue_numbers]:
+            kept.extend(mine[hits[mine] == count][: FIT.rescue_followed])
     return np.sort([one for one in kept if np.isfinite(cost[one])]).astype(int)
 
 
-def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solve_starts(
+    problem: Likelihood, values: np.ndarray, starts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Fit the start of each segment by itself, the machine fixed; also the chi^2.
 
     Each keeps its number of impacts: next to a graze a step would leave the minimum with one more unseen.
@@ -98,7 +90,7 @@ def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tu
     cost, hits = _cost(begun), begun.hits
     damping = np.full(cost.size, 1e-3)
     active = np.flatnonzero(np.isfinite(cost))
-    for _ in range(_ITERATIONS):
+    for _ in range(FIT.rescue_iterations):
         if not active.size:
             break
         part = problem.of_segments(active)
@@ -110,7 +102,9 @@ def solve_starts(problem: Problem, values: np.ndarray, starts: np.ndarray) -> tu
         starts[active[better]] = tried[better]
         cost[active[better]] = reached[better]
         damping[active] *= np.where(better, 0.2, 10)
-        active = active[np.where(better, reached < before - _LEAST_GAIN, damping[active] < _STRONGEST)]
+        active = active[
+            np.where(better, reached < before - FIT.rescue_gain, damping[active] < FIT.rescue_strongest)
+        ]
     return starts, cost
 
 

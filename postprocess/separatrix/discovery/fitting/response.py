@@ -8,24 +8,13 @@ integral of T(t) T(s)^-1 (0, f(s)/m) ds. No simulation is needed, so that any nu
 
 import numpy as np
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.joint_response import columns_of
-from separatrix.discovery.fitting.problem import Problem
-
-_LOST = 1e-9
+from separatrix.discovery.fitting.likelihood import Likelihood
+from separatrix.discovery.policy import FIT
 
 
-def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
-    """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples.
-
-    Where the force is compared, a force on the body in its direction reduces the measured one.
-    """
-    if problem.in_force:
-        return _of_forces(problem, fit, forces)
-    if isinstance(problem, CoordinateProblem):
-        # on each body by itself
-        return columns_of(problem, fit, forces)
+def columns_of_motion(problem: Likelihood, fit: Fit, forces: np.ndarray, mass: float) -> np.ndarray:
+    """Columns (segments, width, q) of forces (segments, length, q) [N] given at the samples."""
     back, alive = _back(problem, fit)
     carried = back[:, :, :, None] * forces[:, :, None, :] / mass
     steps = np.diff(problem.sample_times(), axis=1)[:, :, None, None]
@@ -34,15 +23,13 @@ def force_columns(problem: Problem, fit: Fit, forces: np.ndarray, mass: float) -
     return _as_columns(problem, fit, moved, alive)
 
 
-def kick_columns(problem: Problem, fit: Fit, kicks: np.ndarray) -> np.ndarray:
+def kicks_of_motion(problem: Likelihood, fit: Fit, kicks: np.ndarray) -> np.ndarray:
     """Columns of sudden changes of velocity (segments, length, q) [m/s] at the samples."""
-    if problem.in_force:
-        return np.zeros_like(kicks)
     back, alive = _back(problem, fit)
     return _as_columns(problem, fit, np.cumsum(back[:, :, :, None] * kicks[:, :, None, :], axis=1), alive)
 
 
-def _of_forces(problem: Problem, fit: Fit, forces: np.ndarray) -> np.ndarray:
+def columns_of_force(problem: Likelihood, fit: Fit, forces: np.ndarray) -> np.ndarray:
     """Forces over the noise of a measured force."""
     columns = np.zeros((*fit.evaluation.residual.shape, forces.shape[2]))
     length = forces.shape[1]
@@ -53,14 +40,16 @@ def _of_forces(problem: Problem, fit: Fit, forces: np.ndarray) -> np.ndarray:
     return problem.whitened(columns * (fit.evaluation.used > 0)[:, :, None])
 
 
-def _back(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def _back(problem: Likelihood, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Change of the start that is equivalent to a kick in v at each sample, and its validity."""
     transition = fit.evaluation.transition
     determinant = (
         transition[:, :, 0, 0] * transition[:, :, 1, 1] - transition[:, :, 0, 1] * transition[:, :, 1, 0]
     )
     # a body that sticks loses its memory: later forces have no earlier equivalent
-    alive = np.logical_and.accumulate((np.abs(determinant) > _LOST) & problem.segments.inside, axis=1)
+    alive = np.logical_and.accumulate(
+        (np.abs(determinant) > FIT.lost_memory) & problem.segments.inside, axis=1
+    )
     safe = np.where(alive, determinant, 1.0)
     # second column of the inverse
     back = np.stack([-transition[:, :, 0, 1] / safe, transition[:, :, 0, 0] / safe], axis=2)
@@ -68,7 +57,7 @@ def _back(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return back, alive
 
 
-def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarray) -> np.ndarray:
+def _as_columns(problem: Likelihood, fit: Fit, started: np.ndarray, alive: np.ndarray) -> np.ndarray:
     """What changes of the start do to x and v in units of the noise, as the residuals are laid out."""
     moved = np.einsum("klij,kljq->kliq", fit.evaluation.transition, started)
     moved[~alive] = 0
@@ -84,7 +73,7 @@ def _as_columns(problem: Problem, fit: Fit, started: np.ndarray, alive: np.ndarr
     return problem.whitened(columns)
 
 
-def standardised(problem: Problem, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def standardised(problem: Likelihood, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A signal (segments, samples) less the mean of its record, over its standard deviation, and the latter.
 
     Both are of the record as measured, which is sampled evenly: condensed samples are denser near impacts.
@@ -92,7 +81,7 @@ def standardised(problem: Problem, signal: np.ndarray) -> tuple[np.ndarray, np.n
     found, deviations = np.zeros(signal.shape), np.zeros(len(problem.prepared))
     for number, prepared in enumerate(problem.prepared):
         rows = np.flatnonzero(problem.segments.record == number)
-        measured = prepared.record.force if problem.in_force else prepared.record.x
+        measured = prepared.column
         deviations[number] = float(np.std(measured))
         if deviations[number] > 0:
             found[rows] = (signal[rows] - np.mean(measured)) / deviations[number]

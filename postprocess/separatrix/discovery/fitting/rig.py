@@ -12,80 +12,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import IMPERFECTION_SIZE, imperfection_columns_of
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import IMPERFECTION, Free
-from separatrix.discovery.fitting.motions import scaled_motion
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, inverse_scaled, solve_scaled
-from separatrix.discovery.fitting.problem import Problem
 from separatrix.discovery.fitting.refit import Fitted, common
-from separatrix.discovery.fitting.response import force_columns, standardised
-
-_POWERS = (2, 3)
-_HARMONICS = 6
-# largest imperfection in standard deviations; factors by which its prior is narrowed for that
-_LARGEST = 3.0
-_NARROWER, _NARROWEST = 4.0, 1e15
-# precisions over that of the prior: imperfections of half and a quarter of its size are equally likely
-_SIZES = (1.0, 4.0, 16.0)
-# least usable eigenvalue of scaled equations
-_SHOWN = 1e-11
+from separatrix.discovery.policy import FIT
 
 
-def imperfection_columns(problem: Problem, fit: Fit) -> np.ndarray:
+def imperfection_columns(problem: Likelihood, fit: Fit) -> np.ndarray:
     """Columns (segments, width, q) of imperfections of one standard deviation, along the fitted motion.
 
     None where they are fitted already.
     """
     if problem.imperfections:
         return np.zeros((*fit.evaluation.residual.shape, 0))
-    return _columns_of_imperfections(problem, fit)
-
-
-def _columns_of_imperfections(problem: Problem, fit: Fit, usual: float | None = None) -> np.ndarray:
-    if isinstance(problem, CoordinateProblem):
-        return imperfection_columns_of(problem, fit)
-    state = scaled_motion(problem, fit)
-    inside = problem.segments.inside
-    columns = [_sensor(problem, fit)]
-    if state["phase"] is not None:
-        usual = usual_acceleration(problem, fit) if usual is None else usual
-        waves = [f(n * state["phase"]) for n in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
-        accelerations = IMPERFECTION_SIZE * usual * np.stack(waves, axis=2) * inside[:, :, None]
-        columns.append(force_columns(problem, fit, accelerations, 1.0))
-    return np.concatenate(columns, axis=2)
-
-
-def usual_acceleration(problem: Problem, fit: Fit) -> float:
-    """Median acceleration of a fitted motion [m/s^2], below that of impacts; 0 without a segment."""
-    steps = np.diff(problem.sample_times(), axis=1)
-    usable = problem.segments.inside[:, 1:] & fit.good[:, None] & (steps > 0)
-    rates = np.diff(fit.evaluation.v, axis=1)[usable] / steps[usable]
-    return float(np.median(np.abs(rates))) / 0.6745 if rates.size else 0.0
-
-
-def _sensor(problem: Problem, fit: Fit) -> np.ndarray:
-    """Contributions of square and cube of the compared signal, position or force, to its measurement.
-
-    They are separate for each record: a smooth curve has other terms over another range.
-    """
-    signal = fit.evaluation.force if problem.in_force else fit.evaluation.x
-    count, length = signal.shape
-    records = len(problem.prepared)
-    table = np.zeros((count, fit.evaluation.residual.shape[1], records * len(_POWERS)))
-    u, deviations = standardised(problem, signal)
-    # also of segments that only another machine follows well
-    inside = problem.segments.inside & ~fit.evaluation.failed[:, None]
-    for number, prepared in enumerate(problem.prepared):
-        rows = np.flatnonzero(problem.segments.record == number)
-        sigma = prepared.deviation(problem.segments.index[rows])
-        size = IMPERFECTION_SIZE * deviations[number]
-        for column, power in enumerate(_POWERS, start=number * len(_POWERS)):
-            table[rows, :length, column] = inside[rows] * size * u[rows] ** power / sigma
-    return problem.whitened(table)
+    return problem.imperfection_columns(fit)
 
 
 @dataclass(frozen=True)
@@ -114,7 +58,7 @@ class Beside:
         return np.where(known > 0, np.sqrt(known + self.shift**2), 0.0)
 
 
-def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
+def cleaned(problem: Likelihood, fit: Fit, known: Beside | None = None) -> Fit:
     """The fit less the part of its residuals that imperfections may explain, refitted beside them.
 
     The first parameters of a held-out record are `known` from the training records.
@@ -127,29 +71,32 @@ def cleaned(problem: Problem, fit: Fit, known: Beside | None = None) -> Fit:
     return replace(fit, evaluation=replace(evaluation, residual=residual), chi2=chi2)
 
 
-def imperfections_of(problem: Problem, fit: Fit, usual: float) -> dict[tuple[str, int | None], np.ndarray]:
-    """Contribution of each imperfection of one standard deviation to x and v along a fit, as in `Problem`.
+def imperfections_of(problem: Likelihood, fit: Fit, usual: float) -> dict[tuple[str, int | None], np.ndarray]:
+    """Contribution of each imperfection of one standard deviation to x and v along a fit, as in `Likelihood`.
 
     Sensors are curved in each record by themselves; the drive has its harmonics in all of them, of one size
     over the `usual` acceleration [m/s^2].
     """
     records = range(len(problem.prepared))
-    keys = [(f"{IMPERFECTION}curve_{power}", number) for number in records for power in _POWERS]
+    keys = [(f"{IMPERFECTION}curve_{power}", number) for number in records for power in FIT.imperfect_powers]
     curves = len(keys)
-    columns = np.nan_to_num(problem.in_units(_columns_of_imperfections(problem, fit, usual)))
+    columns = np.nan_to_num(problem.in_units(problem.imperfection_columns(fit, usual)))
     columns[:, :, :, curves:] *= fit.good[:, None, None, None]
     if columns.shape[3] > curves:
-        orders = range(1, _HARMONICS + 1)
+        orders = range(1, FIT.imperfect_harmonics + 1)
         keys += [(f"{IMPERFECTION}{wave}_{n}", None) for n in orders for wave in ("sine", "cosine")]
     return dict(zip(keys, np.moveaxis(columns, 3, 0), strict=True))
 
 
 def as_nuisances(imperfections: dict[tuple[str, int | None], np.ndarray]) -> list[Free]:
     """The sizes of imperfections as unknowns, in standard deviations."""
-    return [Free(path, 0.0, -_LARGEST, _LARGEST, record=record, error=1.0) for path, record in imperfections]
+    return [
+        Free(path, 0.0, -FIT.imperfection_largest, FIT.imperfection_largest, record=record, error=1.0)
+        for path, record in imperfections
+    ]
 
 
-def _explained(problem: Problem, fit: Fit, known: Beside | None) -> tuple[np.ndarray, np.ndarray]:
+def _explained(problem: Likelihood, fit: Fit, known: Beside | None) -> tuple[np.ndarray, np.ndarray]:
     """Columns of parameters and imperfections, with the steps and sizes that explain most of a residual."""
     columns, matrix, gradient, open_ = _equations(problem, fit)
     p = fit.evaluation.by_parameter.shape[2]
@@ -174,7 +121,7 @@ def _shared(fitted: Fitted, prediction: Prediction) -> Beside:
     return replace(known, shift=np.zeros_like(known.shift)) if prediction.with_imperfections else known
 
 
-def with_imperfections(problem: Problem, fit: Fit) -> Beside:
+def with_imperfections(problem: Likelihood, fit: Fit) -> Beside:
     """Parameters of a fit and their covariance if the imperfections of a rig were fitted too.
 
     The covariance is enlarged where that fit is still worse than the noise.
@@ -188,7 +135,7 @@ def with_imperfections(problem: Problem, fit: Fit) -> Beside:
     return Beside(steps, covariance * max(1.0, cleaned(problem, fit).reduced_chi2))
 
 
-def _equations(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _equations(problem: Likelihood, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Columns of parameters and imperfections, their normal equations without starts, and which may move."""
     evaluation = fit.evaluation
     columns = np.concatenate([evaluation.by_parameter, imperfection_columns(problem, fit)], axis=2)
@@ -208,9 +155,12 @@ def _bounded(matrix: np.ndarray, gradient: np.ndarray, p: int, open_: np.ndarray
     prior = 1.0
     while True:
         known = matrix + np.diag(np.r_[np.zeros(p), np.full(gradient.size - p, prior)])
-        if np.all(np.abs(solve_scaled(known, gradient, open_)[p:]) <= _LARGEST) or prior > _NARROWEST:
+        if (
+            np.all(np.abs(solve_scaled(known, gradient, open_)[p:]) <= FIT.imperfection_largest)
+            or prior > FIT.imperfection_narrowest
+        ):
             return known, prior
-        prior *= _NARROWER
+        prior *= FIT.imperfection_narrower
 
 
 def _change(evaluation: Evaluation, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -330,7 +280,7 @@ def _contest(
     without, beside = known or (None, None)
     prior = equations.narrowest(beside)
     plain = equations.of(without, None)
-    tried = [equations.of(beside, prior * narrower) for narrower in _SIZES]
+    tried = [equations.of(beside, prior * narrower) for narrower in FIT.imperfection_sizes]
     return Contest(
         plain[1],
         np.array([evidence - plain[0] for evidence, _ in tried]),
@@ -389,4 +339,4 @@ def _log_determinant(matrix: np.ndarray, open_: np.ndarray) -> float:
     shown = open_ & (np.diag(matrix) > 0)
     size = np.sqrt(np.diag(matrix)[shown])
     values = np.linalg.eigvalsh(matrix[np.ix_(shown, shown)] / np.outer(size, size))
-    return float(np.log(np.maximum(values, _SHOWN)).sum() + 2 * np.log(size).sum())
+    return float(np.log(np.maximum(values, FIT.imperfection_shown)).sum() + 2 * np.log(size).sum())

@@ -15,17 +15,9 @@ from scipy.stats import chi2
 
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.normal_equations import solve_scaled
-from separatrix.discovery.fitting.problem import Problem
-
-# bootstrap of the null
-_SEED = 22
-_DRAWS = 4000
-_TAIL = 0.05
-# size of a signature, in units of its noise, that is rounding
-_ROUNDING = 1e-100
-# share of a signature below which nothing is left of it
-_NOTHING = 1e-7
+from separatrix.discovery.policy import FIT
 
 
 @dataclass
@@ -58,14 +50,14 @@ class Screened:
 
     def seen(self, name: str) -> bool:
         """Whether something of a signature is left beside the base."""
-        return self.shares[name] > _NOTHING
+        return self.shares[name] > FIT.screen_nothing
 
     def cosine(self, one: str, other: str) -> float:
         """Largest cosine between what is left of two signatures."""
         return float(self.cosines[self.names.index(one), self.names.index(other)])
 
 
-def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None:
+def signature(base: Likelihood, fit: Fit, candidate: Candidate) -> Signature | None:
     """Signature of the added effect at the fitted base, in its form of largest gain; None without one."""
     by_path = {(one.path, one.record): value for one, value in zip(base.free, fit.values, strict=True)}
     values = np.array([by_path.get((one.path, one.record), one.value) for one in candidate.free])
@@ -82,7 +74,7 @@ def signature(base: Problem, fit: Fit, candidate: Candidate) -> Signature | None
     return best
 
 
-def _shown(problem: Problem, fit: Fit, candidate: Candidate, values: np.ndarray) -> Signature | None:
+def _shown(problem: Likelihood, fit: Fit, candidate: Candidate, values: np.ndarray) -> Signature | None:
     """The signature at given shape parameters."""
     added = list(candidate.added)
     good = fit.good
@@ -139,7 +131,7 @@ def screen(fit: Fit, signatures: list[Signature]) -> Screened:
     share = np.where(raw > 0, np.diag(left) / np.where(raw > 0, raw, 1), 0)
     own = [float(share[first:last].max(initial=0)) for first, last in itertools.pairwise(edges)]
     shares = dict(zip(names, own, strict=True))
-    tested = [root if size > _NOTHING else root[:0] for root, size in zip(roots, own, strict=True)]
+    tested = [root if size > FIT.screen_nothing else root[:0] for root, size in zip(roots, own, strict=True)]
     tests = _independent_tests(left, edges, tested) if len(names) > 1 else float(len(names))
     return Screened(names, gain, step, error, live, origin, cosines, shares, tests)
 
@@ -152,18 +144,22 @@ def _independent_tests(left: np.ndarray, edges: np.ndarray, roots: list[np.ndarr
     """
     size = np.sqrt(np.maximum(np.diag(left), 0))
     # what the base can do itself leaves nothing but rounding, which has no direction
-    scale = np.where(size > _ROUNDING, size, np.inf)
+    scale = np.where(size > FIT.screen_rounding, size, np.inf)
     values, vectors = np.linalg.eigh(np.clip(left / np.outer(scale, scale), -1, 1))
     half = vectors * np.sqrt(np.maximum(values, 0))
-    draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, size.size)) @ half.T * size
-    lowest = np.ones(_DRAWS)
+    draws = (
+        np.random.default_rng(FIT.screen_seed).standard_normal((FIT.screen_draws, size.size)) @ half.T * size
+    )
+    lowest = np.ones(FIT.screen_draws)
     for (first, last), root in zip(itertools.pairwise(edges), roots, strict=True):
         if root.size:
             squares = np.sum((draws[:, first:last] @ root.T) ** 2, axis=1)
             lowest = np.minimum(lowest, chi2.sf(squares, root.shape[0]))
     # signatures that all but vanish are rounding; there are never more tests than parameters
-    least = float(np.clip(np.quantile(lowest, _TAIL), np.finfo(float).tiny, 1 - np.finfo(float).epsneg))
-    return float(np.clip(np.log1p(-_TAIL) / np.log1p(-least), 1.0, edges[-1]))
+    least = float(
+        np.clip(np.quantile(lowest, FIT.screen_tail), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    )
+    return float(np.clip(np.log1p(-FIT.screen_tail) / np.log1p(-least), 1.0, edges[-1]))
 
 
 def project(

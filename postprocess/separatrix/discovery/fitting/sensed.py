@@ -12,32 +12,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.data import FEWEST, STAGES, Data, oscillation_samples
+from separatrix.discovery.fitting.data import Data, oscillation_samples
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.machine import Free, bounds_of
+from separatrix.discovery.fitting.machine import Free, bounds_of, drive_nuisances
 from separatrix.discovery.fitting.noise import noise_of
 from separatrix.discovery.fitting.rescue import solve_starts
 from separatrix.discovery.measured.bodies import Structure, structure_of
 from separatrix.discovery.measured.segments import cut
 from separatrix.discovery.measured.sensors import SensedPrepared
 from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
-# periods of the drive, or oscillations, that determine coordinates without a sensor
-_UNSEEN_PERIODS = 2.0
-# corrections of an observer by the measurement per period
-_CORRECTIONS = 10
-# stage whose segments are followed one after the other
-_CHAINED = 1
-# cost of a segment over the usual one that is lost, and neighbours whose starts are tried then
-_LOST, _NEIGHBOURS = 5.0, 6
-# standard error of what was guessed, over its size
-_GUESSED = 0.1
 # parameters of joints that records hardly determine, or that another parameter represents
 _FIXED = ("free_length", "exponent", "tension", "velocity")
-_MISFIT = 1.5
-# of a stiffness, mass, friction or restitution
-_LEAST = 1e-3
 
 
 @dataclass
@@ -57,6 +45,21 @@ class SensedData(Data):
         """The fit of a model to the segments of a stage."""
         return CoordinateProblem(model, self.prepared, self.stages[stage], free)
 
+    def unknowns(self, model) -> list[Free]:
+        """What is free in the base machine."""
+        forces = any(sensor.kind == "F" for one in self.prepared for sensor in one.sensors)
+        return joint_parameters(model, forces) + drive_nuisances(model, self.prepared)
+
+    def measured_by_sensor(self, problem: CoordinateProblem, fit: Fit) -> bool:
+        """Measure the noise of each sensor."""
+        measure_sensors(self, problem, fit)
+        return True
+
+    def details(self, number: int) -> dict[str, tuple[np.ndarray, dict]]:
+        """What each sensor shows: there is no motion of one body."""
+        sensors = {one.name: (one.values, {"sigma": one.sigma}) for one in self.prepared[number].sensors}
+        return sensors | {"impacts": (np.zeros((0, 6)), {})}
+
     def smoothed_starts(self, stage: int) -> np.ndarray:
         """Starts (segments, 2 n) of a stage: smoothed where there is a sensor, guessed elsewhere."""
         return self._at_starts(stage, [self.guess(r) for r in range(len(self.prepared))])
@@ -66,7 +69,7 @@ class SensedData(Data):
         n, tables = self.structure.n, []
         for r, seen in enumerate(self.bodies):
             guess = self.guess(r)
-            table = np.tile(_GUESSED * np.std(guess, axis=0), (guess.shape[0], 1))
+            table = np.tile(FIT.guessed * np.std(guess, axis=0), (guess.shape[0], 1))
             for name, one in seen.items():
                 body = self.structure.names.index(name[2:])
                 error = np.sqrt(np.einsum("kii->ki", one.covariance))
@@ -136,7 +139,7 @@ class SensedData(Data):
 
         The start of each is fitted from the end of the segment before and from the guess of the observer.
         """
-        whole = self.problem(self.model, _CHAINED, [])
+        whole = self.problem(self.model, FIT.chained_stage, [])
         rows = np.flatnonzero(whole.segments.record == number)
         begins = whole.segments.first[rows]
         starts, costs = np.full((rows.size, known.shape[1]), np.nan), np.full(rows.size, np.inf)
@@ -157,10 +160,12 @@ class SensedData(Data):
                 tried.append(np.where(unseen, motions[i - 1][-1], known[first]))
             follow(i, tried)
         # a drive is periodic: a lost segment may move as its neighbours do
-        lost = np.flatnonzero(costs > _LOST * np.median(costs))
+        lost = np.flatnonzero(costs > FIT.chain_lost * np.median(costs))
         for i in lost:
             near = [
-                j for j in np.argsort(np.abs(np.arange(rows.size) - i))[1 : 1 + _NEIGHBOURS] if j not in lost
+                j
+                for j in np.argsort(np.abs(np.arange(rows.size) - i))[1 : 1 + FIT.chain_neighbours]
+                if j not in lost
             ]
             if near:
                 follow(i, [np.where(unseen, starts[j], known[begins[i]]) for j in near])
@@ -174,7 +179,7 @@ class SensedData(Data):
         """The motion of the machine of the case, corrected by the measurement."""
         model, t = self.model, prepared.record.t
         period = prepared.period_samples or oscillation_samples(_moving(prepared))
-        every = max(1, round(period / _CORRECTIONS))
+        every = max(1, round(period / FIT.corrections))
         values, active = np.zeros(0), []
         if prepared.frequency is not None:
             active = [
@@ -222,13 +227,17 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
         bodies.append(seen)
         calm.append(_calm(structure, record.t, seen))
         unseen = sum(name[0] == "x" for name in seen) < structure.n
-        share = max(periods, _UNSEEN_PERIODS) if unseen else periods
+        share = max(periods, FIT.unseen_periods) if unseen else periods
         period = one.period_samples or oscillation
         length = seconds / record.interval if seconds is not None else share * period
-        lengths.append(int(np.clip(length, FEWEST, record.t.size / 3)))
+        lengths.append(int(np.clip(length, FIT.fewest_segments, record.t.size / 3)))
     stages = [
-        cut([one.samples for one in prepared], calm, [max(FEWEST, int(share * n)) for n in lengths])
-        for share in STAGES
+        cut(
+            [one.samples for one in prepared],
+            calm,
+            [max(FIT.fewest_segments, int(share * n)) for n in lengths],
+        )
+        for share in FIT.stage_lengths
     ]
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
@@ -282,7 +291,7 @@ def joint_parameters(model, forces: bool) -> list[Free]:
             continue
         lower, upper = bounds_of(parameter)
         if key in ("mass", "stiffness", "moment") and value > 0:
-            lower = max(lower, _LEAST * value)
+            lower = max(lower, FIT.least_of_joint * value)
         found.append(Free(path, value, lower, upper, abs(value) or 1.0, also=tied.get(path)))
     return found
 
@@ -331,4 +340,4 @@ def measure_sensors(data: SensedData, problem: CoordinateProblem, fit: Fit) -> N
     for one in data.prepared:
         one.sigma = one.sensors[0].sigma
         # of all sensors alike, or none
-        one.memory = float(np.median(memories)) if misfit < _MISFIT else 0.0
+        one.memory = float(np.median(memories)) if misfit < FIT.misfit_of_sensors else 0.0

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator, CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, KroghInterpolator
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-# probability, or largest deviation over the largest value, from which on a closed form fits
-LIKELY, _CLOSE = 0.01, 2e-3
+from separatrix.discovery.policy import FIT
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:
     for i in range(at.size):
         first = max(0, min(i - 2, at.size - 5))
         part = slice(first, min(at.size, first + 5))
-        slopes.append(float(BarycentricInterpolator(at[part], value[part]).derivative(at[i])))
+        slopes.append(float(KroghInterpolator(at[part], value[part]).derivative(at[i])))
     return CubicHermiteSpline(at, value, slopes)
 
 
@@ -142,7 +141,7 @@ def closed_forms(
             "freedom": freedom,
             "p": p,
             "deviation": deviation,
-            "fits": p > LIKELY or deviation < _CLOSE,
+            "fits": p > FIT.form_p or deviation < FIT.form_close,
             "at": fine,
             "curve": form.value(fine, *fit.x),
         }

@@ -25,34 +25,11 @@ from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted, gain_over
-from separatrix.discovery.fitting.shapes import FORM_OF, LIKELY, closed_forms
+from separatrix.discovery.fitting.shapes import FORM_OF, closed_forms
 from separatrix.discovery.fitting.spline import roughness, smoothed
+from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
-
-# knots, and those of a table in which zero is implied
-_KNOTS, _KNOTS_BESIDE_ZERO = 16, 15
-# points at which a series is drawn
-_TURN = 49
-# passes of the choice of knots
-_PASSES = 3
-# power of the second derivative that the density of knots follows
-_BENT = 0.4
-# share of the segments that a step must follow
-_FOLLOWED = 0.98
-# linearisations of the motion, halvings of a step, steps of the starts after it
-_ROUNDS, _HALVINGS, _FOLLOW = 6, 3, 6
-# change of squares that is negligible; squares per value by which the end may miss
-_SETTLED, _NEAR = 0.1, 1.0
-# degree of the smooth function to start from if a table is jagged; ratio of squares to the fit from which on
-# it is
-_EVENED, _TRAPPED = 3, 2.0
-# squares by which the function may follow the records worse than the effect
-_WORSE = 10.0
-# share of the promised change of the squares by which a step may miss it
-_AS_PROMISED = 0.3
-# share of the largest eigenvalue, in units of the diagonal, below which a direction is not known
-_UNKNOWN = 1e-10
 
 
 @dataclass
@@ -104,7 +81,7 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
     seen = member.seen(fitted)
     if seen.size < 3 or not np.ptp(seen) > 0:
         return None
-    knots = knots_over(member, seen, _KNOTS_BESIDE_ZERO if member.beside else _KNOTS)
+    knots = knots_over(member, seen, FIT.function_knots_zero if member.beside else FIT.function_knots)
     try:
         settled = _settled(data, base, fitted, member, knots)
     except (np.linalg.LinAlgError, SeparatrixError):
@@ -136,7 +113,7 @@ def _correct_for_knots(forms: dict[str, dict], own: dict, gain: float, freedom: 
         one["p"] = max(one["p"], float(chi2.sf(max(0.0, one["misfit"] - bias), one["freedom"])))
     own["p"] = max(own["p"], float(chi2.sf(max(0.0, gain), freedom)))
     for one in forms.values():
-        one["fits"] = one["fits"] or one["p"] > LIKELY
+        one["fits"] = one["fits"] or one["p"] > FIT.form_p
 
 
 def _settled(
@@ -148,7 +125,7 @@ def _settled(
     than the effect, and the number of parameters that the records determine.
     """
     parts, curve = None, None
-    for _ in range(_PASSES):
+    for _ in range(FIT.knot_passes):
         last = parts
         at = knots if last is None else _closer(member, last)
         again = _Curve.begun(data, base, fitted if curve is None else curve.fitted, member, at)
@@ -169,7 +146,7 @@ def _settled(
         if changed and all(np.all(one < part.error**2) for one, part in zip(changed, parts, strict=True)):
             break
     gain = None if curve is None else curve.gain(fitted)
-    if gain is None or gain < -_WORSE:
+    if gain is None or gain < -FIT.function_worse:
         # no function of its family reproduces this law
         return None
     freedom = sum(float(np.trace(part.information @ part.covariance)) for part in parts)
@@ -186,7 +163,7 @@ def _closer(member: Member, parts: list[Part]) -> np.ndarray:
         value = np.append(0.0, part.value) if member.beside else part.value
         bend[1:-1] += np.abs(np.diff(np.diff(value) / np.diff(at)) / (at[2:] - at[:-2]))
     bend[[0, -1]] = bend[[1, -2]]
-    density = bend**_BENT
+    density = bend**FIT.knot_bend
     density = (density[1:] + density[:-1]) / 2 * np.diff(at)
     if not density.sum() > 0:
         return parts[0].at
@@ -226,9 +203,9 @@ class _Curve:
         """The function as it was fitted, on these knots; `evened`: the cubic nearest to it, if there is."""
         table = table_of(fitted, member)
         if evened:
-            if table is None or table[0][0].size < _EVENED + 2:
+            if table is None or table[0][0].size < FIT.function_evened + 2:
                 return None
-            table = [(at, np.polyval(np.polyfit(at, value, _EVENED), at)) for at, value in table]
+            table = [(at, np.polyval(np.polyfit(at, value, FIT.function_evened), at)) for at, value in table]
         alike = len(member.values) > 1 and (table is None or len(table) == 1)
         begun = begun_at(member, fitted, base, knots, table)
         made = None if begun is None else with_table(data, base, member, fitted, knots, begun, alike)
@@ -280,7 +257,7 @@ class _Curve:
 
     def settle(self) -> list[Part] | None:
         """The function by direction, the motion linearised about it; None where it is not reached."""
-        for _ in range(_ROUNDS):
+        for _ in range(FIT.function_rounds):
             known = self._known()
             # a closed form may begin elsewhere
             freed = self._known(origin=True) if self.member.origin else known
@@ -294,16 +271,16 @@ class _Curve:
             if not self._go(step, known.promised(found[0] - centre)):
                 break
             moved = self.values + self.beside - centre
-            if moved @ known.information @ moved < _SETTLED:
+            if moved @ known.information @ moved < FIT.function_settled:
                 break
         left = found[0] - self.values - self.beside
-        if left @ known.information @ left > _NEAR * left.size:
+        if left @ known.information @ left > FIT.function_near * left.size:
             return None
         return self._parts(*found, freed, centre)
 
     def far_from(self, fitted: Fitted) -> bool:
         """Whether the misfit exceeds that of a fitted machine so far that segments are in a local minimum."""
-        return self.fitted.fit.total > _TRAPPED * fitted.fit.total
+        return self.fitted.fit.total > FIT.function_trapped * fitted.fit.total
 
     def gain(self, fitted: Fitted) -> float:
         """Squares over the misfit by which the function follows the records better than a fitted machine."""
@@ -344,19 +321,27 @@ class _Curve:
         problem, fit = self.fitted.problem, self.fitted.fit
         bounds = np.array([(one.lower, one.upper) for one in problem.free]).T
         fixed = np.ones(fit.values.size, bool)
-        most = max(1.0, fit.reduced_chi2) * (max(0.0, promised) + 1 + _AS_PROMISED * abs(promised))
-        for halving in range(_HALVINGS):
+        most = max(1.0, fit.reduced_chi2) * (
+            max(0.0, promised) + 1 + FIT.function_as_promised * abs(promised)
+        )
+        for halving in range(FIT.function_halvings):
             values = np.clip(fit.values + 0.5**halving * step, *bounds)
             try:
-                tried = minimise(problem, values, fit.starts, most=_FOLLOW, fixed=fixed)
+                tried = minimise(problem, values, fit.starts, most=FIT.function_starts, fixed=fixed)
                 # a distant function leaves segments in wrong minima
                 tried = polished(
-                    self.data, problem, tried, self.data.last, _FOLLOW, fixed, rival=self.begun_from
+                    self.data,
+                    problem,
+                    tried,
+                    self.data.last,
+                    FIT.function_starts,
+                    fixed,
+                    rival=self.begun_from,
                 )
             except SeparatrixError:
                 continue
             both = tried.good & fit.good
-            followed = both.sum() >= _FOLLOWED * fit.good.sum()
+            followed = both.sum() >= FIT.function_followed * fit.good.sum()
             if followed and tried.chi2[both].sum() < fit.chi2[both].sum() + most:
                 self.fitted.fit = tried
                 return True
@@ -416,7 +401,7 @@ def _alone(part: Part) -> tuple[np.ndarray, np.ndarray]:
     """
     size = np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information / np.outer(size, size))
-    kept = values > _UNKNOWN * values[-1]
+    kept = values > FIT.function_unknown * values[-1]
     rows = (np.sqrt(values[kept])[:, None] * vectors[:, kept].T) * size
     offset = (vectors[:, kept].T @ (part.gradient / size)) / np.sqrt(values[kept])
     return rows, rows @ part.centre + offset
@@ -424,7 +409,7 @@ def _alone(part: Part) -> tuple[np.ndarray, np.ndarray]:
 
 def _series(fitted: Fitted, member: Member) -> Part:
     """A series of harmonics by its values over a turn."""
-    at = np.linspace(0, 2 * np.pi, _TURN)
+    at = np.linspace(0, 2 * np.pi, FIT.series_points)
     paths = [one.path for one in fitted.problem.free]
     columns, indices = [], []
     for key, wave in zip(member.values, (np.cos, np.sin), strict=True):

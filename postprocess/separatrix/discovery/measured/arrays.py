@@ -17,10 +17,9 @@ from separatrix.discovery.measured.tables import (
     is_column,
     is_noise,
 )
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 
-# share of a sampling interval by which times of channels may differ
-_APART = 0.01
 _MOST_NAMES = 30
 
 
@@ -139,7 +138,7 @@ def common_times(path: Path, times: Mapping[str, np.ndarray]) -> np.ndarray:
             )
         apart = np.abs(other - t)
         row = int(np.argmax(apart)) if t.size else 0
-        if t.size and not apart[row] <= _APART * step:
+        if t.size and not apart[row] <= RECORDS.channels_apart * step:
             raise SeparatrixError(
                 f"{path}: '{name}' is not sampled at the times of '{first}': at {other[row]:.9g} s beside "
                 f"{t[row]:.9g} s, row {row + 1}; export both with one clock"

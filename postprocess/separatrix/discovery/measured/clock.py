@@ -8,16 +8,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
-
-GAP = 1.5
-# shortest interval without gaps that is fitted [samples]
-FEWEST_IN_PIECE = 12
-# usual relative deviation of the time steps from their median above which stamps are uneven
-_UNEVEN = 0.01
-# rows on either side of an uneven step that distinguish a lost sample from a late stamp
-_AROUND = 7
-_LATE, _LOST = 1.25, 2.0
 
 
 def pieces_of(
@@ -30,19 +22,19 @@ def pieces_of(
     """
     steps = np.diff(t)
     usual = float(np.median(steps))
-    whole = steps[steps < GAP * usual]
-    uneven = float(np.quantile(np.abs(whole / usual - 1), 0.9)) > _UNEVEN
-    gaps = _lost(t, steps, float(whole.mean())) if uneven else np.flatnonzero(steps > GAP * usual) + 1
+    whole = steps[steps < RECORDS.gap * usual]
+    uneven = float(np.quantile(np.abs(whole / usual - 1), 0.9)) > RECORDS.uneven
+    gaps = _lost(t, steps, float(whole.mean())) if uneven else np.flatnonzero(steps > RECORDS.gap * usual) + 1
     pieces = list(pairwise([0, *gaps.tolist(), t.size]))
     for row in gaps[:3]:
         notes.append(f"{where(row)}: gap of {t[row] - t[row - 1]:.4g} s; nothing is fitted across it")
     if gaps.size > 3:
         notes.append(f"{gaps.size - 3} more gaps")
-    long = sum(last - first for first, last in pieces if last - first >= FEWEST_IN_PIECE)
+    long = sum(last - first for first, last in pieces if last - first >= RECORDS.fewest_in_piece)
     if long < fewest:
         raise SeparatrixError(
             f"{where(int(gaps[0]) if gaps.size else 0)}: gaps leave {long} samples in intervals of at least "
-            f"{FEWEST_IN_PIECE}, {fewest} are needed"
+            f"{RECORDS.fewest_in_piece}, {fewest} are needed"
         )
     if uneven:
         t = _evened(t, x, pieces, where, notes)
@@ -51,15 +43,17 @@ def pieces_of(
 
 def _lost(t: np.ndarray, steps: np.ndarray, usual: float) -> np.ndarray:
     """Rows after a gap where stamps scatter: after a gap all later stamps are late, not one alone."""
-    rows = np.flatnonzero(steps > _LATE * usual) + 1
-    late = np.pad(t - usual * np.arange(t.size), _AROUND)
-    before = sum(late[rows + k] for k in range(_AROUND)) / np.minimum(_AROUND, rows)
-    after = sum(late[rows + _AROUND + k] for k in range(_AROUND)) / np.minimum(_AROUND, t.size - rows)
+    rows = np.flatnonzero(steps > RECORDS.late * usual) + 1
+    late = np.pad(t - usual * np.arange(t.size), RECORDS.around_step)
+    before = sum(late[rows + k] for k in range(RECORDS.around_step)) / np.minimum(RECORDS.around_step, rows)
+    after = sum(late[rows + RECORDS.around_step + k] for k in range(RECORDS.around_step)) / np.minimum(
+        RECORDS.around_step, t.size - rows
+    )
     jumps = np.full(t.size, -np.inf)
     jumps[rows] = after - before
-    largest = jumps == maximum_filter1d(jumps, 2 * _AROUND - 1)
+    largest = jumps == maximum_filter1d(jumps, 2 * RECORDS.around_step - 1)
     lasting = (jumps[rows] > 0.5 * usual) & largest[rows]
-    return rows[(steps[rows - 1] > _LOST * usual) | lasting]
+    return rows[(steps[rows - 1] > RECORDS.lost * usual) | lasting]
 
 
 def _evened(t: np.ndarray, x: np.ndarray, pieces, where, notes: list[str]) -> np.ndarray:
@@ -90,7 +84,7 @@ def _followed(x: np.ndarray, late: np.ndarray, interval: float, pieces) -> tuple
     """Lead of x where a stamp is late over speed times delay, and its error; 1: true times, 0: scatter."""
     delays, positions = [], []
     for first, last in pieces:
-        if last - first >= FEWEST_IN_PIECE:
+        if last - first >= RECORDS.fewest_in_piece:
             speed = np.gradient(x[first:last])[2:-2] / interval
             delays.append(speed * np.diff(late[first:last], 4))
             positions.append(np.diff(x[first:last], 4))

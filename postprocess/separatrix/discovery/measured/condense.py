@@ -21,26 +21,8 @@ from scipy.signal import lfilter
 
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import white_noise
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
-
-# samples per period of the motion above which a record is condensed, and those that are smoothed then
-_MANY, _ENOUGH = 450.0, 200.0
-# samples of a record that are fitted as they are, however slow the motion
-_FEW = 10_000
-# values that replace a block, its shortest and, as a share of the period, longest length
-NODES = 4
-_SHORTEST = 16
-_LONGEST = 1 / 16
-# chi^2 of two terms that noise exceeds in one of a hundred blocks
-_UNSEEN = 9.2
-# share of their noise by which a jump of the acceleration may shift the values; share of such a jump in terms
-# above degree n of a block
-_SHIFT, _HIDDEN = 0.1, 0.004
-_MOST_MEMORY = 0.9
-# length of the blocks in which the memory of the noise is measured
-_SOUNDED = 32
-MOST_ROWS = 200_000
-"""Values and samples that a record may keep."""
 
 
 @dataclass
@@ -80,7 +62,7 @@ class Samples:
     @cached_property
     def freedom(self) -> np.ndarray:
         """Residual degrees of freedom of blocks, at their first rows."""
-        return np.where((self.node == 0) & (self.size > 1), self.size - NODES, 0)
+        return np.where((self.node == 0) & (self.size > 1), self.size - RECORDS.block_values, 0)
 
     def spread(self, memory: float) -> np.ndarray:
         """Standard deviation of each row over that of a sample, of noise with correlation memory^|k|."""
@@ -95,7 +77,7 @@ class Samples:
         found = np.zeros(self.size.size)
         for size in self.lengths:
             rows = (self.size == size) & (self.node == 0)
-            found[rows] = (size - NODES) / expected_left(size, round(memory, 3))[0]
+            found[rows] = (size - RECORDS.block_values) / expected_left(size, round(memory, 3))[0]
         return found
 
     def _of_noise(self, memory: float) -> tuple[np.ndarray, np.ndarray]:
@@ -141,16 +123,20 @@ def whole(record: Record) -> Samples:
 
 def stride(period: float, samples: int) -> int:
     """Stride that still resolves a motion of `period` samples in a record of `samples`."""
-    return 1 if period < _MANY or samples <= _FEW else max(1, round(period / _ENOUGH))
+    return (
+        1
+        if period < RECORDS.condensed_from or samples <= RECORDS.never_condensed
+        else max(1, round(period / RECORDS.condensed_to))
+    )
 
 
 @cache
 def _basis(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orthonormal polynomials (size, NODES + 2) on a block; nodes [samples]; values there by coefficient."""
+    """Orthonormal polynomials (size, values + 2) on a block; nodes [samples]; values there by coefficient."""
     u = np.linspace(-1, 1, size)
-    q, r = np.linalg.qr(np.polynomial.legendre.legvander(u, NODES + 1))
+    q, r = np.linalg.qr(np.polynomial.legendre.legvander(u, RECORDS.block_values + 1))
     q *= np.sign(np.diag(r))
-    jacobi = q[:, :NODES].T @ (u[:, None] * q[:, :NODES])
+    jacobi = q[:, : RECORDS.block_values].T @ (u[:, None] * q[:, : RECORDS.block_values])
     nodes, vectors = np.linalg.eigh(jacobi)
     # the polynomial of degree 0 is positive
     values = (vectors / (vectors[0] * np.sqrt(size))).T
@@ -165,7 +151,7 @@ def _block_noise(size: int, memory: float) -> tuple[np.ndarray, np.ndarray, np.n
     first).
     """
     q, _, values = _basis(size)
-    weights = values @ q[:, :NODES].T
+    weights = values @ q[:, : RECORDS.block_values].T
     forth = lfilter([1.0], [1.0, -memory], weights, axis=1)
     back = lfilter([1.0], [1.0, -memory], weights[:, ::-1], axis=1)[:, ::-1]
     carried = forth + back - weights
@@ -178,7 +164,7 @@ def _block_noise(size: int, memory: float) -> tuple[np.ndarray, np.ndarray, np.n
 @cache
 def expected_left(size: int, memory: float) -> tuple[float, float]:
     """Residual sum of squares, and of products of neighbours, of noise of size 1 in a block."""
-    q = _basis(size)[0][:, :NODES]
+    q = _basis(size)[0][:, : RECORDS.block_values]
     noise = toeplitz(memory ** np.arange(size))
     carried = noise @ q
     inner = q.T @ carried
@@ -197,50 +183,50 @@ def condense(
     """
     kept, slow, acceleration = events
     noise = max(sigma, white_noise(record.x)) * _inflation(record)
-    longest = _power(period * _LONGEST)
+    longest = _power(period * RECORDS.longest_block)
     # the hidden part of a jump of friction stays below the noise of the values
-    jump = _HIDDEN * max(acceleration, 1e-300) * record.interval**2
-    at_jumps = (_SHIFT * noise / jump) ** 0.4
-    unseen = _UNSEEN
+    jump = RECORDS.jump_hidden * max(acceleration, 1e-300) * record.interval**2
+    at_jumps = (RECORDS.jump_shift * noise / jump) ** 0.4
+    unseen = RECORDS.block_chi2
     while True:
-        taken = _taken(record, (kept, slow), longest, at_jumps, noise * np.sqrt(unseen / _UNSEEN))
-        rows = sum(NODES * first.size for _, first in taken) + int(
+        taken = _taken(record, (kept, slow), longest, at_jumps, noise * np.sqrt(unseen / RECORDS.block_chi2))
+        rows = sum(RECORDS.block_values * first.size for _, first in taken) + int(
             record.t.size - sum(size * first.size for size, first in taken)
         )
-        if rows <= MOST_ROWS:
+        if rows <= RECORDS.most_rows:
             break
         if unseen > 1e12:
             raise SeparatrixError(
                 f"{record.file}: {rows} of {record.t.size} samples are around impacts or where the body "
-                f"turns, at most {MOST_ROWS} can be fitted: keep every "
-                f"{-(-rows // MOST_ROWS)}th row, or a part of the record"
+                f"turns, at most {RECORDS.most_rows} can be fitted: keep every "
+                f"{-(-rows // RECORDS.most_rows)}th row, or a part of the record"
             )
         unseen *= 4
         at_jumps *= 2
     found = _rows(record, taken)
-    found.factor = float(np.sqrt(unseen / _UNSEEN))
+    found.factor = float(np.sqrt(unseen / RECORDS.block_chi2))
     return found
 
 
 def _power(samples: float) -> int:
     """Longest block of at most so many samples: the shortest one times a power of two."""
-    return int(_SHORTEST * 2 ** np.floor(np.log2(max(1.0, samples / _SHORTEST))))
+    return int(RECORDS.shortest_block * 2 ** np.floor(np.log2(max(1.0, samples / RECORDS.shortest_block))))
 
 
 def _inflation(record: Record) -> float:
     """Noise of slow terms over that of white noise of the same size, from short blocks."""
-    blocks = _blocks(record.pieces, np.zeros(record.t.size, bool), _SOUNDED)
+    blocks = _blocks(record.pieces, np.zeros(record.t.size, bool), RECORDS.memory_block)
     if not blocks.size:
         return 1.0
-    q = _basis(_SOUNDED)[0][:, :NODES]
-    at = blocks[:: max(1, blocks.size // 2000), None] + np.arange(_SOUNDED)
+    q = _basis(RECORDS.memory_block)[0][:, : RECORDS.block_values]
+    at = blocks[:: max(1, blocks.size // 2000), None] + np.arange(RECORDS.memory_block)
     y = record.x[at] - record.x[at].mean(axis=1, keepdims=True)
     y = y - (y @ q) @ q.T
     power, product = np.sum(y**2, axis=1), np.sum(y[:, 1:] * y[:, :-1], axis=1)
     quiet = power <= 2 * np.median(power)
     seen = product[quiet].sum() / max(power[quiet].sum(), 1e-300)
-    memories = np.linspace(0, _MOST_MEMORY, 19)
-    ratios = [two / one for one, two in (expected_left(_SOUNDED, memory) for memory in memories)]
+    memories = np.linspace(0, RECORDS.condensed_memory, 19)
+    ratios = [two / one for one, two in (expected_left(RECORDS.memory_block, memory) for memory in memories)]
     memory = float(np.interp(seen, ratios, memories))
     return float(np.sqrt((1 + memory) / (1 - memory)))
 
@@ -263,7 +249,7 @@ def _taken(
     slow_before = np.concatenate([[0], np.cumsum(slow)])
     found = []
     size = longest
-    while size >= _SHORTEST:
+    while size >= RECORDS.shortest_block:
         first = _blocks(record.pieces, taken, size)
         if size > at_jumps:
             first = first[slow_before[first + size] == slow_before[first]]
@@ -279,10 +265,10 @@ def _taken(
 def _smooth(record: Record, first: np.ndarray, size: int, noise: float) -> np.ndarray:
     """Whether the noise hides the next two terms of each block in x and v, at even times."""
     at = first[:, None] + np.arange(size)
-    q = _basis(size)[0][:, NODES:]
-    smooth = np.sum((record.x[at] @ q) ** 2, axis=1) < _UNSEEN * noise**2
+    q = _basis(size)[0][:, RECORDS.block_values :]
+    smooth = np.sum((record.x[at] @ q) ** 2, axis=1) < RECORDS.block_chi2 * noise**2
     if record.v is not None:
-        smooth &= np.sum((record.v[at] @ q) ** 2, axis=1) < _UNSEEN * white_noise(record.v) ** 2
+        smooth &= np.sum((record.v[at] @ q) ** 2, axis=1) < RECORDS.block_chi2 * white_noise(record.v) ** 2
     span = record.t[first + size - 1] - record.t[first]
     off = np.abs(record.t[at] - record.t[first, None] - span[:, None] * np.linspace(0, 1, size))
     return smooth & (off.max(axis=1, initial=0) < 1e-3 * record.interval)
@@ -296,11 +282,11 @@ def _rows(record: Record, taken: list[tuple[int, np.ndarray]]) -> Samples:
         at = first[:, None] + np.arange(size)
         single[at.ravel()] = False
         q, nodes, values = _basis(size)
-        q = q[:, :NODES]
+        q = q[:, : RECORDS.block_values]
         channels = []
         for y in (record.x, record.v):
             if y is None:
-                channels.append((np.zeros((first.size, NODES)), *np.zeros((2, first.size))))
+                channels.append((np.zeros((first.size, RECORDS.block_values)), *np.zeros((2, first.size))))
                 continue
             middle = y[at].mean(axis=1, keepdims=True)
             centred = y[at] - middle
@@ -310,12 +296,14 @@ def _rows(record: Record, taken: list[tuple[int, np.ndarray]]) -> Samples:
             channels.append((middle + terms @ values.T, np.sum(rest**2, axis=1), products))
         offset = first[:, None] + nodes
         span = (record.t[first + size - 1] - record.t[first]) / (size - 1)
-        begun = np.arange(NODES) == 0
+        begun = np.arange(RECORDS.block_values) == 0
         (x, left, products), (v, left_v, _) = channels
         columns = (offset, record.t[first][:, None] + nodes * span[:, None], x, v)
         columns = (*columns, *(one[:, None] * begun for one in (left, left_v, products)))
         flat = [one.ravel() for one in columns]
-        parts.append([*flat, np.full(offset.size, size), np.tile(np.arange(NODES), first.size)])
+        parts.append(
+            [*flat, np.full(offset.size, size), np.tile(np.arange(RECORDS.block_values), first.size)]
+        )
     rows = np.flatnonzero(single)
     none = np.zeros(rows.size)
     v = none if record.v is None else record.v[rows]

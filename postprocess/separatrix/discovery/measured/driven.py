@@ -12,13 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from separatrix.discovery.measured.smoother import Smoothed
-
-# standard errors of the speed within which a body may be at rest; share of the usual speed where errors are 0
-_SLOW, _REST = 3.0, 1e-4
-# errors of neighbouring accelerations are correlated: factor by which they count as larger
-_TOGETHER = 2.0
-# way at the beginning, over that of the whole record, on which friction may depend on the earlier motion
-_BEGUN = 0.1
+from separatrix.discovery.policy import RECORDS
 
 
 @dataclass
@@ -79,14 +73,18 @@ def driven(
         share = variance / (variance + velocity_sigma**2)
         speed = (1 - share) * speed + share * v
         variance = (1 - share) * variance
-    least = np.maximum(_SLOW * np.sqrt(variance), _REST * np.sqrt(np.mean(speed**2)))
+    least = np.maximum(
+        RECORDS.driven_rest * np.sqrt(variance), RECORDS.driven_rest_share * np.sqrt(np.mean(speed**2))
+    )
     moves = np.abs(speed) > least
     for first, last in pieces:
         turns = speed[first : last - 1] * speed[first + 1 : last] <= 0
         moves[first : last - 1] &= ~turns
         moves[first + 1 : last] &= ~turns
-        moves[first:last] &= np.cumsum(np.abs(np.diff(x[first:last], prepend=x[first]))) > _BEGUN * np.ptp(x)
-    error = _TOGETHER * mass * np.sqrt(np.maximum(smoothed.covariance[:, 2, 2], 0.0))
+        moves[first:last] &= np.cumsum(
+            np.abs(np.diff(x[first:last], prepend=x[first]))
+        ) > RECORDS.driven_beginning * np.ptp(x)
+    error = RECORDS.driven_errors * mass * np.sqrt(np.maximum(smoothed.covariance[:, 2, 2], 0.0))
     turned = _turning_positions(smoothed, x, speed, pieces)
     return Driven(x.copy(), speed.copy(), a.copy(), error, moves, turned)
 

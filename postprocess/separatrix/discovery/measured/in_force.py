@@ -2,21 +2,62 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records of a known motion whose force is compared: a joint driven along x(t), as friction is tested."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
+from separatrix.discovery.measured.condense import stride
+from separatrix.discovery.measured.driven import driven
 from separatrix.discovery.measured.preflight import Prepared, check_velocity, velocity_noise
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.sensor_imperfections import check_clipped_force
-from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
+from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.discovery.policy import RECORDS
 from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
 
-MOST_SAMPLES = 40_000
-"""Compared samples of such a record; a longer one is averaged over neighbours."""
-# least noise of a force over its scatter: no sensor of force is better
-_EXACT = 5e-4
+
+@dataclass
+class DrivenPrepared(Prepared):
+    """A record whose force is compared: sigma and resolution are its own, the motion is known."""
+
+    noise_key: ClassVar[str] = "force_noise_sigma_n"
+    near_mass: ClassVar[bool] = True
+    # noise of the positions, mass of the case [kg]
+    motion_sigma: float = 0.0
+    mass: float = 0.0
+
+    @property
+    def column(self) -> np.ndarray:
+        """The force."""
+        return self.record.force
+
+    @property
+    def noise(self) -> tuple:
+        """Memory of the noise and its size."""
+        return (self.memory, self.sigma)
+
+    @noise.setter
+    def noise(self, known: tuple) -> None:
+        self.memory, self.sigma = known
+
+    def details(self) -> dict[str, tuple[np.ndarray, dict]]:
+        """The force."""
+        return {"force": (self.record.force, {})}
+
+    def deviation(self, rows: np.ndarray) -> np.ndarray:
+        """Standard deviation of the noise of the force, with the error of mass times acceleration."""
+        return np.hypot(self.sigma, self.driven.inertia_error)[rows]
+
+    def known_motion(self, oscillation: float) -> Smoothed:
+        """Smooth the motion, and keep it."""
+        record = self.record
+        every = stride(oscillation, record.t.size)
+        found = smooth(record.t, record.x, self.motion_sigma, oscillation, every)
+        self.driven = driven(found, record.v, self.velocity_sigma, self.mass, record.pieces)
+        return found
 
 
 def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared:
@@ -39,7 +80,7 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
         raise SeparatrixError(f"{record.file}: 'force' is constant")
     stated = record.header.get("force_noise_sigma_n") if rest is None else _at_rest(rest)
     resolution = resolution_of(record.force)
-    least = max(_EXACT * float(np.std(record.force)), resolution / np.sqrt(12))
+    least = max(RECORDS.exact_force * float(np.std(record.force)), resolution / np.sqrt(12))
     sigma = max(stated / np.sqrt(_together(record)) if stated else white_noise(record.force), least)
     if not stated:
         notes.append(f"noise of the force {sigma:.3g} {unit}, from fourth differences")
@@ -51,13 +92,18 @@ def prepare_force(record: Record, model, rest: Record | None = None) -> Prepared
         )
     of_x = max(white_noise(record.x), resolution_of(record.x) / np.sqrt(12))
     of_sensor = (record.header.get("sensor_noise_sigma_m") or 0.0) / np.sqrt(_together(record))
-    motion = max(of_sensor or of_x, QUIET * float(np.std(record.x)))
-    prepared = Prepared(
-        record, sigma, velocity_noise(record), resolution, notes=notes, origin=float(record.t[0])
+    motion = max(of_sensor or of_x, RECORDS.quiet * float(np.std(record.x)))
+    return DrivenPrepared(
+        record,
+        sigma,
+        velocity_noise(record),
+        resolution,
+        notes=notes,
+        origin=float(record.t[0]),
+        sigma_stated=bool(stated),
+        motion_sigma=motion,
+        mass=model.parameters["body.mass"].value,
     )
-    prepared.in_force, prepared.motion_sigma, prepared.sigma_stated = True, motion, bool(stated)
-    prepared.mass = model.parameters["body.mass"].value
-    return prepared
 
 
 def _at_rest(rest: Record) -> float:
@@ -74,7 +120,7 @@ def _together(record: Record) -> int:
 
 def _thinned(record: Record, notes: list[str]) -> Record:
     """Means of neighbours where there are far more samples than a law of the joint needs."""
-    count = -(-record.t.size // MOST_SAMPLES)
+    count = -(-record.t.size // RECORDS.most_in_force)
     if count == 1:
         return record
     rows, pieces = [], []

@@ -3,35 +3,18 @@
 """Properties of a record before any fit: noise, resolution, drive, delay of channels."""
 
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
-from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
 from separatrix.discovery.measured.condense import Samples, whole
 from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.measured.records import Record
-from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
+from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.smoother import Smoothed
+from separatrix.discovery.policy import RECORDS
 from separatrix.discovery.wording import units_of
 from separatrix.errors import SeparatrixError
-
-_FEWEST_PER_PERIOD = 12
-_FEWEST_PERIODS = 2.0
-# share by which a stated drive frequency may differ from that of a measured crank angle
-_OFF = 0.01
-# largest difference of the intervals of two pieces, over the interval, with a measured force
-_UNEVEN = 1e-2
-# sizes of a record against those of the machine beyond which a unit must be wrong
-_MOST_RATIO = 50.0
-# ratio of the velocity to the slope of the position beyond which its unit must be wrong
-_UNIT = 2.0
-# samples by which x may lag behind v; correlation of v and the slope of x above which no blocks of samples
-# are needed, and least number of blocks
-_MOST_LAG = 4
-_ALIKE, _FEWEST_BLOCKS = 0.9, 400
-# error of a crank angle [rad] below which it is due to rounding
-_EXACT = 1e-9
-# ratio of the scatter of a crank angle to its stated noise that is reported
-_DISAGREEMENT = 1.5
 
 
 @dataclass
@@ -62,13 +45,12 @@ class Prepared:
     notes: list[str] = field(default_factory=list)
     # fitted rows: all samples, or fewer with the same information
     samples: Samples | None = None
-    # whether the force is compared: sigma and resolution are its own, the motion is known
-    in_force: bool = False
+    # the known motion, where the force is compared
     driven: Driven | None = None
-    # noise of the positions of such a record
-    motion_sigma: float = 0.0
-    # of the case [kg]
-    mass: float = 0.0
+
+    # key of the header that states the noise; whether the mass is nearly that of the case
+    noise_key: ClassVar[str] = "sensor_noise_sigma_m"
+    near_mass: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Fit every sample by default."""
@@ -78,8 +60,7 @@ class Prepared:
     @property
     def noise(self) -> tuple:
         """Memory of the noise, and its size in each column that is compared."""
-        velocity = self.record.v is not None and not self.in_force
-        return (self.memory, self.sigma, *((self.velocity_sigma,) if velocity else ()))
+        return (self.memory, self.sigma, *(() if self.record.v is None else (self.velocity_sigma,)))
 
     @noise.setter
     def noise(self, known: tuple) -> None:
@@ -97,17 +78,30 @@ class Prepared:
         return 1 + 2 * self.memory_error * 2 * self.memory / (1 - self.memory**2)
 
     @property
+    def column(self) -> np.ndarray:
+        """The column of one body that is compared."""
+        return self.record.x
+
+    @property
     def signal(self) -> np.ndarray:
-        """What is compared: position, or force."""
-        return self.record.force if self.in_force else self.record.x
+        """What is compared first."""
+        return self.column
+
+    @property
+    def sensor_noise(self) -> dict[str, float]:
+        """Noise of each sensor, where there are several."""
+        return {}
+
+    def details(self) -> dict[str, tuple[np.ndarray, dict]]:
+        """Columns beside t and x that are compared, with attributes."""
+        return {}
+
+    def known_motion(self, oscillation: float) -> Smoothed | None:
+        """The motion, where it is known and not compared."""
+        return None
 
     def deviation(self, rows: np.ndarray) -> np.ndarray:
-        """Standard deviation of the noise of what is compared at some rows.
-
-        That of a force has the error of mass times acceleration in it.
-        """
-        if self.in_force:
-            return np.hypot(self.sigma, self.driven.inertia_error)[rows]
+        """Standard deviation of the noise of what is compared at some rows."""
         return self.sigma * self.samples.spread(self.memory)[rows]
 
     @property
@@ -166,7 +160,7 @@ def _noise(record: Record, rest: Record | None, resolution: float, unit: str, no
         notes.append(f"noise {sigma:.3g} {unit}, from fourth differences of x")
     sigma = max(sigma, floor)
     # a record that states zero noise was computed
-    least = QUIET * float(np.std(record.x))
+    least = RECORDS.quiet * float(np.std(record.x))
     if sigma <= (least if stated == 0 else 0):
         sigma = least
         notes.append(f"no noise found: {sigma:.3g} {unit} is taken")
@@ -180,7 +174,9 @@ def velocity_noise(record: Record) -> float:
     stated = record.header.get("sensor_noise_sigma_m_s")
     if stated:
         return stated
-    return max(white_noise(record.v), resolution_of(record.v) / np.sqrt(12), QUIET * float(np.std(record.v)))
+    return max(
+        white_noise(record.v), resolution_of(record.v) / np.sqrt(12), RECORDS.quiet * float(np.std(record.v))
+    )
 
 
 def _find_drive(prepared: Prepared, model) -> None:
@@ -210,15 +206,16 @@ def _find_drive(prepared: Prepared, model) -> None:
 def check_periods(prepared: Prepared) -> None:
     """Refuse a record with too few samples in a period of the drive, or too few periods."""
     record, samples = prepared.record, prepared.period_samples
-    if samples < _FEWEST_PER_PERIOD:
+    if samples < RECORDS.samples_per_period:
         raise SeparatrixError(
-            f"{record.file}: {samples:.1f} samples per drive period, at least {_FEWEST_PER_PERIOD} are needed"
+            f"{record.file}: {samples:.1f} samples per drive period, "
+            f"at least {RECORDS.samples_per_period} are needed"
         )
     periods = record.duration / record.interval / samples
-    if periods < _FEWEST_PERIODS:
+    if periods < RECORDS.fewest_periods:
         raise SeparatrixError(
             f"{record.file}{record.part}: {periods:.2f} drive periods, "
-            f"at least {_FEWEST_PERIODS:g} are needed"
+            f"at least {RECORDS.fewest_periods:g} are needed"
         )
 
 
@@ -232,7 +229,7 @@ def from_measured_angle(prepared: Prepared) -> None:
             "too short a record, or not the angle of a turning crank"
         )
     stated = record.header.get("drive_frequency_rad_s")
-    if stated is not None and abs(prepared.frequency / stated - 1) > _OFF:
+    if stated is not None and abs(prepared.frequency / stated - 1) > RECORDS.frequency_off:
         prepared.notes.append(
             f"drive_frequency_rad_s is {stated:g}, phi turns at {prepared.frequency:.4g} rad/s: that is taken"
         )
@@ -274,7 +271,7 @@ def _errors_of_angle(prepared: Prepared) -> None:
     scatter = scatter - 2 * np.pi * np.round(scatter / (2 * np.pi))
     sigma = float(np.std(scatter))
     stated = record.header.get("phi_noise_sigma_rad", 0.0)
-    if stated and sigma > _DISAGREEMENT * stated:
+    if stated and sigma > RECORDS.angle_disagreement * stated:
         prepared.notes.append(
             f"noise of phi is stated as {stated:.3g} rad, it scatters by {sigma:.3g} rad about even turning"
         )
@@ -282,7 +279,7 @@ def _errors_of_angle(prepared: Prepared) -> None:
     memory = float(np.corrcoef(scatter[1:], scatter[:-1])[0, 1]) if sigma > 0 else 0.0
     memory = min(max(memory, 0.0), 0.99)
     error = max(sigma, stated) * np.sqrt((1 + memory) / (1 - memory) / t.size)
-    if error > _EXACT:
+    if error > RECORDS.angle_rounding:
         prepared.phase_error = error
         prepared.clock_error = error / float(np.sqrt(np.mean(t**2))) / prepared.frequency
 
@@ -312,11 +309,11 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
     for first, last in record.pieces:
         steps = last - 1 - first
         # shorter ones are not fitted
-        if steps < FEWEST_IN_PIECE:
+        if steps < RECORDS.fewest_in_piece:
             continue
         interval = float((record.t[last - 1] - record.t[first]) / steps)
         usual = usual or interval
-        if abs(interval - usual) > usual * max(_UNEVEN, 1 / steps):
+        if abs(interval - usual) > usual * max(RECORDS.uneven_pieces, 1 / steps):
             raise SeparatrixError(
                 f"{record.file}, from {record.t[first]:.6g} s on: samples every {interval:.6g} s, before "
                 f"every {usual:.6g} s: a measured force needs one rate"
@@ -339,7 +336,7 @@ def _check_size(prepared: Prepared, model) -> None:
         return
     unit = units_of(model.parameters).position
     spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
-    if not 1 / _MOST_RATIO < spread / expected < _MOST_RATIO:
+    if not 1 / RECORDS.size_ratio < spread / expected < RECORDS.size_ratio:
         raise SeparatrixError(
             f"{prepared.record.file}: x ranges over {spread:.3g} {unit}, the machine over "
             f"{expected:.3g} {unit}: "
@@ -373,10 +370,10 @@ def check_velocity(record: Record, notes: list[str]) -> None:
         # sampled fast, x changes by less than its noise from sample to sample: means of blocks do not
         t, x, v = (_block_means(values, width) for values in (record.t, record.x, record.v))
         slope = np.gradient(x, t)
-        shifts = np.arange(-(_MOST_LAG // width), _MOST_LAG // width + 1)
+        shifts = np.arange(-(RECORDS.most_lag // width), RECORDS.most_lag // width + 1)
         overlap = [float(np.corrcoef(np.roll(v, shift)[inner], slope[inner])[0, 1]) for shift in shifts]
         best = int(np.argmax(overlap))
-        if overlap[best] > _ALIKE or t.size < 2 * _FEWEST_BLOCKS:
+        if overlap[best] > RECORDS.speed_alike or t.size < 2 * RECORDS.speed_blocks:
             break
         width *= 2
     if overlap[best] < 0.5:
@@ -385,7 +382,7 @@ def check_velocity(record: Record, notes: list[str]) -> None:
         )
     ratio = float(np.std(v[inner]) / np.std(slope[inner]))
     # noise of either one moves the ratio by no more than the correlation
-    if not overlap[best] / _UNIT < ratio < _UNIT / overlap[best]:
+    if not overlap[best] / RECORDS.speed_ratio < ratio < RECORDS.speed_ratio / overlap[best]:
         raise SeparatrixError(
             f"{record.file}: 'v' is {ratio:.4g} times the slope of 'x': wrong units? v is read in m/s, of an "
             "angle in rad/s"

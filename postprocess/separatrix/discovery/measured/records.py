@@ -15,11 +15,8 @@ from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
 from separatrix.discovery.measured.sensor_imperfections import check_clipping, left_out
 from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_sensor
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
-
-_FEWEST_SAMPLES = 60
-# largest measured value [SI]: squares of larger ones overflow
-_LARGEST = 1e100
 
 
 @dataclass
@@ -90,11 +87,11 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     columns, unit, of_time = to_si(path, table, notes)
     numbers = numbers_of(path, header, of_time, notes)
     for name, column in columns.items():
-        bad = np.flatnonzero(~(np.abs(column) < _LARGEST))
+        bad = np.flatnonzero(~(np.abs(column) < RECORDS.largest_value))
         if bad.size:
             raise SeparatrixError(f"{where(bad[0])}: '{name}' is {column[bad[0]]}; {bad.size} such values")
-    if kept.size < _FEWEST_SAMPLES:
-        raise SeparatrixError(f"{path}: {kept.size} samples, at least {_FEWEST_SAMPLES} are needed")
+    if kept.size < RECORDS.fewest_samples:
+        raise SeparatrixError(f"{path}: {kept.size} samples, at least {RECORDS.fewest_samples} are needed")
     sensors = [name for name in columns if is_sensor(name)]
     positions = [name for name in sensors if name[0] == "x"]
     own_x = "x" in columns
@@ -121,7 +118,7 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
             kept = np.delete(kept, left_out(t, x, unit, where, notes))
         columns = {name: column[kept] for name, column in columns.items()}
         x = columns["x"]
-    t, pieces = pieces_of(columns["t"], x, _FEWEST_SAMPLES, where, notes)
+    t, pieces = pieces_of(columns["t"], x, RECORDS.fewest_samples, where, notes)
     usual = float(np.median(np.diff(t)))
     rate = numbers.get("sampling_rate_hz")
     if rate is not None and not 0.99 < rate * usual < 1.01:

@@ -11,13 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.measured.clock import FEWEST_IN_PIECE
 from separatrix.discovery.measured.condense import Samples
 from separatrix.discovery.measured.smoother import Smoothed
-
-_FEWEST = 6
-_IMPACT_MARGIN = 2
-_SLOW = 0.3
+from separatrix.discovery.policy import RECORDS
 
 
 @dataclass
@@ -45,7 +41,7 @@ def cut(records: list[Samples], smoothed: list[Smoothed], lengths: list[int]) ->
             # impacts that only the velocity shows, as at the beginning of the record
             smoothness[record.blind] = 0
         for first, last in record.pieces:
-            if last - first >= max(_FEWEST, min(length, FEWEST_IN_PIECE)):
+            if last - first >= max(RECORDS.segment_samples, min(length, RECORDS.fewest_in_piece)):
                 piece = slice(first, last)
                 cuts = _cut_piece(record.offset[piece], length, smoothness[piece])
                 rows += [(number, first + a, first + b) for a, b in cuts]
@@ -84,7 +80,7 @@ def _calm(smooth: Smoothed) -> np.ndarray:
     speed = np.abs(smooth.v)
     calm = speed / max(float(np.sqrt(np.mean(speed**2))), 1e-300)
     for k in smooth.impacts:
-        calm[max(0, k - _IMPACT_MARGIN) : k + 2 + _IMPACT_MARGIN] = 0
+        calm[max(0, k - RECORDS.impact_margin) : k + 2 + RECORDS.impact_margin] = 0
     return calm
 
 
@@ -94,15 +90,15 @@ def _cut_piece(offset: np.ndarray, length: int, calm: np.ndarray) -> list[tuple[
     whole = offset[-1] - offset[0] + 1
     within = min(max(2, length // 4), whole // 2)
     begin = int(np.searchsorted(offset, offset[0] + within))
-    starts = [int(np.argmax(calm[:begin] > _SLOW))]
+    starts = [int(np.argmax(calm[:begin] > RECORDS.slow_start))]
     reach = max(1, length // 3)
     while offset[-1] + 1 - offset[starts[-1]] > 1.5 * length:
         aim = offset[starts[-1]] + length
         near = np.arange(np.searchsorted(offset, aim - reach), np.searchsorted(offset, aim + reach, "right"))
-        near = near[near > starts[-1] + _FEWEST]
+        near = near[near > starts[-1] + RECORDS.segment_samples]
         if not near.size:
-            near = np.array([min(starts[-1] + _FEWEST + 1, offset.size - 1)])
+            near = np.array([min(starts[-1] + RECORDS.segment_samples + 1, offset.size - 1)])
         near = near[np.argsort(np.abs(offset[near] - aim), kind="stable")]
-        good = near[calm[near] > _SLOW]
+        good = near[calm[near] > RECORDS.slow_start]
         starts.append(int(good[0] if good.size else near[np.argmax(calm[near])]))
     return list(zip(starts, [*starts[1:], offset.size], strict=True))

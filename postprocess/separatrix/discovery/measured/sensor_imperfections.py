@@ -6,30 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from separatrix.discovery.measured.clock import GAP
-from separatrix.discovery.measured.signals import QUIET, resolution_of, runs, white_noise
+from separatrix.discovery.measured.signals import resolution_of, runs, white_noise
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 
 Where = Callable[[int], str]
-
-# distance of a stray sample from the line of its neighbours: over the noise, the grid, and the changes of the
-# steps around it, of which an impact causes a third at most
-_STRAY = (20.0, 5.0, 3.0)
-# rows on either side from which the change of steps is estimated
-_AROUND = 5
-_MOST_STRAY = 3
-# a held value ends with a jump: over the noise, the grid, and the usual steps before and after
-_HELD = (20.0, 3.0, 2.0)
-_SHORTEST_HELD = 3
-# usual jump of a sensor that is slower than the record, over the distance of its values
-_SLOW = 3.0
-_CLIPPED_RUN = 5
-_CLIPPED_SHARE = 0.02
-# step to and from a clipped value, over the grid and over the usual step: a turning point or a position of
-# rest is reached level by level, or ever more slowly
-_ABRUPT = (1.5, 0.05)
-# noise over the grid of a force from which on it is never the same number by chance
-_STEPS_OF_NOISE, _FEWEST_INSIDE = 0.5, 20
 
 
 def left_out(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
@@ -49,7 +30,7 @@ def _check_rate(x: np.ndarray, where: Where) -> None:
         return
     apart = float(np.median(np.diff(changes)))
     spacing = max(resolution_of(x), float(np.median(np.diff(np.unique(x)))))
-    if apart >= 2 and np.median(np.abs(steps[changes])) > _SLOW * spacing:
+    if apart >= 2 and np.median(np.abs(steps[changes])) > RECORDS.slow_sensor * spacing:
         raise SeparatrixError(
             f"{where(int(changes[0]) + 1)}: x changes in one of {apart:g} rows only, in jumps: "
             "keep one row for each value of the sensor"
@@ -63,22 +44,25 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[st
     steps = np.diff(x)
     bend = np.full(x.size, np.inf)
     bend[2:-2] = np.abs(steps[3:] - steps[:-3])
-    second = np.pad(np.abs(np.diff(x, 2)), _AROUND + 1)
-    for shift in range(2, _AROUND + 1):
+    second = np.pad(np.abs(np.diff(x, 2)), RECORDS.stray_rows + 1)
+    for shift in range(2, RECORDS.stray_rows + 1):
         for side in (-shift, shift):
-            bend = np.maximum(bend, second[_AROUND + side : _AROUND + side + x.size])
+            bend = np.maximum(bend, second[RECORDS.stray_rows + side : RECORDS.stray_rows + side + x.size])
     # across a gap the samples are no neighbours
     wide = np.flatnonzero(_gaps(t))
     for shift in range(-1, 3):
         bend[np.clip(wide + shift, 0, x.size - 1)] = np.inf
-    least = max(_STRAY[0] * max(white_noise(x), QUIET * float(np.std(x))), _STRAY[1] * resolution_of(x))
+    least = max(
+        RECORDS.stray[0] * max(white_noise(x), RECORDS.quiet * float(np.std(x))),
+        RECORDS.stray[1] * resolution_of(x),
+    )
     size = np.abs(off)
-    rows = np.flatnonzero((size > least) & (size > _STRAY[2] * bend))
+    rows = np.flatnonzero((size > least) & (size > RECORDS.stray[2] * bend))
     messages = [
         f"{where(row)}: x is {x[row]:.6g} {unit} between {x[row - 1]:.6g} and {x[row + 1]:.6g} {unit}"
         for row in rows
     ]
-    if rows.size > _MOST_STRAY:
+    if rows.size > RECORDS.most_stray:
         raise SeparatrixError(f"{messages[0]}; {rows.size} such samples: clean the record")
     notes += [f"{text}: left out" for text in messages]
     return rows
@@ -87,21 +71,26 @@ def _stray(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[st
 def _gaps(t: np.ndarray) -> np.ndarray:
     """Whether a sample is followed by a gap."""
     steps = np.diff(t)
-    return steps > GAP * np.median(steps)
+    return steps > RECORDS.gap * np.median(steps)
 
 
 def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str]) -> np.ndarray:
     """Samples that repeat one before them, until the motion goes on elsewhere."""
-    least = max(_HELD[0] * white_noise(x), _HELD[1] * resolution_of(x))
+    least = max(RECORDS.held[0] * white_noise(x), RECORDS.held[1] * resolution_of(x))
     gaps = _gaps(t)
     found = []
     for first, last in runs(np.diff(x) == 0):
         last += 1
         # a body at rest before a gap may have moved after it
-        if last - first < _SHORTEST_HELD or first < 1 or last > x.size - 2 or gaps[first - 1 : last].any():
+        if (
+            last - first < RECORDS.shortest_held
+            or first < 1
+            or last > x.size - 2
+            or gaps[first - 1 : last].any()
+        ):
             continue
         around = max(abs(x[first] - x[first - 1]), abs(x[last + 1] - x[last]))
-        if abs(x[last] - x[first]) > max(least, _HELD[2] * around):
+        if abs(x[last] - x[first]) > max(least, RECORDS.held[2] * around):
             found.append((first, last))
     for first, last in found[:3]:
         notes.append(
@@ -116,15 +105,15 @@ def _held(t: np.ndarray, x: np.ndarray, unit: str, where: Where, notes: list[str
 def check_clipping(x: np.ndarray, unit: str, where: Where, notes: list[str]) -> None:
     """Runs of exactly the extreme value; a coarse resolution makes such runs by itself at turning points."""
     steps = np.abs(np.diff(x))
-    least = max(_ABRUPT[0] * resolution_of(x), _ABRUPT[1] * float(np.median(steps[steps > 0])))
+    least = max(RECORDS.abrupt[0] * resolution_of(x), RECORDS.abrupt[1] * float(np.median(steps[steps > 0])))
     _check_limits("x", x, unit, where, notes, lambda first, last: _is_abrupt(x, first, last, least))
 
 
 def check_clipped_force(force: np.ndarray, unit: str, where: Where, notes: list[str]) -> None:
     """The same of a force, which may jump to a constant value: but not without its noise."""
     inside = force[(force > force.min()) & (force < force.max())]
-    if inside.size > _FEWEST_INSIDE and white_noise(inside) > max(
-        _STEPS_OF_NOISE * resolution_of(force), QUIET * float(np.std(force))
+    if inside.size > RECORDS.fewest_inside and white_noise(inside) > max(
+        RECORDS.grid_of_noise * resolution_of(force), RECORDS.quiet * float(np.std(force))
     ):
         _check_limits("force", force, unit, where, notes, lambda first, last: True)
 
@@ -137,14 +126,14 @@ def _check_limits(
         long = [
             (first, last)
             for first, last in runs(x == extreme)
-            if last - first >= _CLIPPED_RUN and holds(first, last)
+            if last - first >= RECORDS.clipped_run and holds(first, last)
         ]
         if not long:
             continue
         share = sum(last - first for first, last in long) / x.size
         stays = f"{name} stays at its {end} value {extreme:.6g} {unit}"
         message = f"{where(long[0][0])}: {stays} in {len(long)} intervals"
-        if len(long) >= 2 and share > _CLIPPED_SHARE:
+        if len(long) >= 2 and share > RECORDS.clipped_share:
             raise SeparatrixError(
                 f"{message}, {100 * share:.0f} % of the samples: clipped. The range of the sensor has to be "
                 f"that of the {'force' if name == 'force' else 'motion'}"

@@ -14,13 +14,13 @@ import numpy as np
 from separatrix.discovery.measured.bodies import Structure, structure_of
 from separatrix.discovery.measured.preflight import Prepared, check_periods, from_measured_angle
 from separatrix.discovery.measured.records import Record
-from separatrix.discovery.measured.signals import QUIET, resolution_of, white_noise
+from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 
 # laws of joints whose force follows from extension and speed
 FORCES = ("linear", "polynomial", "kelvin_voigt")
-_MOST_SAMPLES = 50_000
 
 
 @dataclass
@@ -63,6 +63,11 @@ class SensedPrepared(Prepared):
             one.sigma = sigma
         self.sigma = self.sensors[0].sigma
 
+    @property
+    def sensor_noise(self) -> dict[str, float]:
+        """Noise of each sensor."""
+        return {one.name: one.sigma for one in self.sensors}
+
     def sensor(self, name: str) -> Sensor | None:
         """The sensor of a column, if this record has it."""
         return next((one for one in self.sensors if one.name == name), None)
@@ -81,11 +86,11 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
         raise SeparatrixError(
             f"{record.file}: found a column force, allowed F.JOINT of a machine of several bodies"
         )
-    if record.t.size > _MOST_SAMPLES:
+    if record.t.size > RECORDS.most_of_bodies:
         raise SeparatrixError(
-            f"{record.file}: {record.t.size} samples, at most {_MOST_SAMPLES} a record of several "
+            f"{record.file}: {record.t.size} samples, at most {RECORDS.most_of_bodies} a record of several "
             "bodies: keep a part "
-            f"of it, or every {-(-record.t.size // _MOST_SAMPLES)}th row"
+            f"of it, or every {-(-record.t.size // RECORDS.most_of_bodies)}th row"
         )
     if not record.has_position:
         _check_impacts(record, structure)
@@ -165,7 +170,7 @@ def _sensor(record: Record, name: str, values: np.ndarray, structure: Structure,
         stated = record.header.get("sensor_noise_sigma_m_s", 0.0)
     floor = resolution_of(values) / np.sqrt(12)
     sigma = float(np.hypot(stated, floor)) if stated else max(white_noise(values), floor)
-    sigma = max(sigma, QUIET * float(np.std(values)))
+    sigma = max(sigma, RECORDS.quiet * float(np.std(values)))
     if not stated:
         notes.append(f"noise of {name}: {sigma:.3g}, from fourth differences")
     unit = "m/s" if kind == "v" else "m"

@@ -5,18 +5,10 @@
 import numpy as np
 from scipy.ndimage import median_filter
 
-# noise that is assumed where none is found, over the scatter of the signal
-QUIET = 1e-6
+from separatrix.discovery.policy import RECORDS
+
 # variance of fourth differences of white noise of variance 1
 _FOURTH = 70.0
-# deviation of a multiple of the step of a grid from a whole number
-_OFF_GRID = 0.05
-# factors of the noise and of the excess of the neighbouring steps over it that a jump exceeds
-_JUMP, _SUDDEN = 4.0, 3.0
-# neighbouring steps whose median is the smooth motion
-_BESIDE = 7
-# a grid below this share of the noise is that of the digits in the file
-_FINE = 0.3
 
 
 def white_noise(x: np.ndarray) -> float:
@@ -39,19 +31,19 @@ def resolution_of(x: np.ndarray) -> float:
     multiple = steps / step
     off = np.abs(multiple - np.round(multiple))
     if levels.size <= 0.5 * x.size:
-        return step if np.all(off < _OFF_GRID * np.maximum(1, multiple)) else 0.0
-    return step if np.all(off < _OFF_GRID) and step > _FINE * white_noise(x) else 0.0
+        return step if np.all(off < RECORDS.off_grid * np.maximum(1, multiple)) else 0.0
+    return step if np.all(off < RECORDS.off_grid) and step > RECORDS.fine_grid * white_noise(x) else 0.0
 
 
 def jumps(v: np.ndarray, noise: float) -> np.ndarray:
     """Samples after which a velocity jumps: its step is beyond the noise, and beyond those beside it."""
     steps = np.diff(v)
-    steps = np.abs(steps - median_filter(steps, _BESIDE))
-    chance = _JUMP * np.sqrt(2) * noise
+    steps = np.abs(steps - median_filter(steps, RECORDS.beside_jump))
+    chance = RECORDS.jump * np.sqrt(2) * noise
     beside = np.zeros(steps.size)
     beside[1:] = steps[:-1]
     beside[:-1] = np.maximum(beside[:-1], steps[1:])
-    return np.flatnonzero((steps > chance) & (steps > _SUDDEN * np.maximum(0, beside - chance)))
+    return np.flatnonzero((steps > chance) & (steps > RECORDS.sudden * np.maximum(0, beside - chance)))
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:

@@ -13,13 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from separatrix.discovery.measured.signals import runs
-
-# samples that are sufficient for tuning
-_TUNED_SAMPLES = 600
-_JUMP_SIGMAS = 6.0
-_JUMP_MEDIANS = 4.0
-# samples that a stick has at least
-_FEWEST_STILL = 4
+from separatrix.discovery.policy import RECORDS
 
 
 @dataclass
@@ -75,7 +69,9 @@ def detect_impacts(t: np.ndarray, x: np.ndarray, sigma: float, window: int) -> n
     centre = slice(window - 1, n - window)
     size = np.zeros(n)
     size[centre] = np.abs(jump[centre])
-    threshold = max(_JUMP_SIGMAS * np.sqrt(2) * error, _JUMP_MEDIANS * float(np.median(size[centre])))
+    threshold = max(
+        RECORDS.impact_sigmas * np.sqrt(2) * error, RECORDS.impact_medians * float(np.median(size[centre]))
+    )
     found = []
     for k in np.argsort(-size):
         if size[k] < threshold:
@@ -131,7 +127,7 @@ def stick_intervals(smoothed: Smoothed) -> list[tuple[float, float]]:
     return [
         (float(smoothed.t[first]), float(smoothed.t[last - 1]))
         for first, last in runs(still)
-        if last - first >= _FEWEST_STILL
+        if last - first >= RECORDS.fewest_still
     ]
 
 
@@ -144,7 +140,7 @@ def reversals(smoothed: Smoothed) -> np.ndarray:
 
 
 def _tuned_jerk(t: np.ndarray, x: np.ndarray, sigma: float, impacts: np.ndarray) -> float:
-    n = min(x.size, _TUNED_SAMPLES)
+    n = min(x.size, RECORDS.tuned_samples)
     dt = float(np.median(np.diff(t[:n])))
     size = max(float(np.std(x)), sigma) / dt**2.5
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 
 CHANNELS = ("x", "v", "force", "phi")
@@ -39,10 +40,6 @@ NUMBERS = {
 """Header keys with one number."""
 _SENSOR = re.compile(r"[xvaF]\.[A-Za-z_][\w.]*")
 _NOISE = "noise."
-MOST_SAMPLES = 10_000_000
-"""Samples of a record that are read."""
-# lines of a header; bytes that are looked at together
-_MOST_HEADER, _CHUNK = 1000, 1_000_000
 KEYS = NUMBERS | {"units"}
 """All known header keys."""
 
@@ -100,7 +97,7 @@ class Table:
 def is_text(path: Path) -> bool:
     """Whether a file may be text of any encoding: only UTF-16 has zero bytes."""
     with path.open("rb") as file:
-        begin = file.read(_CHUNK)
+        begin = file.read(RECORDS.chunk)
     return begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" not in begin
 
 
@@ -116,7 +113,7 @@ def _count_lines(path: Path) -> tuple[int, int]:
     """Lines of a text, and how many of them are comments; they end as on any system."""
     ends, comments, last = {b"\n": 0, b"\r": 0}, 0, b"\n"
     with path.open("rb") as file:
-        while chunk := file.read(_CHUNK):
+        while chunk := file.read(RECORDS.chunk):
             for end in ends:
                 ends[end] += chunk.count(end)
                 comments += (last + chunk).count(end + b"#")
@@ -132,7 +129,7 @@ def _read_plain(path: Path, count: int) -> Table | None:
             begun.append(line)
             if line.strip() and not line.startswith("#"):
                 break
-            if len(begun) > _MOST_HEADER:
+            if len(begun) > RECORDS.most_header:
                 return None
         first = file.readline()
     names = [_named(name)[0] for name in begun[-1].split(",")] if begun else []
@@ -157,10 +154,10 @@ def _read_plain(path: Path, count: int) -> Table | None:
 
 def check_length(path: Path, samples: int) -> None:
     """Refuse a record of more samples than fit into the memory of a usual machine."""
-    if samples > MOST_SAMPLES:
+    if samples > RECORDS.most_samples:
         raise SeparatrixError(
-            f"{path}: about {samples:.3g} samples, at most {MOST_SAMPLES:.0e} a record are read: keep a "
-            f"part of it, or every {int(-(-samples // MOST_SAMPLES))}th row"
+            f"{path}: about {samples:.3g} samples, at most {RECORDS.most_samples:.0e} a record are read: "
+            f"keep a part of it, or every {int(-(-samples // RECORDS.most_samples))}th row"
         )
 
 

@@ -12,11 +12,9 @@ from separatrix.discovery.measured.arrays import Found, column_of, common_times
 from separatrix.discovery.measured.header import is_stated
 from separatrix.discovery.measured.tables import is_column
 from separatrix.discovery.measured.tdms_bursts import OFFSET, START, STEP, Burst, bursts_of
+from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 from separatrix.extras import library
-
-# of a step, by which a burst may begin beside where the last one ended
-_BESIDE = 0.5
 
 
 def read_tdms(path: Path, names: Mapping[str, str]) -> Found:
@@ -72,7 +70,7 @@ def _times(path: Path, name: str, size: int, bursts: list[Burst], found: Found) 
             seconds, fractions = (a - b for a, b in zip(start, begin, strict=True))
             first += seconds + fractions / 2.0**64
         before, stated = burst.clock, before
-        if parts and (before == stated or abs(first - end) <= _BESIDE * step):
+        if parts and (before == stated or abs(first - end) <= RECORDS.beside_burst * step):
             first = end
         elif parts:
             if first < end:

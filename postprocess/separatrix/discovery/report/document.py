@@ -92,6 +92,12 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "at 1 these "
         "records do not distinguish the two.",
     )
+    _show_fits(by_key, details)
+    return parts
+
+
+def _show_fits(by_key: dict[str, Section], details: h5py.File) -> None:
+    """Figures of the fits of both machines."""
     _show(
         by_key["residuals"],
         "residual",
@@ -119,7 +125,6 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "residuals in standard "
         "deviations of the noise; grey: 95 % of noise.",
     )
-    return parts
 
 
 def _first_page(section: Section, verdict: dict) -> None:

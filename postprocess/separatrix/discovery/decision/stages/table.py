@@ -4,30 +4,32 @@
 
 from dataclasses import replace
 
-from separatrix.discovery.decision.characterise import Character
-from separatrix.discovery.decision.decide import Decision
 from separatrix.discovery.decision.flexible import best_table
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.decision.stages.character import Character
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.curves import fits_machine
 from separatrix.discovery.fitting.members import MEMBERS
 
 
-def with_law(context: SearchContext, decision: Decision) -> Decision:
-    """The decision with the characterised force as a table, or with the reason why the simulator has none.
+def table(state: SearchState) -> SearchState:
+    """Add a characterised force to the case as a table, or the reason why the simulator has none.
 
     The table must close as much of the gap as a characterised force, on fitted and on held-out records.
     """
+    return state.decided(with_law(state.context, state.decision))
+
+
+def with_law(context: SearchContext, decision: Decision) -> Decision:
+    """The decision with that table or that reason."""
     if decision.suspected is not None:
         found = _law(context, decision, decision.suspected)
         if not isinstance(found, ScoredCandidate):
             return decision
         return replace(decision, outcome="characterised", characters=[decision.suspected], added=found)
-    if decision.outcome != "characterised":
-        return decision
-    if isinstance(decision.rounds[0].base.problem, CoordinateProblem):
+    if not decision.rounds[0].base.problem.has_tables:
         return replace(decision, not_added="nothing is added to the case: tables are laws of one body")
     reasons = []
     for character in decision.characters:

@@ -7,14 +7,14 @@ may have columns with separate coefficients for each interval of a record: an os
 the initial value of a hidden state.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from separatrix.discovery.fitting.fit import Fit
-from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import (
     after_impacts,
     extensions,
@@ -24,26 +24,7 @@ from separatrix.discovery.fitting.motions import (
     scaled_motion,
     splines,
 )
-from separatrix.discovery.fitting.problem import Problem
-from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.response import force_columns, kick_columns
-
-# drive periods, or periods of the natural frequency, over which an oscillation keeps its phase
-_COHERENT_PERIODS = 12
-# frequencies of an oscillation over the natural frequency: of stiffness, friction or force; of restitution
-_WAVES, _SLOW_WAVES = (0.3, 4.0), (0.08, 0.6)
-# time constants, delays over the natural period; frequencies of an attached mass over the natural frequency
-_RELAXATIONS, _DELAYS, _ATTACHED = (0.02, 1.5), (0.05, 0.6), (1.6, 7.0)
-_GRID = 20
-# damping ratios of an attached mass that are tried
-_DAMPINGS = (0.005, 0.02, 0.08)
-# parts of a delay at the beginning of a record, before which the motion is not known
-_BEGINNINGS = 4
-# integration steps of a hidden state per natural period
-_STEPS = 100
-_FEWEST_IMPACTS, _FEWEST_AFTER = 4, 100
-# shortest way after a turning point, over the longest, and knots of its function
-_SHORTEST_WAY, _WAY_KNOTS = 2e-3, 12
+from separatrix.discovery.policy import SEARCH
 
 Columns = np.ndarray | None
 
@@ -52,7 +33,7 @@ Columns = np.ndarray | None
 class Motion:
     """A fitted motion of training or held-out records; times are from the start of each record [s]."""
 
-    problem: Problem
+    problem: Likelihood
     fit: Fit
     mass: float
     # natural frequency [rad/s]
@@ -95,9 +76,8 @@ class Hypothesis:
     values: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
 
-def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
+def motion_of(problem: Likelihood, fit: Fit, mass: float, natural: float) -> Motion:
     """The motion of a fit."""
-    problem, fit = one.problem, one.fit
     t = np.zeros(problem.segments.inside.shape)
     frequency = natural
     for number, prepared in enumerate(problem.prepared):
@@ -105,24 +85,26 @@ def motion_of(one: Fitted | Prediction, mass: float, natural: float) -> Motion:
         t[rows] = prepared.samples.t[problem.segments.index[rows]] - prepared.samples.t[0]
         frequency = prepared.frequency or frequency
     phase = scaled_motion(problem, fit)["phase"]
-    coherence_time = _COHERENT_PERIODS * 2 * np.pi / frequency
+    coherence_time = SEARCH.coherent_periods * 2 * np.pi / frequency
     spring = None if phase is None else extensions(problem, fit)
     good = problem.segments.inside & fit.good[:, None]
     return Motion(problem, fit, mass, natural, coherence_time, t, phase, spring, good)
 
 
-def hypotheses(training: Motion) -> Iterator[Hypothesis]:
-    """All that are tried; knots and scales are those of the training records."""
+def hypotheses(training: Motion, more: Iterable[Hypothesis] = ()) -> Iterator[Hypothesis]:
+    """All that are tried, and `more`; knots and scales are those of the training records."""
     yield from _smooth(training)
     yield from _times(training)
     yield from memories(training)
-    if training.problem.in_force:
-        yield _after_turning(training)
-        yield Hypothesis(
-            ("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record"
-        )
-    if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= _FEWEST_IMPACTS:
+    yield from more
+    if np.count_nonzero(impacts_at(training.problem, training.fit)[1]) >= SEARCH.impacts_of_hypothesis:
         yield from _at_impacts(training)
+
+
+def of_known_motion(training: Motion) -> Iterator[Hypothesis]:
+    """Those of a force along a known motion: its way since it turned, the drift of its sensor."""
+    yield _after_turning(training)
+    yield Hypothesis(("slow time",), lambda m, _: (None, _force(m, _drifts(m))), "a + b t, of each record")
 
 
 def _smooth(training: Motion) -> Iterator[Hypothesis]:
@@ -165,7 +147,7 @@ def _times(training: Motion) -> Iterator[Hypothesis]:
         (("direction of motion",), lambda m: np.sign(m.v)[:, :, None], " sign(v)"),
         (("position",), lambda m: np.stack([m.x - middle, np.ones_like(m.x)], axis=2), " (x - x0)"),
     )
-    waves = _frequencies(training, _WAVES)
+    waves = _frequencies(training, SEARCH.waves)
     for names, factor, text in factors:
         yield _function(("slow time", *names), lambda m, f=factor: m.t[:, :, None] * f(m), f"a t{text}")
         yield Hypothesis(
@@ -184,7 +166,8 @@ def memories(training: Motion) -> Iterator[Hypothesis]:
             _force(m, -_by_record(m, lambda t, x: _relaxed(t, x, tau))),
             _force(m, _in_records(m, _by_record(m, lambda t, x: np.exp(-t / tau)[:, None]))),
         ),
-        "-a z, z' = v - z/tau", ("time constant tau", "s"), True, period * np.geomspace(*_RELAXATIONS, _GRID),
+        "-a z, z' = v - z/tau", ("time constant tau", "s"), True,
+        period * np.geomspace(*SEARCH.relaxations, SEARCH.hidden_grid),
     )  # fmt: skip
     yield Hypothesis(
         ("memory",),
@@ -192,9 +175,10 @@ def memories(training: Motion) -> Iterator[Hypothesis]:
             _force(m, -_by_record(m, lambda t, x: _late(t, x, tau))),
             _force(m, _in_records(m, _beginning(m, tau))),
         ),
-        "-a (x(t - tau) - x0)", ("delay tau", "s"), True, period * np.linspace(*_DELAYS, _GRID),
+        "-a (x(t - tau) - x0)", ("delay tau", "s"), True,
+        period * np.linspace(*SEARCH.delays, SEARCH.hidden_grid),
     )  # fmt: skip
-    for zeta in _DAMPINGS:
+    for zeta in SEARCH.attached_dampings:
         yield Hypothesis(
             ("memory",),
             lambda m, w, zeta=zeta: (
@@ -203,14 +187,14 @@ def memories(training: Motion) -> Iterator[Hypothesis]:
             ),
             "a (z - x), z'' + 2 zeta w z' + w^2 z = w^2 x",
             (f"damping ratio zeta near {zeta:g} and a frequency w", "rad/s"),
-            values=training.natural * np.geomspace(*_ATTACHED, 2 * _GRID),
+            values=training.natural * np.geomspace(*SEARCH.attached, 2 * SEARCH.hidden_grid),
         )  # fmt: skip
 
 
 def _after_turning(training: Motion) -> Hypothesis:
     """Friction that builds up over a way after a turning point, by a spring or a play in series."""
     longest = float(_ways(training)[training.good].max())
-    inner = longest * np.append(0.0, np.geomspace(_SHORTEST_WAY, 1.0, _WAY_KNOTS))
+    inner = longest * np.append(0.0, np.geomspace(SEARCH.shortest_way, 1.0, SEARCH.way_knots))
     knots = np.concatenate([[0.0] * 3, inner, [longest] * 3])
     return _function(
         ("direction of motion", "way since it turned"),
@@ -241,7 +225,7 @@ def _at_impacts(training: Motion) -> Iterator[Hypothesis]:
         return (at * speed * (before / speed) ** power)[:, :, None]
 
     def kick(m: Motion, changes: np.ndarray) -> np.ndarray:
-        return kick_columns(m.problem, m.fit, changes)
+        return m.problem.kick_columns(m.fit, changes)
 
     yield Hypothesis(
         ("impact speed",),
@@ -252,7 +236,7 @@ def _at_impacts(training: Motion) -> Iterator[Hypothesis]:
     )
     since = after_impacts(training.problem, training.fit)
     known = training.good & np.isfinite(since)
-    if np.count_nonzero(known) > _FEWEST_AFTER:
+    if np.count_nonzero(known) > SEARCH.samples_after_impacts:
         knots = knots_of(since[known], 12)
 
         def after(m: Motion) -> np.ndarray:
@@ -264,7 +248,7 @@ def _at_impacts(training: Motion) -> Iterator[Hypothesis]:
         ("oscillating time", "impacts"),
         lambda m, w: (None, kick(m, _in_intervals(m, _wave(m, w, rebounds(m))))),
         "a cos(w t + c) V", ("frequency w", "rad/s"),
-        values=_frequencies(training, _SLOW_WAVES),
+        values=_frequencies(training, SEARCH.slow_waves),
     )  # fmt: skip
 
 
@@ -274,7 +258,7 @@ def _function(depends_on: tuple[str, ...], values: Callable, formula: str = "") 
 
 
 def _force(m: Motion, values: np.ndarray) -> np.ndarray:
-    return force_columns(m.problem, m.fit, values, m.mass)
+    return m.problem.force_columns(m.fit, values, m.mass)
 
 
 def _frequencies(m: Motion, ends: tuple[float, float]) -> np.ndarray:
@@ -320,7 +304,9 @@ def _by_record(m: Motion, make: Callable[[np.ndarray, np.ndarray], np.ndarray]) 
         if t.size < 2:
             continue
         t, first = np.unique(t, return_index=True)
-        even = np.arange(0.0, prepared.samples.t[-1] - prepared.samples.t[0], 2 * np.pi / m.natural / _STEPS)
+        even = np.arange(
+            0.0, prepared.samples.t[-1] - prepared.samples.t[0], 2 * np.pi / m.natural / SEARCH.hidden_steps
+        )
         values = make(even, np.interp(even, t, m.x[rows][usable][first]))
         if found.shape[2] != values.shape[1]:
             found = np.zeros((*m.x.shape, values.shape[1]))
@@ -344,8 +330,8 @@ def _late(t: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
 
 def _beginning(m: Motion, tau: float) -> np.ndarray:
     """Tent functions over the first `tau` of a record, where the delayed motion is unknown."""
-    centre = np.arange(_BEGINNINGS) * tau / (_BEGINNINGS - 1)
-    tents = np.maximum(0, 1 - np.abs(m.t[:, :, None] - centre) * (_BEGINNINGS - 1) / tau)
+    centre = np.arange(SEARCH.beginnings) * tau / (SEARCH.beginnings - 1)
+    tents = np.maximum(0, 1 - np.abs(m.t[:, :, None] - centre) * (SEARCH.beginnings - 1) / tau)
     return tents * (m.t <= tau)[:, :, None]
 
 

@@ -11,32 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision
-from separatrix.discovery.decision.hypotheses import Hypothesis, Motion, hypotheses, memories, motion_of
-from separatrix.discovery.decision.joint_hypotheses import hypotheses_at, motion_at
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import family_wise
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.fitting.hypotheses import Hypothesis, Motion
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.rig import evidence_of_imperfections
-from separatrix.discovery.fitting.sensed import SensedData
-
-# least usable eigenvalue of scaled normal equations: of motions, and of forces, which are exact
-_USABLE, _EXACT = 1e-6, 1e-11
-# of the distance of the values of a constant that are tried, towards the best
-_HALVINGS = 3
-# factor of the lowest value of a constant below which a hidden state is none
-_FADED = 1.3
-# share of the best evidence from which on a variable of the same kind may be the right one, and the share of
-# the gap that the best closes from which on it is not
-_AKIN, _NEARLY_ALL = 0.4, 0.9
-
-
-# share of the gap that must be closed, linearised, for a location among several bodies: a force at a wrong
-# one closes most of a large gap, too
-_AT_LOCATION = 0.95
+from separatrix.discovery.policy import SEARCH
 
 
 @dataclass
@@ -80,20 +62,24 @@ class Character:
         }
 
 
+def has_gap(state: SearchState) -> bool:
+    """Whether the base machine leaves a gap on held-out records."""
+    predicted = state.decision.predicted
+    return predicted is not None and predicted.fit.excess > 0
+
+
+def character(state: SearchState) -> SearchState:
+    """Add to the decision on what an unnamed gap depends."""
+    return state.decided(characterised(state.context, state.decision))
+
+
 def characterised(context: SearchContext, decision: Decision) -> Decision:
     """The decision with what is known of an unnamed gap; unchanged where nothing is certain."""
     base, predicted = decision.rounds[0].base, decision.predicted
-    if decision.outcome != "not-in-catalogue" or predicted is None or predicted.fit.excess <= 0:
-        return decision
-    if isinstance(base.problem, CoordinateProblem):
-        training, held_out = motion_at(base, context.training), motion_at(predicted, context.held_out)
-        tried = hypotheses_at(training)
-    else:
-        training, held_out = _motions(context, base, predicted)
-        tried = hypotheses(training)
-    found = [_best(training, held_out, one) for one in tried]
+    training, held_out = motions(context, base, predicted)
+    found = [best_of_hypothesis(training, held_out, one) for one in base.problem.hypotheses(training)]
     best = max(found, key=lambda one: one.evidence)
-    if not _known(best, context):
+    if not _known(best, context, base.problem.locates):
         return replace(decision, suspected=best if _likely(best, context) else None)
     others: dict[tuple[str, ...], Character] = {}
     for one in sorted(found, key=lambda one: -one.evidence):
@@ -103,50 +89,18 @@ def characterised(context: SearchContext, decision: Decision) -> Decision:
     return replace(decision, outcome="characterised", characters=[best, *others.values()])
 
 
-def hidden_state_tested(context: SearchContext, decision: Decision) -> Decision:
-    """The decision without its names where a hidden state explains clearly more than they do.
-
-    The catalogue has no hidden state, and a function of speed, position or phase reproduces it in part. A
-    right name leaves nothing to explain, so the state must explain more beside the names too, and more than
-    imperfections of the rig.
-    """
-    base, predicted = decision.rounds[0].base, decision.predicted
-    if not decision.accepted or predicted is None or predicted.fit.excess <= 0:
-        return decision
-    name = decision.accepted[0]
-    if context.options.quick or isinstance(base.problem, CoordinateProblem) or name.prediction is None:
-        return decision
-    training, held_out = _motions(context, base, predicted)
-    best = max((_best(training, held_out, one) for one in memories(training)), key=lambda one: one.evidence)
-    imperfections = evidence_of_imperfections(name.fitted, name.prediction)
-    least = context.options.needed * context.options.separation
-    lead = best.evidence - name.own_evidence / max(1.0, name.fitted.fit.reduced_chi2) - imperfections
-    if lead < least:
-        return decision
-    beside = _best(*_motions(context, name.fitted, name.prediction), best.hypothesis)
-    if beside.evidence - imperfections < least:
-        return decision
-    gap = replace(
-        decision, outcome="not-in-catalogue", accepted=[], alternatives=[], rivals=[], equivalent=False
-    )
-    found = characterised(context, gap)
-    if not found.characters or found.characters[0].hypothesis.depends_on != best.hypothesis.depends_on:
-        return decision
-    names = " and ".join(name.fitted.names)
-    return replace(found, reasons=[f"a hidden state explains more than {names} (log-likelihood {lead:.3g})"])
-
-
-def _motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
-    """The motion of one body in training and on held-out records."""
-    natural = _natural_frequency(context)
-    training, held_out = (motion_of(one, context.scales.mass, natural) for one in (base, predicted))
+def motions(context: SearchContext, base: Fitted, predicted: Prediction) -> tuple[Motion, Motion]:
+    """The motion in training and on held-out records."""
+    pairs = (base, context.training), (predicted, context.held_out)
+    mass, natural = context.scales.mass, _natural_frequency(context)
+    training, held_out = (one.problem.motion(one.fit, data, mass, natural) for one, data in pairs)
     return training, held_out
 
 
-def _known(best: Character, context: SearchContext) -> bool:
+def _known(best: Character, context: SearchContext, located: bool) -> bool:
     """Whether a hypothesis closes most of the gap, in training and on held-out records, and not by chance."""
     options = context.options
-    least = _AT_LOCATION if isinstance(context.training, SensedData) else options.characterised
+    least = SEARCH.closed_at_location if located else options.characterised
     return best.p < options.detection_level and min(best.closed, best.held_out_closed) > least
 
 
@@ -159,8 +113,8 @@ def _akin(one: Character, best: Character) -> bool:
     """Whether only the second variable differs, which is not determined while the best leaves a gap."""
     return (
         one.hypothesis.depends_on[0] == best.hypothesis.depends_on[0]
-        and one.evidence > _AKIN * best.evidence
-        and min(best.closed, best.held_out_closed) < _NEARLY_ALL
+        and one.evidence > SEARCH.akin * best.evidence
+        and min(best.closed, best.held_out_closed) < SEARCH.nearly_all
     )
 
 
@@ -169,7 +123,7 @@ def _left(one: Character, fit) -> float:
     return max(1.0, 1 + (1 - one.closed) * fit.excess / max(1.0, fit.samples))
 
 
-def _best(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Character:
+def best_of_hypothesis(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Character:
     """A hypothesis with its constant where it closes most, to a fraction of the distance of those tried."""
     values = hypothesis.values
     tried = {float(one): _gain(training, hypothesis, one) for one in values}
@@ -177,12 +131,12 @@ def _best(training: Motion, held_out: Motion, hypothesis: Hypothesis) -> Charact
     if values.size > 1:
         index = int(np.searchsorted(values, best))
         step = np.diff(values)[max(0, min(index, values.size - 2))]
-        for _ in range(_HALVINGS):
+        for _ in range(SEARCH.constant_halvings):
             step /= 2
             tried |= {one: _gain(training, hypothesis, one) for one in (best - step, best + step)}
             best = max(tried, key=tried.get)
     found = _scored(training, held_out, hypothesis, best)
-    if hypothesis.fades and best < _FADED * values[0]:
+    if hypothesis.fades and best < SEARCH.faded * values[0]:
         found.evidence = -np.inf
     return found
 
@@ -202,7 +156,7 @@ def _movable(motion: Motion) -> np.ndarray:
     A bound that the machine ran into without it holds them, but where the force is compared: that is so
     nearly linear in them that they may come back from anywhere.
     """
-    return ~motion.fit.at_bound | motion.problem.in_force
+    return ~motion.fit.at_bound | motion.problem.exact
 
 
 def _scored(training: Motion, held_out: Motion, hypothesis: Hypothesis, constant: float) -> Character:
@@ -246,7 +200,7 @@ def _solved(
     """Solution (0 where closed), the decrease of chi^2, and the rank."""
     scaled, size = _scaled(matrix[np.ix_(open_, open_)])
     values, vectors = np.linalg.eigh(scaled)
-    usable = values > (_EXACT if motion.problem.in_force else _USABLE)
+    usable = values > (SEARCH.usable_force if motion.problem.exact else SEARCH.usable_motion)
     parts = vectors[:, usable].T @ (gradient[open_] / size)
     found = np.zeros(open_.size)
     found[open_] = vectors[:, usable] @ (parts / values[usable]) / size
@@ -284,4 +238,4 @@ def _predicted_fall(
 def _natural_frequency(context: SearchContext) -> float:
     """That of the machine of the case [rad/s], or where it has none, of its motion in the records."""
     stated = next((one.natural for one in context.training.prepared if one.natural), None)
-    return stated or context.scales.speed / context.scales.length
+    return stated or context.scales.frequency

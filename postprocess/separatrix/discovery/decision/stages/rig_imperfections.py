@@ -11,44 +11,47 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision, decide
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
-from separatrix.discovery.fitting.coordinates import CoordinateProblem
+from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.fit import Fit, minimise
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import IMPERFECTION_SIZE
-from separatrix.discovery.fitting.problem import Problem
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import (
     as_nuisances,
     imperfections_of,
-    usual_acceleration,
     weight_of_imperfections,
 )
-
-# log-likelihood in training, and its share of the gap, from which imperfections of a rig may hide an effect
-_HIDING, _HIDING_SHARE = 10.0, 0.3
-# iterations of the motion along which they act: it is that of the machine fitted beside them
-_TIMES = 2
-# progress of the second search
-_BEGUN, _ENDED = 0.85, 0.89
+from separatrix.discovery.fitting.rig_columns import usual_acceleration
+from separatrix.discovery.policy import FIT, SEARCH
 
 
-def decide_with_imperfections(context: SearchContext, base: Fitted) -> tuple[SearchContext, Decision]:
-    """Decide; without a name, decide again with fitted imperfections of the rig if they explain much.
+def hidden_by_imperfections(state: SearchState) -> bool:
+    """Whether there is no name and imperfections explain much of the residual in training."""
+    base = state.round.base
+    if _sure(state.decision) or state.context.options.quick or not base.problem.fits_imperfections:
+        return False
+    if not base.fit.good.any():
+        return False
+    weight, _ = weight_of_imperfections(base, None)
+    return weight > max(SEARCH.hiding, SEARCH.hiding_share * 0.5 * base.fit.excess)
 
-    The second decision, with its context, is returned if it is a name.
-    """
-    first = decide(context, base)
-    if not _may_hide(context, first):
-        return context, first
-    context.options.progress("searching beside imperfections of the rig", _BEGUN)
-    found = _with_imperfections(context, first.rounds[0].base, first.predicted)
+
+def beside_imperfections(state: SearchState) -> SearchState:
+    """Begin the search again beside fitted imperfections of the rig; unchanged if their fit fails."""
+    found = _with_imperfections(state.context, state.round.base, state.decision.predicted)
     if found is None:
-        return context, first
-    second = decide(*found)
-    return (found[0], second) if _sure(second) and _small(second.accepted[0]) else (context, first)
+        return state
+    context, base = found
+    return state.again(context=context, base=base, noise_measured=False, without_imperfections=state)
+
+
+def with_or_without(state: SearchState) -> SearchState:
+    """Keep the search beside imperfections if it found a name, else return to the one without them."""
+    if _sure(state.decision) and _small(state.decision.accepted[0]):
+        return replace(state, without_imperfections=None)
+    return replace(state.without_imperfections, steps=state.steps)
 
 
 def _sure(decision: Decision) -> bool:
@@ -61,7 +64,7 @@ def _sure(decision: Decision) -> bool:
 
 def _small(one: ScoredCandidate) -> bool:
     """Whether no fitted imperfection is at its largest size; a larger one is not an imperfection."""
-    pairs: list[tuple[Problem, Fit]] = [(one.fitted.problem, one.fitted.fit)]
+    pairs: list[tuple[Likelihood, Fit]] = [(one.fitted.problem, one.fitted.fit)]
     if one.prediction is not None:
         pairs.append((one.prediction.problem, one.prediction.fit))
     return not any(
@@ -71,27 +74,12 @@ def _small(one: ScoredCandidate) -> bool:
     )
 
 
-def _may_hide(context: SearchContext, decision: Decision) -> bool:
-    """Whether there is no name and imperfections explain much of the residual in training."""
-    base = decision.rounds[0].base
-    if _sure(decision) or context.options.quick or isinstance(base.problem, CoordinateProblem):
-        return False
-    if base.problem.in_force or not base.fit.good.any():
-        return False
-    weight, _ = weight_of_imperfections(base, None)
-    return weight > max(_HIDING, _HIDING_SHARE * 0.5 * base.fit.excess)
-
-
 def _with_imperfections(
     context: SearchContext, base: Fitted, prediction: Prediction | None
 ) -> tuple[SearchContext, Fitted] | None:
     """Records with imperfections of their rig, and the machine fitted beside these; None if the fit fails."""
     machine, values, followed = base.problem.free, base.fit.values, base.fit.good.sum()
-    progress = context.options.progress
-    options = replace(
-        context.options, progress=lambda text, at: progress(text, _BEGUN + (_ENDED - _BEGUN) * at)
-    )
-    for turn in range(_TIMES):
+    for turn in range(SEARCH.imperfect_rounds):
         usual = usual_acceleration(base.problem, base.fit)
         tables = imperfections_of(base.problem, base.fit, usual)
         training, held_out = context.training.with_imperfections(tables), context.held_out
@@ -107,13 +95,13 @@ def _with_imperfections(
         training.base_starts = fit.starts
         context = replace(context, training=training, held_out=held_out)
         base, values = replace(base, problem=problem, fit=fit), fit.values
-    return replace(context, options=options), base
+    return context, base
 
 
 def in_words(fitted: Fitted) -> list[str]:
     """The sizes of imperfections that were fitted beside a machine, in a sentence; none if none were."""
     sizes = {
-        (one.path, one.record): IMPERFECTION_SIZE * abs(value)
+        (one.path, one.record): FIT.imperfection_size * abs(value)
         for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
         if one.is_imperfection
     }

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.discovery.decision.hypotheses import Hypothesis, Motion
-from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.joint_forces import POWERS, kicks_of
+from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.hypotheses import Hypothesis, Motion
+from separatrix.discovery.fitting.joint_forces import kicks_of
 from separatrix.discovery.fitting.joint_response import columns_of
+from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import clock_of, knots_of, products, splines
-from separatrix.discovery.fitting.refit import Fitted
-from separatrix.discovery.fitting.sensed import SensedData
-
-_KNOTS, _FEWER, _HARMONICS = 8, 4, 3
+from separatrix.discovery.policy import FIT, SEARCH
 
 
 @dataclass(frozen=True)
@@ -28,9 +26,8 @@ class SensedMotion(Motion):
     measured: np.ndarray | None = None
 
 
-def motion_at(one: Fitted | Prediction, data: SensedData) -> SensedMotion:
+def motion_at(problem: Likelihood, fit: Fit, data: object) -> SensedMotion:
     """The motion of a fit of several bodies; `t` is the time over a record, -1 to 1."""
-    problem, fit = one.problem, one.fit
     good = problem.segments.inside & fit.good[:, None]
     time, phase = clock_of(problem, fit)
     measured = fit.evaluation.motion.copy()
@@ -48,8 +45,8 @@ def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
         s, u = _extension(training, location.row), _speed(training, location.row)
         if not np.std(s[training.good]) > 0:
             continue
-        of_speed, of_extension = (knots_of(one[training.good], _KNOTS) for one in (u, s))
-        coarse = [knots_of(one[training.good], _FEWER) for one in (u, s)]
+        of_speed, of_extension = (knots_of(one[training.good], SEARCH.joint_knots) for one in (u, s))
+        coarse = [knots_of(one[training.good], SEARCH.joint_knots_of_two) for one in (u, s)]
         row, name = location.row, location.name
 
         def over_speed(m: Motion, _: float, row=row, knots=of_speed) -> tuple:
@@ -77,7 +74,9 @@ def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
         for body, row in zip(structure.names, np.eye(structure.n), strict=True):
 
             def over_phase(m: Motion, _: float, row=row) -> tuple:
-                waves = [f(k * m.phase) for k in range(1, _HARMONICS + 1) for f in (np.sin, np.cos)]
+                waves = [
+                    f(k * m.phase) for k in range(1, SEARCH.joint_harmonics + 1) for f in (np.sin, np.cos)
+                ]
                 return _pushed(m, np.stack(waves, axis=2) * m.good[:, :, None], row), None
 
             yield Hypothesis((f"drive phase at {body}",), over_phase)
@@ -85,7 +84,7 @@ def hypotheses_at(training: Motion) -> Iterator[Hypothesis]:
 
         def at_impacts(m: Motion, _: float, path=path) -> tuple:
             # a held-out record may have too few of these impacts
-            nothing = np.zeros((*m.fit.evaluation.residual.shape, POWERS))
+            nothing = np.zeros((*m.fit.evaluation.residual.shape, FIT.kick_powers))
             return kicks_of(m.problem, m.fit).get(path, nothing), None
 
         yield Hypothesis((f"impact speed at {path}",), at_impacts)

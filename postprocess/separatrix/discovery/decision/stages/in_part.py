@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from separatrix.discovery.decision.decide import Decision, decide
 from separatrix.discovery.decision.gates import choice, pass_gates
 from separatrix.discovery.decision.other_machine import other_units
 from separatrix.discovery.decision.rounds import Round, SearchContext, pair_gains, run_round
@@ -28,35 +27,28 @@ from separatrix.discovery.decision.scoring import (
     scored,
 )
 from separatrix.discovery.decision.several import fit_set, over_base, without
+from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.ceiling import ceiling
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
-
-_PAIRS = 12
-_LEADERS = 2
-# share of the gap on held-out records that an effect must close to be worth a name
-_LEAST = 0.1
+from separatrix.discovery.policy import SEARCH
 
 
-def decide_in_part(context: SearchContext, base: Fitted) -> Decision:
-    """Return the strict decision on one effect, else the effects that help though more is missing."""
-    decision = decide(replace(context, options=replace(context.options, most_effects=1)), base)
-    if decision.outcome != "not-in-catalogue":
-        return decision
-    base = decision.rounds[0].base
-    rounds = decision.rounds[:1]
+def effects_in_part(state: SearchState) -> SearchState:
+    """Name the effects that help though more is missing."""
+    context, base = state.context, state.round.base
+    rounds = [state.round]
     accepted = _first(context, rounds[0])
     last = None
     while accepted is not None:
         last = accepted
         if len(last.fitted.names) >= context.options.most_effects:
             break
-        rounds.append(run_round(context, last.fitted, last.prediction, 0.9, 0.98))
+        rounds.append(run_round(context, last.fitted, last.prediction))
         accepted = _next(context, rounds[-1])
         if accepted is not None and not _all_needed(context, rounds[0], accepted):
             accepted = None
     if last is None:
-        return decision
+        return state
     whole = over_base(context, base, rounds[0].predicted, last)
     whole.gates, whole.p = last.gates, last.p
     whole.ceiling = ceiling(whole.fitted.problem, whole.fitted.fit, context.scales.mass)
@@ -64,16 +56,15 @@ def decide_in_part(context: SearchContext, base: Fitted) -> Decision:
     complete = bool(whole.leaves)
     whole.gates["adequate"] = complete
     odd = other_units(context.training, base.model)
-    return replace(
-        decision,
+    named = replace(
+        state.decision,
         outcome="ambiguous" if odd else "named",
         complete=complete,
         accepted=[whole],
-        alternatives=[],
-        rivals=[],
         rounds=rounds,
         reasons=[*([] if complete else remaining(context, whole)), *odd],
     )
+    return state.decided(named)
 
 
 def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
@@ -95,13 +86,13 @@ def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
     return reasons
 
 
-def nearest(context: SearchContext, decision: Decision) -> list[str]:
-    """The single effect that passes all gates but the adequacy where the strict decision names none."""
-    if decision.outcome != "not-in-catalogue":
-        return []
-    found = _next(context, decision.rounds[0])
+def nearest(state: SearchState) -> SearchState:
+    """Report the single effect that passes all gates but the adequacy, if there is one."""
+    found = _next(state.context, state.round)
+    if found is None:
+        return state
     hint = "passes every gate but the adequacy; --partial names what helps though a gap remains"
-    return [f"{found.name} {hint}"] if found else []
+    return state.decided(state.decision.because(f"{found.name} {hint}"))
 
 
 def _next(context: SearchContext, found: Round) -> ScoredCandidate | None:
@@ -125,13 +116,13 @@ def _first(context: SearchContext, found: Round) -> ScoredCandidate | None:
 def _pair(context: SearchContext, found: Round) -> ScoredCandidate | None:
     """Two effects that pass only together: each alone drives the base to where it should not be."""
     seconds = []
-    for one in [one for one in found.scored if one.fitted.fit.converged][:_LEADERS]:
+    for one in [one for one in found.scored if one.fitted.fit.converged][: SEARCH.leaders_in_part]:
         # some effects need another one: presliding needs dry friction
-        seconds.append(run_round(context, one.fitted, one.prediction, 0.9, 0.95))
+        seconds.append(run_round(context, one.fitted, one.prediction))
     singles = [one for second in seconds for one in second.scored]
     pairs = [over_base(context, found.base, found.predicted, one) for one in singles]
     tried = {frozenset(one.fitted.names) for one in pairs}
-    for _, one, other in pair_gains(found)[:_PAIRS]:
+    for _, one, other in pair_gains(found)[: SEARCH.pairs_in_part]:
         if frozenset((one, other)) in tried:
             continue
         fitted = fit_set(context, found, (one, other))
@@ -195,7 +186,7 @@ def worth_a_name(one: ScoredCandidate, found: Round) -> bool:
 
 
 def _closes(before: float, after: float) -> bool:
-    return before - after > _LEAST * max(before - 1.0, 0.0)
+    return before - after > SEARCH.closes_in_part * max(before - 1.0, 0.0)
 
 
 def _all_needed(context: SearchContext, first: Round, one: ScoredCandidate) -> bool:
