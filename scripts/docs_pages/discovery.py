@@ -4,7 +4,7 @@
 
 from pathlib import Path
 
-from evidence.markdown import table
+from evidence.evidence_rows import table
 from separatrix.discovery.decision.gates import DROP, GATES, GATES_OF_REST
 from separatrix.discovery.decision.plan import PLAN
 from separatrix.discovery.options import Options

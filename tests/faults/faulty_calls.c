@@ -4,8 +4,8 @@
 /* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
    call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
    write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
-   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. Without $FAULT_AT the
-   number of calls is added as a line to the file $FAULT_COUNT when the process ends. */
+   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. Without $FAULT_AT
+   the number of calls is added as a line to the file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -98,7 +98,7 @@ static int open_late(const char *path, int flags, mode_t mode) {
 
 int open(const char *path, int flags, ...) { OPEN_LATE }
 
-int open64(const char *path, int flags, ...) { OPEN_LATE }
+int open64(const char *path, int flags, ...){OPEN_LATE}
 
 ssize_t write(int descriptor, const void *data, size_t size) {
   const int number = fault_of(descriptor, 1);

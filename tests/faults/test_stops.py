@@ -202,7 +202,7 @@ def test_a_dead_rank_ends_the_job_and_the_others_report_how_to_continue(
 
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, ranks):
-    """It ends with code 75 and says how to go on, though nobody looks for signals meanwhile."""
+    """It ends with code 75 and reports how to go on, though nobody looks for signals meanwhile."""
     life.write_case(tmp_path)
     # The pilot points of a dry run take minutes each.
     long = ["--set", "run.duration=2e6", "--set", "integrator.event_budget=1000000000"]
