@@ -5,7 +5,7 @@
 module body_family
   use body_events, only: events_of_body
   use body_machine, only: body_machine_t
-  use build_motion, only: body_of
+  use build_motion, only: body_of, has_several
   use errors, only: error_t, fail
   use hybrid_machine, only: event_t
   use kinds, only: real64, wp
@@ -68,6 +68,10 @@ contains
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
+    if (has_several(laws)) then
+      call fail(error, exit_bad_case, 'body.law: found several bodies, allowed one: their variations are those of a structure')
+      return
+    end if
     call body_of(laws, family%options, machine, error)
     if (allocated(error)) return
     why = why_not_varied(machine%body)

@@ -91,8 +91,8 @@ def test_a_bar_on_a_wall_pushes_as_waves_predict(source_dir, build_dir, tmp_path
     """Rows of docs/validation.md: 16 modes and the flexibility of the others, against waves."""
     sys.path.insert(0, str(source_dir / "scripts" / "evidence"))
     try:
+        from evidence_program import Program
         from validation_structures_others import bar
-        from validation_structures_program import Program
     finally:
         sys.path.remove(str(source_dir / "scripts" / "evidence"))
     found = bar(Program(build_dir, tmp_path))
