@@ -14,7 +14,6 @@ module basin_driver
   use kinds, only: int64, wp
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
-  use point_columns, only: bytes_of_point, marks_of_attractor, point_values
   use refined_tile, only: pilot_share
   use restoring_law, only: position_is_angle
   use second_look, only: look_again, resume_second_look
@@ -29,8 +28,6 @@ module basin_driver
 
   public :: run_basin
 
-  !> Bytes of the origin of a point of a refined map.
-  integer, parameter :: bytes_of_origin = 1
   !> Slices up to which a dry run builds the catalogues.
   integer, parameter :: most_dry_slices = 16
 
@@ -112,17 +109,18 @@ contains
     integer, intent(in) :: tile(:)
     type(error_t), allocatable :: error
     real(wp) :: seconds, share
-    integer :: bytes
+    type(schema_t) :: schema
+    character(len=name_length), allocatable :: dimensions(:)
+    call describe_basin(session, work, schema, dimensions)
     if (work%refine%active) then
       call pilot_share(work, work%grid%shape, seconds, share, error)
       call session%stop_if(error)
-      bytes = bytes_of_point(marks_of_attractor) + bytes_of_origin
-      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes, seconds))
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, schema%bytes_of_point(), seconds))
       call session%journal%line('plan', 'about '//to_text(100*share, 2)//' % of the points computed (from a few blocks)')
     else
       call pilot_seconds(work, work%grid%shape, seconds, error)
       call session%stop_if(error)
-      call session%journal%line('plan', plan_text(work%grid%shape, tile, bytes_of_point(point_values), seconds))
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, schema%bytes_of_point(), seconds))
     end if
     call session%end_with(exit_done)
   end subroutine report_plan

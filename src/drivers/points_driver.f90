@@ -35,7 +35,7 @@ contains
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
     real(wp) :: seconds
-    integer :: points, bytes
+    integer :: points
     logical :: complete
     call open_session(command, session)
     work%variables = point_variables
@@ -58,8 +58,8 @@ contains
       call pilot_seconds(work, [size(work%list%x0)], seconds, error)
       call session%stop_if(error)
       call describe_points(work%list, schema)
-      bytes = int(schema%bytes()/size(work%list%x0) + schema%bytes_of_point())
-      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], bytes, seconds))
+      call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], &
+                                                  schema%bytes()/size(work%list%x0) + schema%bytes_of_point(), seconds))
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.true.)

@@ -21,7 +21,7 @@ module sweep_driver
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
-  use point_columns, only: at_impacts, at_reason, bytes_of_point, point_values
+  use point_columns, only: at_impacts, at_reason, point_values
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use sweep, only: hold_parameter, hold_t
@@ -129,7 +129,7 @@ contains
     type(branch_work_t), intent(inout) :: work
     type(error_t), allocatable :: error
     type(chains_t) :: chains
-    type(schema_t) :: schema
+    type(schema_t) :: schema, points
     character(len=:), allocatable :: plan
     real(wp) :: seconds
     integer :: holds
@@ -147,8 +147,9 @@ contains
         allocate (work%catalogues(0))
         call pilot_seconds(work, [size(values), product(sweep%starts)], seconds, error)
         call session%stop_if(error)
+        call add_map_variables(points, 'branch_', ['value', 'start'])
         plan = plan//'; many starts: '//plan_text([size(values), product(sweep%starts)], [1, product(sweep%starts)], &
-                                                  bytes_of_point(point_values), seconds)
+                                                  points%bytes_of_point(), seconds)
       else
         plan = plan//'; no many starts'
       end if

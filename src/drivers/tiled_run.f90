@@ -336,7 +336,8 @@ contains
 
   !> Points, tiles and bytes of a grid, and the time that `seconds_per_point` on one core mean.
   function plan_text(lengths, tile_shape, bytes_per_point, seconds_per_point) result(lines)
-    integer, intent(in) :: lengths(:), tile_shape(:), bytes_per_point
+    integer, intent(in) :: lengths(:), tile_shape(:)
+    integer(int64), intent(in) :: bytes_per_point
     real(wp), intent(in) :: seconds_per_point
     character(len=:), allocatable :: lines
     type(tiling_t) :: tiling

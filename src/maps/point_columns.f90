@@ -10,7 +10,7 @@ module point_columns
   implicit none
   private
 
-  public :: outcome_values, margin_or_infinite, bytes_of_point
+  public :: outcome_values, margin_or_infinite
 
   type, public :: point_column_t
     character(len=18) :: name
@@ -67,20 +67,6 @@ contains
       values(at_margin) = margin_or_infinite(f%grazing_margin)
     end associate
   end function outcome_values
-
-  !> Bytes in a file of the first `columns` values of a point.
-  pure integer function bytes_of_point(columns) result(bytes)
-    integer, intent(in) :: columns
-    character(len=len(point_table%type)) :: type
-    integer :: k, bits
-    bytes = 0
-    do k = 1, columns
-      type = point_table(k)%type
-      type = type(scan(type, '0123456789'):)
-      read (type, *) bits
-      bytes = bytes + bits/8
-    end do
-  end function bytes_of_point
 
   !> The smallest distance to a barrier; infinite where no turning point missed one.
   elemental real(wp) function margin_or_infinite(margin)
