@@ -8,7 +8,8 @@ module elementary
   implicit none
   private
 
-  public :: sine_cosine, exponential, exponential_minus_one, logarithm
+  public :: sine_cosine, exponential, exponential_minus_one, logarithm, tangent, arc_sine, arc_cosine, arc_tangent, &
+    hyperbolic_sine, hyperbolic_cosine, hyperbolic_tangent
 
 contains
 
@@ -40,5 +41,48 @@ contains
     real(wp) :: y
     y = log(x)
   end function logarithm
+
+  !> Tangent of an angle [rad].
+  pure elemental real(wp) function tangent(x)
+    real(wp), intent(in) :: x
+    tangent = tan(x)
+  end function tangent
+
+  !> Arc sine [rad].
+  pure elemental real(wp) function arc_sine(x)
+    real(wp), intent(in) :: x
+    arc_sine = asin(x)
+  end function arc_sine
+
+  !> Arc cosine [rad].
+  pure elemental real(wp) function arc_cosine(x)
+    real(wp), intent(in) :: x
+    arc_cosine = acos(x)
+  end function arc_cosine
+
+  !> (e**x - e**-x)/2.
+  pure elemental real(wp) function hyperbolic_sine(x)
+    real(wp), intent(in) :: x
+    hyperbolic_sine = sinh(x)
+  end function hyperbolic_sine
+
+  !> (e**x + e**-x)/2.
+  pure elemental real(wp) function hyperbolic_cosine(x)
+    real(wp), intent(in) :: x
+    hyperbolic_cosine = cosh(x)
+  end function hyperbolic_cosine
+
+  !> Hyperbolic tangent.
+  pure elemental real(wp) function hyperbolic_tangent(x)
+    real(wp), intent(in) :: x
+    hyperbolic_tangent = tanh(x)
+  end function hyperbolic_tangent
+
+  !> Angle [rad] of the point (x, y), from -pi to pi; 0 at the origin.
+  pure elemental real(wp) function arc_tangent(y, x)
+    real(wp), intent(in) :: y, x
+    arc_tangent = 0
+    if (max(abs(x), abs(y)) > 0) arc_tangent = atan2(y, x)
+  end function arc_tangent
 
 end module elementary

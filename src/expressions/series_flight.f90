@@ -1,0 +1,345 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Certified motion of z' = f(z) by Taylor series of one order, to the first zero of a guard.
+!>
+!> The length of a step follows from the last coefficients (Jorba & Zou 2005). A step is accepted if an enclosure is proven: with
+!> B the range of the Taylor polynomials widened by a margin, and M bounds over B of the next coefficients, |M h^(p+1)| less
+!> than the margin proves that the solution stays in B and that the remainder is no larger (Nedialkov, Jackson & Pryce 2001).
+!> With the same bound for each guard, no zero before the one that ends the motion is possible: see `bernstein`.
+module series_flight
+  use bernstein, only: bernstein_of, first_crossing
+  use elementary, only: exponential, logarithm
+  use intervals, only: interval_t
+  use kinds, only: wp
+  use operations, only: op_add, op_select, op_subtract
+  use tape, only: tape_t
+  use tape_bounds, only: bound_coefficients
+  use tape_series, only: expand, prepare_series, series_t
+  implicit none
+  private
+
+  public :: start_flight, set_branches, advance_flight
+
+  !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
+  !> proven; at the budget of steps.
+  integer, parameter, public :: flight_reached = 0, flight_crossed = 1, flight_left_domain = 2, flight_no_progress = 3, &
+    flight_step_budget = 4
+
+  !> The last term of a step is then some epsilon of the first.
+  integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
+  integer, parameter :: most_tries = 200
+  !> Shortest step, as a part of the time.
+  real(wp), parameter :: shortest = 0.01_wp*epsilon(1.0_wp)
+
+  !> A function of the state that ends a motion where it crosses zero.
+  type, public :: guard_t
+    integer :: node = 0
+    !> 1 upwards, -1 downwards, 0 both.
+    integer :: direction = 0
+  end type guard_t
+
+  type, public :: flight_t
+    type(tape_t) :: tape
+    real(wp), allocatable :: parameters(:)
+    integer, allocatable :: rates(:)
+    !> The guards of the caller, then the switching functions of the tape; those that the branches use are active.
+    type(guard_t), allocatable :: guards(:)
+    logical, allocatable :: is_active(:)
+    real(wp), allocatable :: state(:)
+    real(wp) :: time = 0
+    !> Order of the zero that each guard has at the start, 0 for none: such a zero is no crossing. Set to 1 for the guards that
+    !> ended the last motion and to 0 for others; the caller sets what its event changes.
+    integer, allocatable :: zeros(:)
+    !> The guards that crossed at the end.
+    logical, allocatable :: crossed(:)
+    !> Node of the operation that is not defined.
+    integer :: fault = 0
+    !> Steps, enclosures tried for them, and decisions that even short steps left to rounding.
+    integer :: steps = 0, tries = 0, uncertain = 0
+    integer :: step_budget = 1000000
+    !> Margin of an enclosure, as a part of the state.
+    real(wp) :: margin = epsilon(1.0_wp)**0.6_wp
+    type(series_t), private :: series, bounds
+    !> Length of the last proven step, as a part of that by the last coefficients.
+    real(wp), private :: proven = 1
+  end type flight_t
+
+contains
+
+  !> A motion of a system: rates of its variables and guards are nodes of the tape. The caller sets time, state and branches.
+  pure subroutine start_flight(flight, tape, rates, guards, parameters)
+    type(flight_t), intent(out) :: flight
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: rates(:)
+    type(guard_t), intent(in) :: guards(:)
+    real(wp), intent(in) :: parameters(:)
+    integer :: k, n
+    flight%tape = tape
+    flight%rates = rates
+    flight%parameters = parameters
+    n = size(guards) + size(tape%switches)
+    flight%guards = [guards, (guard_t(tape%switches(k)%argument), k=1, size(tape%switches))]
+    allocate (flight%is_active(n), flight%zeros(n), flight%crossed(n), flight%state(size(rates)))
+    flight%zeros = 0
+    flight%crossed = .false.
+    flight%state = 0
+  end subroutine start_flight
+
+  !> Chooses the branch of every switching function by a sign; needed once before the motion also without any.
+  pure subroutine set_branches(flight, branches)
+    type(flight_t), intent(inout) :: flight
+    integer, intent(in) :: branches(:)
+    integer :: i, own
+    own = size(flight%guards) - size(branches)
+    call prepare_series(flight%tape, series_order, flight%rates, flight%guards(:own)%node, branches, flight%series)
+    call prepare_series(flight%tape, series_order + 1, flight%rates, flight%guards(:own)%node, branches, flight%bounds)
+    flight%is_active = .true.
+    flight%is_active(own + 1:) = .false.
+    do i = 1, flight%tape%count
+      if (flight%tape%nodes(i)%operation == op_select .and. flight%series%is_used(i)) then
+        flight%is_active(own + flight%tape%nodes(i)%first) = .true.
+      end if
+    end do
+  end subroutine set_branches
+
+  !> Moves on to the time `until`, or to the first crossing of a guard. `status` states how it ended.
+  pure subroutine advance_flight(flight, until, status)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(in) :: until
+    integer, intent(out) :: status
+    real(wp) :: step, fraction, longest
+    integer :: i
+    flight%crossed = .false.
+    do i = 1, flight%step_budget
+      status = flight_reached
+      if (flight%time >= until) return
+      call expand(flight%tape, flight%state, flight%parameters, flight%series, flight%fault)
+      status = flight_left_domain
+      if (flight%fault > 0) return
+      longest = until - flight%time
+      call take_step(flight, longest, step, fraction, status)
+      if (status == flight_no_progress .or. status == flight_left_domain) return
+      flight%steps = flight%steps + 1
+      call move(flight, step*min(fraction, 1.0_wp))
+      if (fraction > 1 .and. step >= longest) flight%time = until
+      flight%zeros = merge(1, 0, flight%crossed)
+      if (status == flight_crossed) return
+    end do
+    status = flight_step_budget
+  end subroutine advance_flight
+
+  !> The longest proven step up to `longest`, and the fraction of it at which the first guard crosses zero; 2 without one.
+  pure subroutine take_step(flight, longest, step, fraction, status)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(in) :: longest
+    real(wp), intent(out) :: step, fraction
+    integer, intent(out) :: status
+    real(wp) :: natural, excess, scaling
+    integer :: try, fault
+    logical :: is_certain
+    natural = natural_step(flight)
+    step = min(natural*min(1.0_wp, flight%proven), longest)
+    fraction = 2
+    fault = 0
+    status = flight_reached
+    do try = 1, most_tries
+      flight%tries = flight%tries + 1
+      if (.not. step > shortest*max(abs(flight%time), longest)) exit
+      call enclose(flight, step, excess)
+      if (flight%fault > 0) then
+        fault = flight%fault
+        step = 0.5_wp*step
+        cycle
+      end if
+      ! What the remainder allows: it grows with the step to the power of its order.
+      scaling = exponential(logarithm(0.5_wp/max(excess, 1e-90_wp))/(series_order + 1))
+      flight%proven = step/natural*scaling
+      if (excess > 1) then
+        step = step*max(0.25_wp, min(0.9_wp, scaling))
+        cycle
+      end if
+      call find_crossing(flight, step, fraction, is_certain)
+      if (.not. is_certain) then
+        step = 0.5_wp*step
+        cycle
+      end if
+      if (fraction <= 1) status = flight_crossed
+      return
+    end do
+    ! Next to the end of a domain steps may shrink before one leaves it: a longer one does.
+    if (fault == 0) then
+      call enclose(flight, 16*natural, excess)
+      fault = flight%fault
+    end if
+    flight%fault = fault
+    status = merge(flight_left_domain, flight_no_progress, fault > 0)
+  end subroutine take_step
+
+  !> Length of a step whose last term is epsilon times one of the first terms, in every variable. Symmetric motions lack some of
+  !> the last orders: those before count as if terms shrank evenly.
+  pure real(wp) function natural_step(flight) result(step)
+    type(flight_t), intent(in) :: flight
+    real(wp) :: size_of(0:series_order), reach
+    integer :: i, k, j, node
+    ! Its powers must not overflow.
+    real(wp), parameter :: most = 30
+    real(wp) :: smallest
+    smallest = logarithm(epsilon(1.0_wp))
+    step = most
+    do i = 1, size(flight%rates)
+      node = flight%rates(i)
+      ! Coefficients of the rate; that of the state of order k + 1 is the one of order k over k + 1.
+      size_of(0) = abs(flight%state(i))
+      do k = 1, series_order
+        size_of(k) = abs(flight%series%c(k - 1, node))/k
+      end do
+      do k = 0, series_order
+        size_of(k) = merge(rough_logarithm(max(size_of(k), tiny(1.0_wp))), -huge(1.0_wp), size_of(k) > 0)
+      end do
+      do k = series_order - 4, series_order
+        if (size_of(k) <= -huge(1.0_wp)) cycle
+        reach = -huge(1.0_wp)
+        do j = 0, series_order/2
+          if (size_of(j) > -huge(1.0_wp)) then
+            reach = max(reach, smallest/(series_order - j) + (size_of(j) - size_of(k))/(k - j))
+          end if
+        end do
+        step = min(step, reach)
+      end do
+    end do
+    step = exponential(step)
+  end function natural_step
+
+  !> Logarithm to 0.06, by the exponent and a line.
+  pure elemental real(wp) function rough_logarithm(x)
+    real(wp), intent(in) :: x
+    rough_logarithm = (exponent(x) + 2*fraction(x) - 2)*0.693147180559945_wp
+  end function rough_logarithm
+
+  !> Proves that the solution stays in a box over the step, and bounds the next coefficients there. `excess`: the largest
+  !> remainder over its margin; proven if it is at most 1.
+  pure subroutine enclose(flight, step, excess)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(in) :: step
+    real(wp), intent(out) :: excess
+    type(interval_t) :: box(size(flight%rates))
+    real(wp) :: margin(size(flight%rates)), b(0:series_order), power
+    integer :: i
+    real(wp), parameter :: least = 1e-70_wp
+    do i = 1, size(flight%rates)
+      b = bernstein_of(polynomial_of(flight, i, step))
+      box(i) = interval_t(minval(b), maxval(b))
+      margin(i) = flight%margin*max(abs(box(i)%low), abs(box(i)%high)) + least
+      box(i) = interval_t(box(i)%low - margin(i), box(i)%high + margin(i))
+    end do
+    excess = 0
+    call bound_coefficients(flight%tape, box, flight%parameters, flight%bounds, flight%fault)
+    if (flight%fault > 0) return
+    power = step**(series_order + 1)*1.01_wp
+    do i = 1, size(flight%rates)
+      excess = max(excess, flight%bounds%c(series_order, flight%rates(i))/(series_order + 1)*power/margin(i))
+    end do
+    if (.not. excess <= huge(1.0_wp)) excess = huge(1.0_wp)
+  end subroutine enclose
+
+  !> Coefficients of a variable in the fraction of a step.
+  pure function polynomial_of(flight, i, step) result(p)
+    type(flight_t), intent(in) :: flight
+    integer, intent(in) :: i
+    real(wp), intent(in) :: step
+    real(wp) :: p(0:series_order), power
+    integer :: k
+    p(0) = flight%state(i)
+    power = 1
+    do k = 1, series_order
+      power = power*step
+      p(k) = flight%series%c(k - 1, flight%rates(i))/k*power
+    end do
+  end function polynomial_of
+
+  !> First fraction of the step at which an active guard crosses zero, 2 without one, and the guards that do. `is_certain`
+  !> is false if a shorter step could decide what this one leaves open.
+  pure subroutine find_crossing(flight, step, fraction, is_certain)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(in) :: step
+    real(wp), intent(out) :: fraction
+    logical, intent(out) :: is_certain
+    real(wp) :: at(size(flight%guards)), remainder, rounding
+    integer :: g
+    logical :: is_proven
+    at = 2
+    is_certain = .true.
+    do g = 1, size(flight%guards)
+      if (.not. flight%is_active(g)) cycle
+      call cross(flight, g, step, at(g), remainder, rounding, is_proven)
+      if (is_proven) cycle
+      is_certain = is_certain .and. remainder <= rounding
+      if (remainder <= rounding) flight%uncertain = flight%uncertain + 1
+    end do
+    fraction = min(2.0_wp, minval(at))
+    flight%crossed = fraction <= 1 .and. at - fraction <= 8*epsilon(1.0_wp)*fraction
+  end subroutine find_crossing
+
+  !> First crossing of a guard within the step. A zero of order m at the start is divided out: the rest of the series, over
+  !> the fraction to the power m, has the other zeros.
+  pure subroutine cross(flight, g, step, at, remainder, rounding, is_proven)
+    type(flight_t), intent(in) :: flight
+    integer, intent(in) :: g
+    real(wp), intent(in) :: step
+    real(wp), intent(out) :: at, remainder, rounding
+    logical, intent(out) :: is_proven
+    real(wp) :: p(0:series_order), power, total
+    integer :: k, m, node
+    node = flight%guards(g)%node
+    m = min(flight%zeros(g), series_order)
+    power = 1
+    total = 0
+    do k = 0, series_order
+      p(k) = flight%series%c(k, node)*power
+      if (k >= m) total = total + (k + 1)*abs(p(k))
+      power = power*step
+    end do
+    remainder = 1.01_wp*flight%bounds%c(series_order + 1, node)*power
+    rounding = epsilon(1.0_wp)*total
+    if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, node)
+    p(:series_order - m) = p(m:)
+    p(series_order - m + 1:) = 0
+    total = remainder + rounding
+    at = 2
+    is_proven = .true.
+    ! The first term outweighs all others.
+    if (abs(p(0)) > sum(abs(p(1:))) + total) return
+    call first_crossing(p, total, (series_order + 1 + m)*total, flight%guards(g)%direction, at, is_proven)
+  end subroutine cross
+
+  !> Magnitude of what a guard is a sum of: it may be far larger than the sum.
+  pure real(wp) function size_of_arguments(flight, node)
+    type(flight_t), intent(in) :: flight
+    integer, intent(in) :: node
+    associate (it => flight%tape%nodes(node))
+      size_of_arguments = flight%bounds%c(0, node)
+      if (it%operation == op_add .or. it%operation == op_subtract) then
+        size_of_arguments = flight%bounds%c(0, it%first) + flight%bounds%c(0, it%second)
+      end if
+    end associate
+  end function size_of_arguments
+
+  !> State and time after a part of a step.
+  pure subroutine move(flight, step)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(in) :: step
+    real(wp) :: p(0:series_order), total
+    integer :: i, k
+    do i = 1, size(flight%rates)
+      p = polynomial_of(flight, i, step)
+      total = 0
+      do k = series_order, 0, -1
+        total = total + p(k)
+      end do
+      flight%state(i) = total
+    end do
+    flight%time = flight%time + step
+  end subroutine move
+
+end module series_flight

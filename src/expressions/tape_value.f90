@@ -1,0 +1,125 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Values of all nodes of a tape.
+module tape_value
+  use kinds, only: wp
+  use operations, only: op_constant, op_parameter, op_select, op_variable, operate, operation_table
+  use tape, only: node_t, tape_t
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: evaluate, fault_text, starting_branches
+
+contains
+
+  !> Values of the nodes. `fault(i)` is the node whose operation was not defined, or too large, on which node i depends; its
+  !> value is then 0. A branch that is not taken causes no fault. `branches`: sign of each switching function, otherwise that
+  !> of its value.
+  pure subroutine evaluate(tape, variables, parameters, value, fault, branches)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: variables(:), parameters(:)
+    real(wp), intent(out) :: value(tape%count)
+    integer, intent(out) :: fault(tape%count)
+    integer, intent(in), optional :: branches(:)
+    real(wp) :: chosen
+    integer :: i, origin
+    do i = 1, tape%count
+      fault(i) = 0
+      select case (tape%nodes(i)%operation)
+      case (op_constant)
+        value(i) = tape%nodes(i)%value
+      case (op_variable)
+        value(i) = variables(tape%nodes(i)%first)
+      case (op_parameter)
+        value(i) = parameters(tape%nodes(i)%first)
+      case (op_select)
+        call take_branch(tape, tape%nodes(i), value(:i - 1), fault(:i - 1), chosen, origin, branches)
+        value(i) = chosen
+        fault(i) = origin
+      case default
+        call take_operation(tape, i, value, fault)
+      end select
+    end do
+  end subroutine evaluate
+
+  pure subroutine take_operation(tape, i, value, fault)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: i
+    real(wp), intent(inout) :: value(:)
+    integer, intent(inout) :: fault(:)
+    integer :: a, b
+    logical :: is_defined
+    a = tape%nodes(i)%first
+    b = a
+    if (operation_table(tape%nodes(i)%operation)%arguments > 1) b = tape%nodes(i)%second
+    fault(i) = fault(a)
+    if (fault(i) == 0) fault(i) = fault(b)
+    value(i) = 0
+    if (fault(i) > 0) return
+    call operate(tape%nodes(i)%operation, value(a), value(b), value(i), is_defined)
+    if (.not. is_defined) fault(i) = i
+  end subroutine take_operation
+
+  pure subroutine take_branch(tape, node, value, fault, branch_value, branch_fault, branches)
+    type(tape_t), intent(in) :: tape
+    type(node_t), intent(in) :: node
+    real(wp), intent(in) :: value(:)
+    integer, intent(in) :: fault(:)
+    real(wp), intent(out) :: branch_value
+    integer, intent(out) :: branch_fault
+    integer, intent(in), optional :: branches(:)
+    integer :: argument, side
+    argument = tape%switches(node%first)%argument
+    branch_value = 0
+    if (present(branches)) then
+      side = branches(node%first)
+    else
+      branch_fault = fault(argument)
+      if (branch_fault > 0) return
+      side = tape%switches(node%first)%at_zero
+      if (abs(value(argument)) > 0) side = merge(1, -1, value(argument) > 0)
+    end if
+    if (side > 0) then
+      branch_fault = fault(node%second)
+      branch_value = value(node%second)
+    else if (side < 0) then
+      branch_fault = fault(node%third)
+      branch_value = value(node%third)
+    else
+      branch_fault = max(fault(node%second), fault(node%third))
+      branch_value = 0.5_wp*(value(node%second) + value(node%third))
+    end if
+  end subroutine take_branch
+
+  !> The branch of each switching function at a point, 1 or -1; 0 where its argument is zero or not defined.
+  pure subroutine starting_branches(tape, variables, parameters, branches)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: variables(:), parameters(:)
+    integer, intent(out) :: branches(:)
+    real(wp) :: value(tape%count)
+    integer :: fault(tape%count), k, argument
+    call evaluate(tape, variables, parameters, value, fault)
+    do k = 1, size(branches)
+      argument = tape%switches(k)%argument
+      branches(k) = 0
+      if (abs(value(argument)) > 0) branches(k) = merge(1, -1, value(argument) > 0)
+    end do
+  end subroutine starting_branches
+
+  !> Reason of a fault: the operation and what it allows, and the value of its last argument.
+  pure function fault_text(tape, node, value) result(text)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: node
+    real(wp), intent(in) :: value(:)
+    character(len=:), allocatable :: text
+    integer :: operation, last
+    operation = tape%nodes(node)%operation
+    last = tape%nodes(node)%first
+    if (operation_table(operation)%arguments > 1) last = tape%nodes(node)%second
+    text = trim(operation_table(operation)%name)//': found '//to_text(real(value(last), kind(1.0d0)))//', allowed: '// &
+      trim(operation_table(operation)%domain)
+  end function fault_text
+
+end module tape_value
