@@ -10,6 +10,7 @@ module law_table
   use kinds, only: wp
   use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive, range_t, &
     zero_to_one
+  use motor_rows, only: motor_laws, motor_parameters
   use pair_rows, only: pair_laws, pair_parameters
   use part_rows, only: part_laws, part_parameters
   use text, only: join
@@ -26,6 +27,9 @@ module law_table
 
   !> What may be added to a machine of one body: any number of laws.
   character(len=*), parameter, public :: effect_family = 'effect'
+
+  !> The motor of a drive whose power is limited: one law, or none.
+  character(len=*), parameter, public :: motor_family = 'motor'
 
   !> The parts of a machine of several bodies: any number of laws, each with a name of its own. Their laws are named
   !> 'table:law'.
@@ -137,11 +141,12 @@ module law_table
                     optional=.true.)]
 
   type(law_row_t), parameter, public :: laws( &
-    size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws)) = &
-    [other_laws, contact_laws, pair_laws, part_laws, effect_laws]
+    size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws) + &
+    size(motor_laws)) = [other_laws, contact_laws, pair_laws, part_laws, effect_laws, motor_laws]
   type(parameter_row_t), parameter, public :: parameters( &
     size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(part_parameters) + &
-    size(effect_parameters)) = [other_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters]
+    size(effect_parameters) + size(motor_parameters)) = [other_parameters, contact_parameters, pair_parameters, &
+                                                         part_parameters, effect_parameters, motor_parameters]
 
 contains
 

@@ -188,7 +188,7 @@ contains
     end associate
   end subroutine set_bounds
 
-  !> Refuses the laws of two bodies for one. The message begins with the key.
+  !> Refuses the laws of two bodies, and those that a motor drives, for one body without. The message begins with the key.
   pure subroutine refuse_pair(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error
@@ -201,6 +201,8 @@ contains
       case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')
         call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with two bodies '// &
                   '(body.law = "friction_pair" or "backlash_pair")')
+      case ('slider_crank', 'unbalance')
+        call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with a table [motor]')
       end select
     end do
   end subroutine refuse_pair
