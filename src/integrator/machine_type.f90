@@ -141,7 +141,7 @@ module machine_type
 
     !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as in its machine. What follows in `values` are
     !> positions and velocities of the coordinates of several bodies, in place of those of the machine; with a motor the speed of
-    !> the crank [rad/s], zero if absent, and current [A] or integral of the control [rad].
+    !> the crank [rad/s] and current [A] or integral of the control [rad].
     pure function start_interface(self, values) result(section)
       import :: machine_t, section_state_t, wp
       class(machine_t), intent(in) :: self

@@ -12,6 +12,7 @@ module motor_machine
   use machine_columns, only: machine_column_t, set_column
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: log_t, options_t, tally_t
+  use motor_choices, only: start_of_motor
   use motor_equations, only: foot_half_range, y_at
   use motor_log, only: add_sample, motor_energy
   use motor_motion, only: advance_motor, motor_motion_t, prepare_motor, start_motor
@@ -29,6 +30,8 @@ module motor_machine
     type(motor_motion_t) :: motor
     !> Size of the current [A] or the integral [rad].
     real(wp) :: own_size = 1
+    !> Speed of the crank [rad/s] and current or integral where a start has none.
+    real(wp) :: own_start(2) = 0
   contains
     procedure :: coordinates
     procedure :: section_obstacle
@@ -72,7 +75,9 @@ contains
     type(motor_machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     call prepare_motor(choices, options, machine%motor, error)
-    if (.not. allocated(error)) call set_facts(machine)
+    if (allocated(error)) return
+    machine%own_start = start_of_motor(choices)
+    call set_facts(machine)
   end subroutine prepare_motor_machine
 
   !> What the layers above have to know.
@@ -116,7 +121,7 @@ contains
     real(wp) :: all(5)
     integer :: n
     n = min(5, size(values))
-    all = 0
+    all(4:) = self%own_start
     all(:n) = values(:n)
     call start_motor(self%motor, all, section%state, section%motor)
   end function start

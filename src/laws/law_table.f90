@@ -240,14 +240,16 @@ contains
                                                  any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body']))
   end function is_hidden
 
-  !> Whether a path names where a body of several, or a coordinate of a structure, starts: 'body.NAME.x0',
-  !> 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
+  !> Whether a path names how a motor, a body of several, or a coordinate of a structure starts: 'motor.crank_speed',
+  !> 'body.NAME.x0', 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
   pure logical function is_start_parameter(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: name
     integer :: element, mark
     call split_element(path, name, element)
     mark = index(name, '.', back=.true.)
+    is_start_parameter = path == 'motor.crank_speed' .or. path == 'motor.start_current' .or. path == 'motor.start_integral'
+    if (is_start_parameter) return
     is_start_parameter = (name(mark + 1:) == 'x0' .or. name(mark + 1:) == 'v0') .and. &
       ((index(name, 'body.') == 1 .and. mark > 5 .and. element == 0) .or. (index(name, 'structure.') == 1 .and. element > 0))
   end function is_start_parameter

@@ -29,6 +29,8 @@ module motor_rows
     parameter_row_t('motor', 'dc', 'torque_constant', 'N m/A', positive, 'k, torque over current; also voltage over speed'), &
     parameter_row_t('motor', 'dc', 'resistance', 'ohm', positive, 'R'), &
     parameter_row_t('motor', 'dc', 'inductance', 'H', not_negative, 'L; 0: the current follows at once', optional=.true.), &
+    parameter_row_t('motor', 'dc', 'start_current', 'A', any_value, 'current at the start, with an inductance', optional=.true.), &
+    parameter_row_t('motor', 'pi', 'start_integral', 'rad', any_value, 'z at the start', optional=.true.), &
     parameter_row_t('motor', 'pi', 'proportional', 'N m s', not_negative, 'Kp'), &
     parameter_row_t('motor', 'pi', 'integral', 'N m', not_negative, 'Ki'), &
     parameter_row_t('motor', 'pi', 'reference', 'rad/s', positive, 'wr, the speed that is wanted')]
@@ -46,7 +48,9 @@ module motor_rows
                      optional=.true.), i=1, 4), &
     (parameter_row_t('motor', names(i), 'bearing_damping', 'N m s', not_negative, 'h, torque over speed', &
                      optional=.true.), i=1, 4), &
-    (parameter_row_t('motor', names(i), 'bearing_friction', 'N m', not_negative, 'H0, dry', optional=.true.), i=1, 4)]
+    (parameter_row_t('motor', names(i), 'bearing_friction', 'N m', not_negative, 'H0, dry', optional=.true.), i=1, 4), &
+    (parameter_row_t('motor', names(i), 'crank_speed', 'rad/s', any_value, 'speed of the crank at the start', &
+                     optional=.true.), i=1, 4)]
 
   type(parameter_row_t), parameter :: mechanism_parameters(*) = [ &
     parameter_row_t('drive', 'slider_crank', 'crank', 'm', positive, 'r'), &

@@ -4,12 +4,13 @@
 !> The laws of a machine with a motor, and those that do not go with one.
 module motor_choices
   use errors, only: error_t, fail
+  use kinds, only: wp
   use law_table, only: effect_family, law_choice_t, motor_family, value_of
   use status, only: exit_bad_case
   implicit none
   private
 
-  public :: has_motor, number_of_family, refuse_laws
+  public :: has_motor, number_of_family, refuse_laws, start_of_motor
 
 contains
 
@@ -29,6 +30,18 @@ contains
       if (choices(i)%family == family) number = i
     end do
   end function number_of_family
+
+  !> Speed of the crank [rad/s] and current [A] or integral [rad] at the start.
+  pure function start_of_motor(choices) result(start)
+    type(law_choice_t), intent(in) :: choices(:)
+    real(wp) :: start(2)
+    start = 0
+    associate (motor => choices(number_of_family(choices, motor_family)))
+      start(1) = value_of(motor, 'crank_speed')
+      if (motor%name == 'dc') start(2) = value_of(motor, 'start_current')
+      if (motor%name == 'pi') start(2) = value_of(motor, 'start_integral')
+    end associate
+  end function start_of_motor
 
   !> Laws that a motor does not go with.
   pure subroutine refuse_laws(choices, drive, motor, error)

@@ -13,7 +13,7 @@ module oscillator
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, value_of
+  use law_table, only: effect_family, law_choice_t, motor_family, value_of
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
   implicit none
@@ -195,6 +195,11 @@ contains
     integer :: i
     do i = 1, size(choices)
       if (allocated(error)) return
+      if (choices(i)%family == motor_family) then
+        call fail(error, exit_bad_case, 'motor.law: found "'//trim(choices(i)%name)//'", allowed in the commands trajectory, '// &
+                  'basin and sweep')
+        return
+      end if
       select case (choices(i)%name)
       case ('friction_pair', 'backlash_pair')
         call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
