@@ -3,6 +3,7 @@
 
 !> The laws of a machine with a motor, and those that do not go with one.
 module motor_choices
+  use constants, only: two_pi
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: effect_family, law_choice_t, motor_family, value_of
@@ -10,7 +11,10 @@ module motor_choices
   implicit none
   private
 
-  public :: has_motor, number_of_family, refuse_laws, start_of_motor
+  !> Largest decay of a difference of speeds over a turn, as an exponent.
+  real(wp), parameter :: steepest = 1e4_wp
+
+  public :: has_motor, number_of_family, refuse_laws, speed_of, start_of_motor
 
 contains
 
@@ -59,11 +63,46 @@ contains
                 '", allowed with a motor: harmonic, fourier, slider_crank, crank_lever_rod, unbalance')
     else if (.not. value_of(motor, 'inertia') > 0) then
       call fail(error, exit_bad_case, 'motor.inertia: allowed above 0')
+    else if (.not. abs(speed_of(motor)) > 0) then
+      call fail(error, exit_bad_case, 'motor.voltage: found 0.0 V, allowed other than 0: a turn without load is the unit of time')
+    else if (slope_of(motor)*two_pi/abs(speed_of(motor)) > steepest*value_of(motor, 'inertia')) then
+      call fail(error, exit_bad_case, 'motor.inertia: so little that the speed follows the torque within 1e-4 of a turn; '// &
+                'allowed more, or a drive without a motor, whose speed is given')
     else if (drive%name == 'slider_crank') then
       if (.not. value_of(drive, 'rod') > value_of(drive, 'crank')) then
         call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: a shorter rod cannot go round')
       end if
     end if
   end subroutine refuse_laws
+
+  !> Speed of the crank without torque [rad/s].
+  pure real(wp) function speed_of(motor) result(speed)
+    type(law_choice_t), intent(in) :: motor
+    select case (motor%name)
+    case ('linear')
+      speed = value_of(motor, 'no_load_speed')
+    case ('kloss')
+      speed = value_of(motor, 'synchronous_speed')
+    case ('dc')
+      speed = value_of(motor, 'voltage')/value_of(motor, 'torque_constant')
+    case default
+      speed = value_of(motor, 'reference')
+    end select
+  end function speed_of
+
+  !> Torque over the difference of the speed to that without torque [N m s].
+  pure real(wp) function slope_of(motor) result(slope)
+    type(law_choice_t), intent(in) :: motor
+    select case (motor%name)
+    case ('linear')
+      slope = value_of(motor, 'stall_torque')/speed_of(motor)
+    case ('kloss')
+      slope = 2*value_of(motor, 'breakdown_torque')/(value_of(motor, 'breakdown_slip')*speed_of(motor))
+    case ('dc')
+      slope = value_of(motor, 'torque_constant')**2/value_of(motor, 'resistance')
+    case default
+      slope = value_of(motor, 'proportional')
+    end select
+  end function slope_of
 
 end module motor_choices

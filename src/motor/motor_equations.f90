@@ -18,7 +18,7 @@ module motor_equations
   use friction_law, only: friction_of, friction_t
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
-  use motor_choices, only: number_of_family, refuse_laws
+  use motor_choices, only: number_of_family, refuse_laws, speed_of
   use restoring_law, only: restoring_of, restoring_t
   use series_flight, only: flight_t, guard_t, set_branches, start_flight
   use status, only: exit_bad_case, exit_internal
@@ -55,7 +55,9 @@ module motor_equations
     type(contact_t) :: contact
     !> The body carries an unbalance of this moment [kg m]; 0: a mechanism moves the foot of the spring.
     real(wp) :: moment = 0
-    real(wp) :: bearing_friction = 0
+    !> Largest torque by which the bearing holds the crank [N m], force by which friction holds the body [N]; at least rounding, so
+    !> that a machine without dry friction comes to rest.
+    real(wp) :: crank_level = 0, body_level = 0
     !> Speed without torque [rad/s]; size of the motor's own state, current [A] or integral [rad].
     real(wp) :: no_load_speed = 0, own_size = 1
     !> Numbers of the parameters of signs.
@@ -104,6 +106,7 @@ contains
     else
       call add_foot(system)
     end if
+    call set_levels(system)
     call add_flights(system)
     if (allocated(system%sheet%error)) then
       call fail(error, exit_internal, 'equations of a motor: '//system%sheet%error%message)
@@ -163,9 +166,11 @@ contains
       call add_parameter(sheet, 'lower', max(system%contact%lower, -far))
       call add_parameter(sheet, 'bearing_damping', value_of(motor, 'bearing_damping'))
       call add_parameter(sheet, 'bearing_friction', value_of(motor, 'bearing_friction'))
+      call add_parameter(sheet, 'bearing_static', value_of(motor, 'bearing_friction'))
     end associate
     system%rotor_inertia = value_of(motor, 'inertia')
-    system%bearing_friction = value_of(motor, 'bearing_friction')
+    system%crank_level = value_of(motor, 'bearing_friction')
+    system%body_level = system%friction%break_away
     system%slip = parameter_number(system%sheet, 'slip')
     system%turning = parameter_number(system%sheet, 'turning')
   end subroutine add_state
@@ -179,12 +184,10 @@ contains
       case ('linear')
         call add_values(motor, [character(len=13) :: 'stall_torque', 'no_load_speed'], system)
         call define(sheet, 'torque', 'stall_torque*(1 - w/no_load_speed)')
-        system%no_load_speed = value_of(motor, 'no_load_speed')
       case ('kloss')
         call add_values(motor, [character(len=17) :: 'breakdown_torque', 'breakdown_slip', 'synchronous_speed'], system)
         call define(sheet, 'lag', '1 - w/synchronous_speed')
         call define(sheet, 'torque', '2*breakdown_torque*breakdown_slip*lag/(lag^2 + breakdown_slip^2)')
-        system%no_load_speed = value_of(motor, 'synchronous_speed')
       case ('dc')
         call add_values(motor, [character(len=15) :: 'voltage', 'torque_constant', 'resistance', 'inductance'], system)
         if (value_of(motor, 'inductance') > 0) then
@@ -196,15 +199,14 @@ contains
         end if
         call define(sheet, 'torque', 'torque_constant*current')
         system%own_size = max(abs(value_of(motor, 'voltage'))/value_of(motor, 'resistance'), tiny(1.0_wp))
-        system%no_load_speed = abs(value_of(motor, 'voltage'))/value_of(motor, 'torque_constant')
       case ('pi')
         call add_values(motor, [character(len=12) :: 'proportional', 'integral', 'reference'], system)
         call add_variable(sheet, 'y')
         call define(sheet, 'y_rate', 'reference - w')
         call define(sheet, 'torque', 'proportional*y_rate + integral*y')
-        system%no_load_speed = value_of(motor, 'reference')
       end select
     end associate
+    system%no_load_speed = abs(speed_of(motor))
     system%variables = system%sheet%variables
   end subroutine add_motor
 
@@ -282,6 +284,24 @@ contains
     end associate
   end subroutine add_unbalance
 
+  !> What holds body and crank is no less than what rounding does to the forces.
+  pure subroutine set_levels(system)
+    type(motor_system_t), intent(inout) :: system
+    real(wp), parameter :: share = 256*epsilon(1.0_wp)
+    real(wp) :: value(system%sheet%tape%count), z(5), force
+    integer :: fault(system%sheet%tape%count)
+    z = 0
+    call evaluate(system%sheet%tape, z(:system%variables), system%sheet%parameters, value, fault)
+    associate (sheet => system%sheet, half_range => foot_half_range(system))
+      force = system%stiffness*(system%free_length + abs(value(node_of(sheet, 'foot'))) + half_range) &
+              + system%moment*system%no_load_speed**2
+      system%body_level = max(system%body_level, share*force)
+      system%crank_level = max(system%crank_level, share*(abs(value(node_of(sheet, 'torque'))) + force*half_range))
+      sheet%parameters(parameter_number(sheet, 'static')) = system%body_level
+      sheet%parameters(parameter_number(sheet, 'bearing_static')) = system%crank_level
+    end associate
+  end subroutine set_levels
+
   !> The motions of all modes.
   pure subroutine add_flights(system)
     type(motor_system_t), intent(inout) :: system
@@ -339,7 +359,7 @@ contains
     integer :: i
     text = [character(len=40) :: 'x - upper', 'x - lower', 'v', 'w', 'phi - 2*pi', 'phi', &
             'body_hold'//trim(suffix(mode))//' - static', 'body_hold'//trim(suffix(mode))//' + static', &
-            'crank_hold'//trim(suffix(mode))//' - bearing_friction', 'crank_hold'//trim(suffix(mode))//' + bearing_friction', &
+            'crank_hold'//trim(suffix(mode))//' - bearing_static', 'crank_hold'//trim(suffix(mode))//' + bearing_static', &
             'v_rate'//trim(merge(suffix(crank_held), suffix(both_move), mode == crank_held))]
     do i = 1, guard_count
       name = 'guard'//to_text(i)//trim(suffix(mode))
@@ -358,7 +378,7 @@ contains
     do i = 1, angles
       z(phi_at) = i*two_pi/angles
       call evaluate(system%sheet%tape, z(:system%variables), system%sheet%parameters, value, fault)
-      foot(i) = value(system%foot)
+      foot(i) = value(node_of(system%sheet, 'foot'))
     end do
     size_of = (maxval(foot) - minval(foot))/2
   end function foot_half_range

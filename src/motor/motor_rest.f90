@@ -82,7 +82,7 @@ contains
     logical :: up, down
     mode = equation_mode(.false., crank%turning /= 0)
     call low_series(system, mode, state, crank, series, fault)
-    associate (c => series%c(:, system%body_hold(mode)), level => system%friction%break_away)
+    associate (c => series%c(:, system%body_hold(mode)), level => system%body_level)
       up = is_over(c, level, force_rounding(system, state, crank, series))
       down = is_over(-c, level, force_rounding(system, state, crank, series))
     end associate
@@ -110,7 +110,7 @@ contains
     mode = equation_mode(slips(state%mode), .false.)
     crank%turning = 0
     call low_series(system, mode, state, crank, series, fault)
-    associate (c => series%c(:, system%crank_hold(mode)), level => system%bearing_friction)
+    associate (c => series%c(:, system%crank_hold(mode)), level => system%crank_level)
       rounding = 32*epsilon(1.0_wp)*(abs(series%c(0, system%torque)) + abs(series%c(0, system%load)) + level)
       if (is_over(c, level, rounding)) then
         crank%turning = 1
@@ -139,7 +139,7 @@ contains
     type(motor_state_t), intent(in) :: crank
     type(series_t), intent(in) :: series
     rounding = system%stiffness*(abs(system%free_length) + abs(state%x) + abs(series%c(0, system%foot)))
-    rounding = 32*epsilon(1.0_wp)*(rounding + system%friction%break_away + system%moment*crank%w**2)
+    rounding = 32*epsilon(1.0_wp)*(rounding + system%body_level + system%moment*crank%w**2)
   end function force_rounding
 
   !> Whether impacts on the stop in `direction` 1 or -1 are over within `left` [s], the body having just left it. One bounce with
@@ -166,7 +166,7 @@ contains
     speed = abs(state%v)
     associate (law => system%friction, force => series%c(:, system%body_hold(mode)))
       push = direction*force(1)
-      if (push <= law%break_away) return
+      if (push <= system%body_level) return
       friction = law%kinetic + law%excess
       out = (push + friction)/system%mass
       back = (push - friction)/system%mass
