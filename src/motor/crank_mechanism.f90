@@ -5,7 +5,7 @@
 !> `inertia`, with their derivatives `foot_slope`, `inertia_slope`.
 module crank_mechanism
   use elementary, only: sine_cosine
-  use equation_sheet, only: add_parameter, define, define_slope, sheet_t
+  use equation_sheet, only: add_optional, add_parameter, define, define_slope, sheet_t
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
   use text, only: to_text
@@ -25,10 +25,10 @@ contains
     integer :: i
     call add_parameter(sheet, of_motor(1), value_of(motor, 'inertia'))
     do i = 2, size(of_motor)
-      call add_parameter(sheet, of_motor(i), value_of(motor, of_motor(i)))
+      call add_optional(sheet, of_motor(i), value_of(motor, of_motor(i)))
     end do
     if (drive%name /= 'unbalance') then
-      call add_parameter(sheet, 'angle', value_of(drive, 'angle'))
+      call add_optional(sheet, 'angle', value_of(drive, 'angle'))
       call define(sheet, 'angle_now', 'phi + angle')
     end if
     select case (drive%name)
@@ -61,7 +61,7 @@ contains
     type(sheet_t), intent(inout) :: sheet
     integer :: i
     do i = 1, size(names)
-      call add_parameter(sheet, names(i), value_of(choice, trim(names(i))))
+      call add_optional(sheet, names(i), value_of(choice, trim(names(i))))
     end do
   end subroutine add_of
 

@@ -13,7 +13,7 @@ module equation_sheet
   implicit none
   private
 
-  public :: new_sheet, add_variable, add_parameter, define, define_slope, node_of, parameter_number
+  public :: new_sheet, add_variable, add_parameter, add_optional, define, define_slope, node_of, parameter_number
 
   integer, parameter, public :: name_length = 24
 
@@ -57,6 +57,18 @@ contains
     call parameter_node(sheet%tape, size(sheet%parameters), node)
     call add_name(sheet, name, node, size(sheet%parameters))
   end subroutine add_parameter
+
+  !> A parameter that is often zero: the terms that it makes zero are then left out of the tape.
+  pure subroutine add_optional(sheet, name, value)
+    type(sheet_t), intent(inout) :: sheet
+    character(len=*), intent(in) :: name
+    real(wp), intent(in) :: value
+    if (abs(value) > 0) then
+      call add_parameter(sheet, name, value)
+    else
+      call define(sheet, name, '0')
+    end if
+  end subroutine add_optional
 
   !> Gives the expression `text` a name.
   pure subroutine define(sheet, name, text)

@@ -13,7 +13,7 @@ module motor_equations
   use constants, only: two_pi
   use contact_law, only: contact_constant, contact_of, contact_t
   use crank_mechanism, only: add_mechanism
-  use equation_sheet, only: add_parameter, add_variable, define, new_sheet, node_of, parameter_number, sheet_t
+  use equation_sheet, only: add_optional, add_parameter, add_variable, define, new_sheet, node_of, parameter_number, sheet_t
   use errors, only: error_t, fail
   use friction_law, only: friction_of, friction_t
   use kinds, only: wp
@@ -155,17 +155,17 @@ contains
       call add_parameter(sheet, 'slip', 1.0_wp)
       call add_parameter(sheet, 'turning', 1.0_wp)
       call add_parameter(sheet, 'mass', system%mass)
-      call add_parameter(sheet, 'stiffness', system%stiffness)
-      call add_parameter(sheet, 'free_length', system%free_length)
-      call add_parameter(sheet, 'kinetic', system%friction%kinetic)
+      call add_optional(sheet, 'stiffness', system%stiffness)
+      call add_optional(sheet, 'free_length', system%free_length)
+      call add_optional(sheet, 'kinetic', system%friction%kinetic)
       call add_parameter(sheet, 'excess', system%friction%excess)
       call add_parameter(sheet, 'stribeck_velocity', system%friction%stribeck_velocity)
-      call add_parameter(sheet, 'damping', system%friction%damping)
+      call add_optional(sheet, 'damping', system%friction%damping)
       call add_parameter(sheet, 'static', system%friction%break_away)
       call add_parameter(sheet, 'upper', min(system%contact%upper, far))
       call add_parameter(sheet, 'lower', max(system%contact%lower, -far))
-      call add_parameter(sheet, 'bearing_damping', value_of(motor, 'bearing_damping'))
-      call add_parameter(sheet, 'bearing_friction', value_of(motor, 'bearing_friction'))
+      call add_optional(sheet, 'bearing_damping', value_of(motor, 'bearing_damping'))
+      call add_optional(sheet, 'bearing_friction', value_of(motor, 'bearing_friction'))
       call add_parameter(sheet, 'bearing_static', value_of(motor, 'bearing_friction'))
     end associate
     system%rotor_inertia = value_of(motor, 'inertia')
