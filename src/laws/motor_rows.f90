@@ -13,10 +13,13 @@ module motor_rows
 
   type(law_row_t), parameter, public :: motor_laws(*) = [ &
     law_row_t('motor', 'linear', 'torque M0 (1 - w/w0)', kononenko), &
-    law_row_t('motor', 'kloss', 'induction motor: 2 M s sb/(s^2 + sb^2), slip s = 1 - w/ws', 'Kloss, Arch. Elektrotech. (1909)'), &
+    law_row_t('motor', 'kloss', 'induction motor: 2 M s sb/(s^2 + sb^2), slip s = 1 - w/ws', &
+              'Kloss, Arch. Elektrotech. 5 (1916) 59'), &
     law_row_t('motor', 'dc', 'torque k i; L i'' = U - R i - k w', kononenko), &
-    law_row_t('motor', 'pi', 'speed control: torque Kp (wr - w) + Ki z; z'' = wr - w', ''), &
-    law_row_t('drive', 'slider_crank', 'crank and rod push the foot along a guide through the axis; needs a motor', ''), &
+    law_row_t('motor', 'pi', 'speed control: torque Kp (wr - w) + Ki z; z'' = wr - w', &
+              'Astrom, Hagglund, PID Controllers (1995)'), &
+    law_row_t('drive', 'slider_crank', 'crank and rod push the foot along a guide through the axis; needs a motor', &
+              'Reuleaux, Theoretische Kinematik (1875)'), &
     law_row_t('drive', 'unbalance', 'rotor on the body; needs a motor', 'Sommerfeld, Z. Ver. Dtsch. Ing. 46 (1902)')]
 
   type(parameter_row_t), parameter :: own_parameters(*) = [ &
