@@ -30,11 +30,15 @@ contains
     section = moving%start(start)
     section_time = -section%state%time
     do i = 1, size(times)
-      do while (times(i) - section_time >= moving%period .and. reason == 0)
+      do while (moving%timed .and. times(i) - section_time >= moving%period .and. reason == 0)
         call moving%advance_to_section(section, tally, reason)
         section_time = section_time + moving%period
       end do
-      if (reason == 0) call moving%advance(section, times(i) - section_time, tally, reason)
+      do while (reason == 0)
+        call moving%advance(section, times(i) - section_time, tally, reason)
+        if (.not. section%passed) exit
+        section_time = section_time + section%lasted
+      end do
       x(i) = position_of(section%state)
       associate (now => moving%driver(section))
         driver(i) = now(1)

@@ -102,7 +102,7 @@ contains
     type(trajectory_state_t), intent(inout) :: trajectory
     type(outcome_t), intent(inout) :: outcome
     type(log_t), intent(inout), optional :: log
-    if (present(log)) call begin_record(moving, trajectory, log)
+    if (present(log)) call begin_record(moving, span, trajectory, log)
     do while (is_recorded(trajectory))
       call go_on(moving, catalogue, span, trajectory, outcome, log)
     end do
@@ -133,13 +133,18 @@ contains
   end subroutine go_on
 
   !> What a log holds of the state at the start of a trajectory, and when its first sample is due.
-  pure subroutine begin_record(moving, trajectory, log)
+  pure subroutine begin_record(moving, span, trajectory, log)
     class(machine_t), intent(in) :: moving
+    type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(in) :: trajectory
     type(log_t), intent(inout) :: log
+    integer :: i
     log%balance%at_start = moving%energy(trajectory)
     log%origin = -trajectory%state%time
-    if (log%sample_interval > 0) log%next_sample = ceiling(trajectory%state%time/log%sample_interval)
+    if (.not. log%sample_interval > 0) return
+    log%next_sample = ceiling(trajectory%state%time/log%sample_interval)
+    ! Sections do not come at given times: neither do the times of samples begin anew there.
+    if (.not. moving%timed) log%instants = [(i*log%sample_interval, i=0, int(span%duration/log%sample_interval))]
   end subroutine begin_record
 
   !> What a log holds of the state at the end of the duration.
@@ -179,7 +184,7 @@ contains
     type(log_t), intent(inout), optional :: log
     integer(int64) :: slips
     slips = trajectory%tally%slips
-    if (trajectory%until >= moving%period) then
+    if (moving%timed .and. trajectory%until >= moving%period) then
       call moving%advance_to_section(trajectory, trajectory%tally, trajectory%reason, log)
     else
       call moving%advance(trajectory, trajectory%until, trajectory%tally, trajectory%reason, log)
@@ -201,7 +206,7 @@ contains
     type(span_t), intent(in) :: span
     type(trajectory_state_t), intent(in) :: trajectory
     sections_ahead = 0
-    if (trajectory%until < moving%period .or. trajectory%since > 0) return
+    if (.not. moving%timed .or. trajectory%until < moving%period .or. trajectory%since > 0) return
     ! One is left out in case that rounding shifts the last.
     sections_ahead = max(0, int((end_of_phase(span, trajectory%phase) - trajectory%elapsed)/moving%period) - 2)
   end function sections_ahead
@@ -234,7 +239,11 @@ contains
     logical :: ended
     phase_end = end_of_phase(span, trajectory%phase)
     if (trajectory%reason == 0) then
-      if (trajectory%until >= moving%period) then
+      if (.not. moving%timed) then
+        trajectory%elapsed = trajectory%elapsed + (merge(trajectory%lasted, trajectory%until, trajectory%passed) - trajectory%since)
+        if (trajectory%passed) call note_section(moving, catalogue, slipped, trajectory, outcome)
+        if (.not. trajectory%passed) trajectory%elapsed = phase_end
+      else if (trajectory%until >= moving%period) then
         trajectory%elapsed = trajectory%elapsed + (moving%period - trajectory%since)
         call note_section(moving, catalogue, slipped .or. trajectory%since > 0, trajectory, outcome)
       else
@@ -272,7 +281,7 @@ contains
     trajectory%since = trajectory%state%time
     trajectory%until = moving%period
     left = end_of_phase(span, trajectory%phase) - trajectory%elapsed
-    if (trajectory%phase == phase_extension .or. moving%period - trajectory%since <= left) return
+    if (moving%timed .and. (trajectory%phase == phase_extension .or. moving%period - trajectory%since <= left)) return
     trajectory%until = trajectory%since + left
   end subroutine set_stop
 

@@ -11,6 +11,7 @@ module case_echo
   use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, &
     part_kind, part_law, path_of, value_of
   use refinement, only: refine_t
+  use motor_choices, only: has_motor
   use text, only: to_text
   use toml_bindings, only: hash_text
   implicit none
@@ -126,6 +127,7 @@ contains
     rows = parameters_of(law%family, law%name)
     do i = 1, size(rows)
       if (law%family == part_family .and. is_hidden(rows(i))) cycle
+      if (rows(i)%name == 'ratio' .and. has_motor(laws)) cycle
       associate (values => law%parameters(i)%values)
         if (rows(i)%list) then
           if (size(values) > 0 .or. law%family /= part_family) text = text//line(trim(rows(i)%name), reals(values))

@@ -10,6 +10,7 @@ module case_parameters
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
     part_family, path_of, split_element
+  use motor_choices, only: has_motor
   use part_angles, only: is_of_angle
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
@@ -54,6 +55,8 @@ contains
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
         if (path_of(laws(i))//'.'//trim(rows(j)%name) /= name .or. is_hidden(rows(j))) cycle
+        ! A motor sets the speed of the crank.
+        if (name == 'drive.ratio' .and. has_motor(laws)) cycle
         if (rows(j)%list .neqv. number > 0) cycle
         if (number > size(laws(i)%parameters(j)%values)) cycle
         law = i
@@ -116,6 +119,7 @@ contains
       rows = parameters_of(laws(i)%family, laws(i)%name)
       do j = 1, size(rows)
         if (is_hidden(rows(j)) .or. size(laws(i)%parameters(j)%values) == 0) cycle
+        if (rows(j)%name == 'ratio' .and. has_motor(laws)) cycle
         if (len(names) > 0) names = names//', '
         names = names//path_of(laws(i))//'.'//trim(rows(j)%name)
         if (rows(j)%list) names = names//'[1]'

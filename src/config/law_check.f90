@@ -11,6 +11,8 @@ module law_check
   use drive_law, only: ends_with_its_first
   use effect_check, only: refuse_effects
   use errors, only: error_t
+  use motor_choices, only: has_motor
+  use motor_equations, only: build_motor_equations, motor_system_t
   use multibody, only: multibody_t
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, value_of
@@ -44,12 +46,12 @@ contains
     character(len=*), intent(in) :: at
     logical :: good(3), whole
     good = [is_good(source, ['friction']), is_good(source, ['contact']), is_good(source, ['drive'])]
-    whole = all(good) .and. is_good(source, ['body     ', 'restoring', 'effect   '])
+    whole = all(good) .and. is_good(source, ['body     ', 'restoring', 'effect   ', 'motor    '])
     if (good(1)) call check_friction(source, laws, at)
     if (good(2)) call check_barriers(source, laws, at)
     if (whole) call check_bodies(source, laws, at)
     if (.not. good(3)) return
-    if (is_good(source, ['restoring']) .and. needs_spring(laws(drive_position)%name) .and. &
+    if (is_good(source, ['restoring']) .and. needs_spring(laws(drive_position)%name) .and. .not. has_motor(laws) .and. &
         laws(restoring_law)%name /= 'linear') then
       call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
                   '", allowed with "linear": the ratio refers to its natural frequency')
@@ -124,7 +126,10 @@ contains
     type(pair_t) :: pair
     type(multibody_t) :: multibody
     type(error_t), allocatable :: error
-    if (is_multibody(laws)) then
+    type(motor_system_t) :: system
+    if (has_motor(laws)) then
+      call build_motor_equations(laws, system, error)
+    else if (is_multibody(laws)) then
       if (.not. is_good(source, ['spring   ', 'structure'])) return
       call multibody_of(laws, multibody, error)
     else if (is_pair(laws)) then

@@ -12,7 +12,7 @@ module law_reader
   use part_names, only: is_table
   use part_reader, only: has_parts, read_parts
   use law_row, only: law_length
-  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, &
+  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, motor_family, &
     parameter_row_t, parameters_of, set_value, table_of
   use pair_rows, only: pair_laws
   use restoring_law, only: position_is_angle
@@ -52,8 +52,19 @@ contains
       call read_law(source, trim(families(i)), body, position_is_angle(choices(:i - 1)), choices(i))
     end do
     call resolve_static_friction(choices)
+    call read_motor(source, choices)
     call read_effects(source, choices)
   end subroutine read_laws
+
+  !> The table [motor]; a drive without has a given speed.
+  subroutine read_motor(source, choices)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), allocatable, intent(inout) :: choices(:)
+    type(law_choice_t) :: choice
+    if (.not. is_table(source, motor_family)) return
+    call read_law(source, motor_family, '', .false., choice)
+    choices = [choices, choice]
+  end subroutine read_motor
 
   !> The tables [effect.NAME], in the order of the law table.
   subroutine read_effects(source, choices)
@@ -174,6 +185,7 @@ contains
     from_file = .false.
     if (choice%name == 'measured_force') call read_force_file(source, choice, from_file)
     if (any(rows%name == 'ratio')) call refuse_frequency(source, choice%name, rows)
+    if (any(rows%name == 'ratio') .and. is_table(source, motor_family)) call refuse_ratio(source, rows)
     do i = 1, size(rows)
       if (from_file .and. (rows(i)%name == 'interval' .or. rows(i)%name == 'force')) cycle
       call take_row(source, table_of(rows(i)%family, rows(i)%law), rows(i), is_angle, choice%parameters(i)%values)
@@ -194,6 +206,16 @@ contains
                 'angular frequency over sqrt(restoring.stiffness/body.mass)')
     where (rows%name == 'ratio') rows%optional = .true.
   end subroutine refuse_frequency
+
+  !> A motor sets the speed of its crank itself.
+  subroutine refuse_ratio(source, rows)
+    type(case_source_t), intent(inout) :: source
+    type(parameter_row_t), intent(inout) :: rows(:)
+    where (rows%name == 'ratio') rows%optional = .true.
+    if (find(source, 'drive.ratio') == 0) return
+    call know(source, 'drive.ratio')
+    call report(source, 'drive.ratio', 'found with a table [motor], allowed without: the motor sets the speed of the crank')
+  end subroutine refuse_ratio
 
   !> A measured force that is the name of a file, relative to the folder of the case; `found` is false if it is not.
   subroutine read_force_file(source, choice, found)

@@ -20,7 +20,7 @@ module units
     real(wp) :: multiplier, divisor
   end type unit_row_t
 
-  type(unit_row_t), parameter :: rows(43) = [ &
+  type(unit_row_t), parameter :: rows(56) = [ &
     unit_row_t('m', 'm', 1.0_wp, 1.0_wp), &
     unit_row_t('mm', 'm', 1.0_wp, 1e3_wp), &
     unit_row_t('cm', 'm', 1.0_wp, 1e2_wp), &
@@ -63,6 +63,19 @@ module units
     unit_row_t('N', 'N', 1.0_wp, 1.0_wp), &
     unit_row_t('mN', 'N', 1.0_wp, 1e3_wp), &
     unit_row_t('kN', 'N', 1e3_wp, 1.0_wp), &
+    unit_row_t('rpm', 'rad/s', 2*pi, 60.0_wp), &
+    unit_row_t('N m', 'N m', 1.0_wp, 1.0_wp), &
+    unit_row_t('mN m', 'N m', 1.0_wp, 1e3_wp), &
+    unit_row_t('kN m', 'N m', 1e3_wp, 1.0_wp), &
+    unit_row_t('kg m^2', 'kg m^2', 1.0_wp, 1.0_wp), &
+    unit_row_t('kg cm^2', 'kg m^2', 1.0_wp, 1e4_wp), &
+    unit_row_t('g cm^2', 'kg m^2', 1.0_wp, 1e7_wp), &
+    unit_row_t('V', 'V', 1.0_wp, 1.0_wp), &
+    unit_row_t('mV', 'V', 1.0_wp, 1e3_wp), &
+    unit_row_t('ohm', 'ohm', 1.0_wp, 1.0_wp), &
+    unit_row_t('mohm', 'ohm', 1.0_wp, 1e3_wp), &
+    unit_row_t('H', 'H', 1.0_wp, 1.0_wp), &
+    unit_row_t('mH', 'H', 1.0_wp, 1e3_wp), &
     unit_row_t('%', '1', 1.0_wp, 1e2_wp)]
 
 contains

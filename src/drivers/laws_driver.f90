@@ -6,7 +6,8 @@ module laws_driver
   use journal, only: json_text
   use kinds, only: wp
   use law_row, only: law_row_t
-  use law_table, only: effect_family, families, is_hidden, laws, parameter_row_t, parameters_of, part_family, part_kind, &
+  use law_table, only: effect_family, families, is_hidden, laws, motor_family, &
+    parameter_row_t, parameters_of, part_family, part_kind, &
     part_law, table_of
   use text, only: to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
@@ -20,8 +21,8 @@ contains
   !> Prints every law with parameters, units, bounds and source.
   subroutine run_laws(json)
     logical, intent(in) :: json
-    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: part_family, &
-      effect_family]]
+    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: motor_family, &
+      part_family, effect_family]]
     integer :: i, k
     logical :: first
     if (json) write (output_unit, '(a)') '['

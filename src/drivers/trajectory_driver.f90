@@ -124,7 +124,7 @@ contains
     began = monotonic_seconds()
     call begin_trajectory(moving, span, start, trajectory)
     call session%journal%begin('periods', ceiling(span%duration/moving%period, int64), 0_int64)
-    call begin_record(moving, trajectory, log)
+    call begin_record(moving, span, trajectory, log)
     do while (is_recorded(trajectory))
       call go_on(moving, no_catalogue, span, trajectory, outcome, log)
       call session%journal%progress(int(trajectory%elapsed/moving%period, int64))

@@ -55,6 +55,7 @@ contains
     name = 'unit of time'
     if (moving%has_mode()) name = 'period of the slowest mode'
     if (moving%has_drive_period) name = 'drive period'
+    if (.not. moving%timed) name = 'turn without load'
   end function name_of_period
 
   !> When a motion ended [s], to the distance of two samples: as far as it is recorded, or where it left the domain.

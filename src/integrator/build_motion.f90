@@ -12,6 +12,8 @@ module build_motion
   use law_table, only: law_choice_t
   use machine_type, only: machine_t
   use motion_state, only: options_t
+  use motor_choices, only: has_motor
+  use motor_machine, only: motor_machine_t, prepare_motor_machine
   use oscillator, only: build_oscillator, oscillator_t
   use pair, only: build_pair, is_pair, pair_t
   use pair_as_structure, only: structure_of_pair
@@ -30,7 +32,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(body_machine_t) :: body
     type(multibody_machine_t) :: bodies
-    if (has_several(laws)) then
+    type(motor_machine_t) :: driven
+    if (has_motor(laws)) then
+      call prepare_motor_machine(laws, options, driven, error)
+      if (.not. allocated(error)) allocate (machine, source=driven)
+    else if (has_several(laws)) then
       call bodies_of(laws, options, bodies, error)
       if (.not. allocated(error)) allocate (machine, source=bodies)
     else
@@ -89,8 +95,12 @@ contains
     type(oscillator_t) :: machine
     type(pair_t) :: pair
     type(multibody_t) :: multibody
+    type(motor_machine_t) :: driven
     period = 0
-    if (is_multibody(laws)) then
+    if (has_motor(laws)) then
+      call prepare_motor_machine(laws, options_t(), driven, error)
+      if (.not. allocated(error)) period = driven%period
+    else if (is_multibody(laws)) then
       call multibody_of(laws, multibody, error)
       if (.not. allocated(error)) period = multibody%period
     else if (is_pair(laws)) then

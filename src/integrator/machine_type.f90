@@ -11,6 +11,7 @@ module machine_type
   use kinds, only: int64, wp
   use machine_columns, only: machine_column_t
   use motion_state, only: log_t, options_t, reset_tally, state_t, tally_t
+  use motor_state, only: motor_state_t
   use multibody_state, only: multibody_state_t
   use section_size, only: most_coordinates
   implicit none
@@ -22,6 +23,9 @@ module machine_type
   type, public :: section_state_t
     type(state_t) :: state
     type(multibody_state_t) :: multibody
+    type(motor_state_t) :: motor
+    !> The last `advance` ended on the section, where that does not come at given times.
+    logical :: passed = .false.
     !> Time from the last section to this one [s].
     real(wp) :: lasted = 0
   end type section_state_t
@@ -34,6 +38,9 @@ module machine_type
   type, abstract, public :: machine_t
     !> Time from section to section [s], and its circular frequency [rad/s].
     real(wp) :: period = 0, drive_frequency = 0
+    !> The section comes once in a period. Otherwise `advance` ends there, with `passed`, where it comes before the given time, and
+    !> the period is only a scale.
+    logical :: timed = .true.
     !> The section is where the motion turns round, not at a given time.
     logical :: by_event = .false.
     !> An angle repeats after this [rad]; 0 of a position.
@@ -133,7 +140,8 @@ module machine_type
     end function fact_of_machine
 
     !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as in its machine. What follows in `values` are
-    !> positions and velocities of the coordinates of several bodies, in place of those of the machine.
+    !> positions and velocities of the coordinates of several bodies, in place of those of the machine; with a motor the speed of
+    !> the crank [rad/s] and current [A] or integral of the control [rad].
     pure function start_interface(self, values) result(section)
       import :: machine_t, section_state_t, wp
       class(machine_t), intent(in) :: self
@@ -363,6 +371,8 @@ contains
     class(section_state_t), intent(in) :: section
     copy%state = section%state
     copy%multibody = section%multibody
+    copy%motor = section%motor
+    copy%passed = section%passed
     copy%lasted = section%lasted
   end function copy_of
 

@@ -10,6 +10,7 @@ module law_table
   use kinds, only: wp
   use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive, range_t, &
     zero_to_one
+  use motor_rows, only: motor_laws, motor_parameters
   use pair_rows, only: pair_laws, pair_parameters
   use part_rows, only: part_laws, part_parameters
   use text, only: join
@@ -26,6 +27,9 @@ module law_table
 
   !> What may be added to a machine of one body: any number of laws.
   character(len=*), parameter, public :: effect_family = 'effect'
+
+  !> The motor of a drive whose power is limited: one law, or none.
+  character(len=*), parameter, public :: motor_family = 'motor'
 
   !> The parts of a machine of several bodies: any number of laws, each with a name of its own. Their laws are named
   !> 'table:law'.
@@ -137,11 +141,12 @@ module law_table
                     optional=.true.)]
 
   type(law_row_t), parameter, public :: laws( &
-    size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws)) = &
-    [other_laws, contact_laws, pair_laws, part_laws, effect_laws]
+    size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws) + &
+    size(motor_laws)) = [other_laws, contact_laws, pair_laws, part_laws, effect_laws, motor_laws]
   type(parameter_row_t), parameter, public :: parameters( &
     size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(part_parameters) + &
-    size(effect_parameters)) = [other_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters]
+    size(effect_parameters) + size(motor_parameters)) = [other_parameters, contact_parameters, pair_parameters, &
+                                                         part_parameters, effect_parameters, motor_parameters]
 
 contains
 
@@ -235,14 +240,16 @@ contains
                                                  any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body']))
   end function is_hidden
 
-  !> Whether a path names where a body of several, or a coordinate of a structure, starts: 'body.NAME.x0',
-  !> 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
+  !> Whether a path names how a motor, a body of several, or a coordinate of a structure starts: 'motor.crank_speed',
+  !> 'body.NAME.x0', 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
   pure logical function is_start_parameter(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: name
     integer :: element, mark
     call split_element(path, name, element)
     mark = index(name, '.', back=.true.)
+    is_start_parameter = path == 'motor.crank_speed' .or. path == 'motor.start_current' .or. path == 'motor.start_integral'
+    if (is_start_parameter) return
     is_start_parameter = (name(mark + 1:) == 'x0' .or. name(mark + 1:) == 'v0') .and. &
       ((index(name, 'body.') == 1 .and. mark > 5 .and. element == 0) .or. (index(name, 'structure.') == 1 .and. element > 0))
   end function is_start_parameter

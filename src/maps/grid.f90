@@ -13,6 +13,7 @@ module grid
   use multibody, only: multibody_t
   use kinds, only: int64, wp
   use law_table, only: change_parameter, is_start_parameter, law_choice_t
+  use motor_choices, only: has_motor, start_of_motor
   use motion_state, only: options_t
   use text, only: number_in
   implicit none
@@ -103,7 +104,7 @@ contains
     end if
   end subroutine vary
 
-  !> How the start of all coordinates of several bodies depends on what varies: linearly.
+  !> How the start of a motor, or of all coordinates of several bodies, depends on what varies: linearly.
   pure subroutine find_directions(grid)
     type(grid_t), intent(inout) :: grid
     type(law_choice_t), allocatable :: laws(:)
@@ -112,7 +113,7 @@ contains
     extra = size(grid%start_axis) - 3
     allocate (grid%others(0), grid%direction(0, extra))
     if (extra == 0) return
-    if (.not. is_multibody(grid%laws)) return
+    if (.not. (is_multibody(grid%laws) .or. has_motor(grid%laws))) return
     laws = grid%laws
     do k = 4, 3 + extra
       call change_parameter(laws, grid%start_names(k), 0.0_wp, known)
@@ -138,12 +139,17 @@ contains
     direction = starts_of(changed) - others
   end subroutine change_one
 
-  !> Position and velocity of every coordinate at the start, one after the other; none of laws that are refused.
+  !> Position and velocity of every coordinate at the start, one after the other, or the start of a motor; none of laws that are
+  !> refused.
   pure function starts_of(laws) result(starts)
     type(law_choice_t), intent(in) :: laws(:)
     real(wp), allocatable :: starts(:)
     type(multibody_t) :: machine
     type(error_t), allocatable :: error
+    if (has_motor(laws)) then
+      starts = start_of_motor(laws)
+      return
+    end if
     call multibody_of(laws, machine, error)
     allocate (starts(0))
     if (.not. allocated(error)) starts = reshape(machine%start, [2*machine%n])

@@ -13,7 +13,7 @@ module oscillator
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, value_of
+  use law_table, only: effect_family, law_choice_t, motor_family, value_of
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
   implicit none
@@ -188,19 +188,26 @@ contains
     end associate
   end subroutine set_bounds
 
-  !> Refuses the laws of two bodies for one. The message begins with the key.
+  !> Refuses the laws of two bodies, and those that a motor drives, for one body without. The message begins with the key.
   pure subroutine refuse_pair(choices, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(error_t), allocatable, intent(out) :: error
     integer :: i
     do i = 1, size(choices)
       if (allocated(error)) return
+      if (choices(i)%family == motor_family) then
+        call fail(error, exit_bad_case, 'motor.law: found "'//trim(choices(i)%name)//'", allowed in the commands trajectory, '// &
+                  'basin and sweep')
+        return
+      end if
       select case (choices(i)%name)
       case ('friction_pair', 'backlash_pair')
         call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
       case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')
         call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with two bodies '// &
                   '(body.law = "friction_pair" or "backlash_pair")')
+      case ('slider_crank', 'unbalance')
+        call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with a table [motor]')
       end select
     end do
   end subroutine refuse_pair

@@ -1,0 +1,79 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What a log holds of a machine with a motor: beside the body crank angle and speed, torques, power and current.
+module motor_log
+  use constants, only: two_pi
+  use kinds, only: wp
+  use motion_state, only: energy_balance_t, log_t, mode_slip_minus, put_column, record_event, record_sample, state_t
+  use motor_equations, only: motor_system_t
+  use motor_state, only: motor_state_t
+  use tape_value, only: evaluate
+  implicit none
+  private
+
+  public :: add_sample, motor_energy, motor_values, record_motor_event
+
+contains
+
+  !> Torque of the motor, torque against it [N m], power of the motor [W], current or integral, kinetic energy, energy [J].
+  pure function motor_values(system, state, crank) result(values)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: values(6)
+    real(wp) :: node(system%sheet%tape%count), parameters(size(system%sheet%parameters)), z(5)
+    integer :: fault(system%sheet%tape%count)
+    z = [crank%phi, crank%w, state%x, state%v, crank%y]
+    parameters = system%sheet%parameters
+    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
+    parameters(system%turning) = crank%turning
+    call evaluate(system%sheet%tape, z(:system%variables), parameters, node, fault)
+    values = [node(system%torque), node(system%load), node(system%torque)*crank%w, crank%y, node(system%kinetic), &
+              node(system%energy)]
+    if (system%current > 0) values(4) = node(system%current)
+  end function motor_values
+
+  !> Energy of the machine [J]: kinetic, and of the spring. That of a current is the motor's.
+  pure real(wp) function motor_energy(system, state, crank) result(energy)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: values(6)
+    values = motor_values(system, state, crank)
+    energy = values(6)
+  end function motor_energy
+
+  !> Crank angle since the start and crank speed.
+  pure function crank_of(crank) result(motion)
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: motion(2)
+    motion = [crank%phi + two_pi*crank%turns, crank%w]
+  end function crank_of
+
+  !> Writes a sample down.
+  pure subroutine add_sample(system, state, crank, log)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(log_t), intent(inout) :: log
+    type(energy_balance_t) :: balance
+    real(wp) :: values(6)
+    values = motor_values(system, state, crank)
+    balance = log%balance
+    balance%at_end = values(6)
+    call put_column(log%sample_coordinates, log%samples + 1, values(:5))
+    call record_sample(log, state, driver=crank_of(crank), balance=balance)
+  end subroutine add_sample
+
+  !> Writes an event down: the state before it and the velocity after it.
+  pure subroutine record_motor_event(kind, state, crank, v_after, log)
+    integer, intent(in) :: kind
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp), intent(in) :: v_after
+    type(log_t), intent(inout) :: log
+    call record_event(log, kind, state, v_after, driver=crank_of(crank))
+  end subroutine record_motor_event
+
+end module motor_log

@@ -1,0 +1,106 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> How a mode of a machine with a motor begins: its equations, the guards that end it, and which of these are zero at first.
+module motor_modes
+  use constants, only: two_pi
+  use kinds, only: wp
+  use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_upper_barrier, state_t
+  use motor_equations, only: guard_back, guard_body_down, guard_body_up, guard_crank_down, guard_crank_up, guard_fastest, &
+    guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
+  use motor_rest, only: equation_mode, low_series, slips, state_vector, zero_order
+  use motor_state, only: motor_state_t
+  use series_flight, only: flight_t
+  use tape_series, only: series_t
+  implicit none
+  private
+
+  public :: begin_mode, keep_angle
+
+contains
+
+  !> The equations and guards of the present mode.
+  pure subroutine begin_mode(system, state, crank, needs_v_max, kept, flight, fault)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(inout) :: crank
+    logical, intent(in) :: needs_v_max
+    integer, intent(in) :: kept
+    type(flight_t), intent(out) :: flight
+    integer, intent(out) :: fault
+    type(series_t) :: series
+    integer :: mode, slip
+    mode = equation_mode(slips(state%mode), crank%turning /= 0)
+    slip = merge(-1, 1, state%mode == mode_slip_minus)
+    call keep_angle(crank)
+    flight = system%flights(mode, kept)
+    flight%state(:system%variables) = state_vector(system, state, crank)
+    flight%state(system%variables + 1:) = 0
+    flight%time = state%time
+    flight%parameters(system%slip) = slip
+    flight%parameters(system%turning) = crank%turning
+    call low_series(system, mode, state, crank, series, fault)
+    flight%is_active = .false.
+    if (slips(state%mode)) then
+      call watch(flight, guard_turning, -slip)
+      if (slip > 0 .and. system%contact%upper < huge(1.0_wp)) call watch(flight, guard_upper, 1)
+      if (slip < 0 .and. system%contact%lower > -huge(1.0_wp)) call watch(flight, guard_lower, -1)
+      if (slip > 0 .and. needs_v_max) call watch(flight, guard_fastest, -1)
+      if (.not. abs(state%v) > 0) flight%zeros(guard_turning) = zero_order(series%c(:, flight%rates(4)), least(system, state))
+    else
+      if (state%mode /= mode_upper_barrier) call watch(flight, guard_body_up, 1)
+      if (state%mode /= mode_lower_barrier) call watch(flight, guard_body_down, -1)
+      call mark_zeros(flight, series, [guard_body_up, guard_body_down], system%mass*least(system, state))
+    end if
+    if (crank%turning /= 0) then
+      call watch(flight, guard_standstill, -crank%turning)
+      call watch(flight, merge(guard_section, guard_back, crank%turning > 0), crank%turning)
+      if (.not. abs(crank%w) > 0) flight%zeros(guard_standstill) = zero_order(series%c(:, flight%rates(2)), 0.0_wp)
+    else
+      call watch(flight, guard_crank_up, 1)
+      call watch(flight, guard_crank_down, -1)
+      call mark_zeros(flight, series, [guard_crank_up, guard_crank_down], 32*epsilon(1.0_wp)*abs(series%c(0, system%torque)))
+    end if
+  end subroutine begin_mode
+
+  !> What rounding does to the acceleration of the body [m/s^2].
+  pure real(wp) function least(system, state)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    least = 64*epsilon(1.0_wp)*(system%stiffness*(abs(state%x) + abs(system%free_length)) + system%friction%break_away)/system%mass
+  end function least
+
+  pure subroutine watch(flight, guard, direction)
+    type(flight_t), intent(inout) :: flight
+    integer, intent(in) :: guard, direction
+    flight%is_active(guard) = .true.
+    flight%guards(guard)%direction = direction
+  end subroutine watch
+
+  !> Guards that begin at zero.
+  pure subroutine mark_zeros(flight, series, guards, rounding)
+    type(flight_t), intent(inout) :: flight
+    type(series_t), intent(in) :: series
+    integer, intent(in) :: guards(:)
+    real(wp), intent(in) :: rounding
+    integer :: i
+    do i = 1, size(guards)
+      associate (c => series%c(:, flight%guards(guards(i))%node))
+        if (abs(c(1)) <= rounding) flight%zeros(guards(i)) = zero_order(c(2:), 0.0_wp)
+      end associate
+    end do
+  end subroutine mark_zeros
+
+  !> The angle from 0 to 2 pi, whichever way the crank turns.
+  pure subroutine keep_angle(crank)
+    type(motor_state_t), intent(inout) :: crank
+    if (crank%turning < 0 .and. crank%phi <= 0) then
+      crank%phi = two_pi
+      crank%turns = crank%turns - 1
+    else if (crank%turning > 0 .and. crank%phi >= two_pi) then
+      crank%phi = 0
+      crank%turns = crank%turns + 1
+    end if
+  end subroutine keep_angle
+
+end module motor_modes

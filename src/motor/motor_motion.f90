@@ -1,0 +1,323 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The event loop of a body driven by a motor: slip, turning point, stick, release, impact, chatter, rest on a stop; the crank
+!> passing through zero, coming to a standstill, held by its bearing, and turning again.
+module motor_motion
+  use constants, only: two_pi
+  use elementary, only: sine_cosine
+  use errors, only: error_t
+  use kinds, only: wp
+  use law_table, only: law_choice_t
+  use motion_state, only: append_word, event_barrier_release, event_chatter_lower, event_chatter_upper, &
+    event_impact_lower, event_impact_upper, event_release, event_stick, event_turning_point, log_t, mode_lower_barrier, &
+    mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, sample_due, sample_time, &
+    state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, word_stick, word_upper
+  use motor_equations, only: build_motor_equations, guard_back, guard_body_down, guard_body_up, guard_crank_down, &
+    guard_crank_up, guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
+  use motor_log, only: add_sample, motor_energy, record_motor_event
+  use motor_modes, only: begin_mode, keep_angle
+  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, slips
+  use motor_state, only: motor_state_t
+  use series_flight, only: advance_flight, flight_crossed, flight_left_domain, flight_no_progress, flight_reached, &
+    flight_step_budget, flight_t
+  use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
+    reason_step_failed
+  implicit none
+  private
+
+  public :: prepare_motor, start_motor, advance_motor
+
+  !> Events without progress in time after which a motion is given up.
+  integer, parameter :: most_idle_events = 32
+
+  !> A machine with a motor, ready to move.
+  type, public :: motor_motion_t
+    type(motor_system_t) :: system
+    type(options_t) :: options
+  end type motor_motion_t
+
+contains
+
+  !> The machine of `choices`, ready to move.
+  pure subroutine prepare_motor(choices, options, moving, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(options_t), intent(in) :: options
+    type(motor_motion_t), intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    call build_motor_equations(choices, moving%system, error)
+    moving%options = options
+    moving%options%lane_width = 0
+  end subroutine prepare_motor
+
+  !> A body at `x` [m], `v` [m/s], the crank at `angle` [rad] with `speed` [rad/s], current [A] or integral `y`.
+  pure subroutine start_motor(moving, values, state, crank)
+    type(motor_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: values(5)
+    type(state_t), intent(out) :: state
+    type(motor_state_t), intent(out) :: crank
+    integer :: i
+    state = state_t(x=values(1), v=values(2), mode=merge(mode_slip_minus, mode_slip_plus, values(2) < 0))
+    crank%phi = modulo(values(3), two_pi)
+    crank%w = values(4)
+    crank%y = values(5)
+    crank%turning = merge(-1, 1, crank%w < 0)
+    ! Of an unbalance, what holds the one depends on whether the other moves.
+    do i = 1, 2
+      if (.not. abs(crank%w) > 0) call choose_crank(moving%system, state, crank)
+      if (.not. abs(state%v) > 0) call choose_body(moving%system, state, crank)
+    end do
+  end subroutine start_motor
+
+  !> Moves to `time_end` [s], or only to the next section, the crank passing through zero upwards, `at_section` then being true.
+  !> `reason` stays 0 unless the motion had to be given up.
+  pure subroutine advance_motor(moving, state, crank, time_end, at_section, tally, reason, log)
+    type(motor_motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    real(wp), intent(in) :: time_end
+    logical, intent(inout) :: at_section
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    type(log_t), intent(inout), optional :: log
+    type(flight_t) :: flight
+    real(wp) :: before
+    integer :: idle
+    logical :: stops, passed
+    stops = at_section
+    at_section = .false.
+    reason = 0
+    idle = 0
+    do while (state%time < time_end)
+      tally%events = tally%events + 1
+      if (tally%events > moving%options%event_budget) reason = reason_event_budget
+      if (reason /= 0) return
+      before = state%time
+      call fly(moving, state, crank, time_end, flight, tally, reason, log)
+      if (reason /= 0) return
+      if (slips(state%mode)) tally%slips = tally%slips + 1
+      call note_position(tally, state)
+      call do_events(moving, flight%crossed, state, crank, passed, tally, log)
+      idle = merge(0, idle + 1, state%time > before)
+      if (idle >= most_idle_events) reason = reason_mode_cycle
+      if (.not. abs(state%x) <= moving%options%domain) reason = reason_left_domain
+      if (state%x /= state%x .or. state%v /= state%v .or. crank%w /= crank%w) reason = reason_not_finite
+      if (tally%steps > moving%options%step_budget) reason = reason_step_budget
+      if (reason /= 0) return
+      at_section = passed .and. stops
+      if (at_section) return
+    end do
+  end subroutine advance_motor
+
+  !> One mode, to its next event or `time_end`, with the samples on the way.
+  pure subroutine fly(moving, state, crank, time_end, flight, tally, reason, log)
+    type(motor_motion_t), intent(in) :: moving
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    real(wp), intent(in) :: time_end
+    type(flight_t), intent(out) :: flight
+    type(tally_t), intent(inout) :: tally
+    integer, intent(inout) :: reason
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: until
+    integer :: status, fault
+    call begin_mode(moving%system, state, crank, tally%needs_v_max, merge(1, 0, present(log)), flight, fault)
+    status = merge(flight_left_domain, flight_reached, fault > 0)
+    do while (status == flight_reached .or. status == flight_crossed)
+      until = time_end
+      if (present(log)) then
+        if (log%sample_interval > 0 .or. allocated(log%instants)) then
+          do while (sample_due(log, time_end) .and. sample_time(log) <= flight%time)
+            call add_sample(moving%system, state, crank, log)
+          end do
+          if (sample_due(log, time_end)) until = min(time_end, sample_time(log))
+        end if
+      end if
+      call advance_flight(flight, until, status)
+      call take_state(moving%system, flight, state, crank, log)
+      if (status == flight_crossed) then
+        if (.not. flight%crossed(guard_fastest)) exit
+        tally%v_max = max(tally%v_max, state%v)
+        if (count(flight%crossed) > 1) exit
+      end if
+      if (status == flight_reached .and. until >= time_end) exit
+    end do
+    tally%steps = tally%steps + flight%steps
+    tally%v_max = max(tally%v_max, state%v)
+    if (status == flight_step_budget) reason = reason_step_budget
+    if (status == flight_left_domain .or. status == flight_no_progress) reason = reason_step_failed
+  end subroutine fly
+
+  !> State and losses after a part of a flight.
+  pure subroutine take_state(system, flight, state, crank, log)
+    type(motor_system_t), intent(in) :: system
+    type(flight_t), intent(inout) :: flight
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(log_t), intent(inout), optional :: log
+    integer :: n
+    n = system%variables
+    state%time = flight%time
+    crank%phi = flight%state(1)
+    crank%w = flight%state(2)
+    state%x = flight%state(3)
+    state%v = flight%state(4)
+    if (n > 4) crank%y = flight%state(5)
+    if (.not. present(log)) return
+    log%balance%work = log%balance%work + flight%state(n + 1)
+    log%balance%friction = log%balance%friction + flight%state(n + 2)
+    log%balance%damping = log%balance%damping + flight%state(n + 3)
+    flight%state(n + 1:) = 0
+  end subroutine take_state
+
+  !> What happens where guards crossed zero; `passed`: the section upwards.
+  pure subroutine do_events(moving, crossed, state, crank, passed, tally, log)
+    type(motor_motion_t), intent(in) :: moving
+    logical, intent(in) :: crossed(:)
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    logical, intent(out) :: passed
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    associate (system => moving%system)
+      passed = crossed(guard_section)
+      if (crossed(guard_section)) then
+        crank%phi = two_pi
+        call keep_angle(crank)
+        call append_word(tally, word_period)
+      else if (crossed(guard_back)) then
+        crank%phi = 0
+        call keep_angle(crank)
+      end if
+      if (crossed(guard_standstill)) then
+        crank%w = 0
+        call choose_crank(system, state, crank)
+      else if (crossed(guard_crank_up) .or. crossed(guard_crank_down)) then
+        crank%turning = merge(1, -1, crossed(guard_crank_up))
+      end if
+      if (crossed(guard_upper) .or. crossed(guard_lower)) then
+        call hit_stop(system, merge(1, -1, crossed(guard_upper)), state, crank, tally, log)
+      else if (crossed(guard_turning)) then
+        call come_to_rest(system, state, crank, tally, log)
+      else if (crossed(guard_body_up) .or. crossed(guard_body_down)) then
+        call release(merge(mode_slip_plus, mode_slip_minus, crossed(guard_body_up)), state, crank, log)
+      end if
+      if (any(crossed) .and. system%moment > 0) call check_holds(system, state, crank, log)
+    end associate
+  end subroutine do_events
+
+  !> Of an unbalance: what was held may be so no longer where the other one begins or ceases to move.
+  pure subroutine check_holds(system, state, crank, log)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: free
+    if (crank%turning == 0) call choose_crank(system, state, crank)
+    if (slips(state%mode)) return
+    free = state
+    call choose_body(system, free, crank)
+    if (slips(free%mode)) call release(free%mode, state, crank, log)
+  end subroutine check_holds
+
+  !> Friction or a stop no longer holds the body.
+  pure subroutine release(mode, state, crank, log)
+    integer, intent(in) :: mode
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(log_t), intent(inout), optional :: log
+    integer :: event
+    event = merge(event_release, event_barrier_release, state%mode == mode_stick)
+    state%mode = mode
+    if (present(log)) call record_motor_event(event, state, crank, state%v, log)
+  end subroutine release
+
+  !> Zero velocity: the forces choose the next mode.
+  pure subroutine come_to_rest(system, state, crank, tally, log)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    associate (upper => system%contact%upper, lower => system%contact%lower)
+      if (state%x < upper .and. state%x > lower) then
+        tally%grazing_margin = min(tally%grazing_margin, merge(upper - state%x, state%x - lower, state%mode == mode_slip_plus))
+      end if
+    end associate
+    state%v = 0
+    call choose_body(system, state, crank)
+    if (.not. slips(state%mode)) then
+      tally%sticks = tally%sticks + 1
+      call append_word(tally, word_stick)
+    end if
+    if (present(log)) call record_motor_event(merge(event_turning_point, event_stick, slips(state%mode)), state, &
+                                              crank, 0.0_wp, log)
+  end subroutine come_to_rest
+
+  !> Impact: Newton's law for the body; an unbalance throws the crank. Then away, at rest, or the end of a chatter sequence.
+  pure subroutine hit_stop(system, direction, state, crank, tally, log)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: direction
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    real(wp) :: after, left, energy
+    logical :: over
+    state%x = merge(system%contact%upper, system%contact%lower, direction > 0)
+    after = -system%contact%restitution*state%v
+    tally%impacts = tally%impacts + 1
+    tally%last_impact_speed = abs(state%v)
+    tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)
+    call append_word(tally, merge(word_upper, word_lower, direction > 0))
+    if (present(log)) call record_motor_event(merge(event_impact_upper, event_impact_lower, direction > 0), state, &
+                                              crank, after, log)
+    energy = motor_energy(system, state, crank)
+    call set_velocity(system, after, state, crank)
+    state%mode = merge(mode_slip_minus, mode_slip_plus, direction > 0)
+    if (.not. abs(after) > 0) then
+      call come_to_rest(system, state, crank, tally, log)
+    else
+      call chatter_dies_out(system, state, crank, direction, left, over)
+      if (over) call end_chatter(system, direction, left, state, crank, tally, log)
+    end if
+    if (present(log)) log%balance%contact = log%balance%contact + energy - motor_energy(system, state, crank)
+  end subroutine hit_stop
+
+  !> A new velocity of the body; the momentum of the crank about its axis, with that of an unbalance, stays.
+  pure subroutine set_velocity(system, v, state, crank)
+    type(motor_system_t), intent(in) :: system
+    real(wp), intent(in) :: v
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    real(wp) :: sine, cosine
+    if (system%moment > 0) then
+      call sine_cosine(crank%phi, sine, cosine)
+      crank%w = crank%w + system%moment*sine*(v - state%v)/system%rotor_inertia
+      if (abs(crank%w) > 0) crank%turning = merge(1, -1, crank%w > 0)
+    end if
+    state%v = v
+  end subroutine set_velocity
+
+  !> The body rests on the stop; the log has the instant of accumulation.
+  pure subroutine end_chatter(system, direction, left, state, crank, tally, log)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: direction
+    real(wp), intent(in) :: left
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(tally_t), intent(inout) :: tally
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: ended
+    call set_velocity(system, 0.0_wp, state, crank)
+    state%mode = merge(mode_upper_barrier, mode_lower_barrier, direction > 0)
+    tally%chatters = tally%chatters + 1
+    tally%sticks = tally%sticks + 1
+    call append_word(tally, merge(word_chatter_upper, word_chatter_lower, direction > 0))
+    ended = state
+    ended%time = state%time + left
+    if (present(log)) call record_motor_event(merge(event_chatter_upper, event_chatter_lower, direction > 0), ended, &
+                                              crank, 0.0_wp, log)
+  end subroutine end_chatter
+
+end module motor_motion

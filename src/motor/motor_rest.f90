@@ -1,0 +1,188 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Body and crank at zero velocity: which way each goes on, and how a sequence of ever smaller impacts ends.
+module motor_rest
+  use kinds, only: wp
+  use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, state_t
+  use motor_equations, only: body_held, both_held, both_move, crank_held, motor_system_t
+  use motor_state, only: motor_state_t
+  use series_flight, only: flight_t
+  use tape_series, only: expand, prepare_series, series_t
+  implicit none
+  private
+
+  public :: choose_body, choose_crank, equation_mode, slips, state_vector, chatter_dies_out, low_series, zero_order
+
+  !> Terms that decide which way a motion from rest goes.
+  integer, parameter, public :: low_order = 8
+  !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
+  !> is completed, and the same where a bounce is below the rounding of the position.
+  real(wp), parameter :: chatter_uniformity = 1e-6_wp, unflown_uniformity = 0.5_wp
+
+contains
+
+  pure logical function slips(mode)
+    integer, intent(in) :: mode
+    slips = mode == mode_slip_plus .or. mode == mode_slip_minus
+  end function slips
+
+  !> Which equations hold.
+  pure integer function equation_mode(body_slips, crank_turns) result(mode)
+    logical, intent(in) :: body_slips, crank_turns
+    mode = merge(merge(both_move, crank_held, crank_turns), merge(body_held, both_held, crank_turns), body_slips)
+  end function equation_mode
+
+  !> The variables of the equations.
+  pure function state_vector(system, state, crank) result(z)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: z(system%variables)
+    real(wp) :: all(5)
+    all = [crank%phi, crank%w, state%x, state%v, crank%y]
+    z = all(:system%variables)
+  end function state_vector
+
+  !> First Taylor coefficients of everything in a mode. The sign of slip is that of the mode of the body.
+  pure subroutine low_series(system, mode, state, crank, series, fault)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: mode
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(series_t), intent(out) :: series
+    integer, intent(out) :: fault
+    real(wp) :: parameters(size(system%sheet%parameters))
+    parameters = system%sheet%parameters
+    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
+    parameters(system%turning) = crank%turning
+    associate (flight => system%flights(mode, 0))
+      call prepare_series(flight%tape, low_order, flight%rates, &
+                          [flight%guards%node, system%torque, system%load, system%foot, system%inertia], [integer ::], series)
+      call expand(flight%tape, state_vector(system, state, crank), parameters, series, fault)
+    end associate
+  end subroutine low_series
+
+  !> Order of the zero of a rate's integral that is zero now: `c` are coefficients of the rate, `rounding` that of the first.
+  pure integer function zero_order(c, rounding) result(order)
+    real(wp), intent(in) :: c(0:), rounding
+    do order = 1, ubound(c, 1)
+      if (abs(c(order - 1)) > merge(rounding, 0.0_wp, order == 1)) return
+    end do
+  end function zero_order
+
+  !> Mode of the body at zero velocity: at the edge of sticking the next terms of the force decide; a stop holds whatever pushes
+  !> against it.
+  pure subroutine choose_body(system, state, crank)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(series_t) :: series
+    integer :: mode, fault
+    logical :: up, down
+    mode = equation_mode(.false., crank%turning /= 0)
+    call low_series(system, mode, state, crank, series, fault)
+    associate (c => series%c(:, system%body_hold(mode)), level => system%body_level)
+      up = is_over(c, level, force_rounding(system, state, crank, series))
+      down = is_over(-c, level, force_rounding(system, state, crank, series))
+    end associate
+    if (up .and. state%x < system%contact%upper) then
+      state%mode = mode_slip_plus
+    else if (down .and. state%x > system%contact%lower) then
+      state%mode = mode_slip_minus
+    else if (state%x >= system%contact%upper) then
+      state%mode = mode_upper_barrier
+    else if (state%x <= system%contact%lower) then
+      state%mode = mode_lower_barrier
+    else
+      state%mode = mode_stick
+    end if
+  end subroutine choose_body
+
+  !> Which way the crank turns from standstill, or whether its bearing holds it.
+  pure subroutine choose_crank(system, state, crank)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(series_t) :: series
+    real(wp) :: rounding
+    integer :: mode, fault
+    mode = equation_mode(slips(state%mode), .false.)
+    crank%turning = 0
+    call low_series(system, mode, state, crank, series, fault)
+    associate (c => series%c(:, system%crank_hold(mode)), level => system%crank_level)
+      rounding = 32*epsilon(1.0_wp)*(abs(series%c(0, system%torque)) + abs(series%c(0, system%load)) + level)
+      if (is_over(c, level, rounding)) then
+        crank%turning = 1
+      else if (is_over(-c, level, rounding)) then
+        crank%turning = -1
+      end if
+    end associate
+  end subroutine choose_crank
+
+  !> Whether a force with the Taylor coefficients `c` overcomes what holds against it.
+  pure logical function is_over(c, level, rounding)
+    real(wp), intent(in) :: c(0:), level, rounding
+    integer :: k
+    is_over = c(0) - level > rounding
+    if (abs(c(0) - level) > rounding) return
+    do k = 1, ubound(c, 1)
+      is_over = c(k) > 0
+      if (abs(c(k)) > 0) return
+    end do
+  end function is_over
+
+  !> What rounding does to the force on the body [N].
+  pure real(wp) function force_rounding(system, state, crank, series) result(rounding)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(series_t), intent(in) :: series
+    rounding = system%stiffness*(abs(system%free_length) + abs(state%x) + abs(series%c(0, system%foot)))
+    rounding = 32*epsilon(1.0_wp)*(rounding + system%body_level + system%moment*crank%w**2)
+  end function force_rounding
+
+  !> Whether impacts on the stop in `direction` 1 or -1 are over within `left` [s], the body having just left it. One bounce with
+  !> constant friction: out at (R + F)/m, back at (R - F)/m, the speed shrinks by k sqrt(back/out), so that times form a
+  !> geometric series. What they change is then less than the uniformity, so that the body may rest at once.
+  pure subroutine chatter_dies_out(system, state, crank, direction, left, over)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    integer, intent(in) :: direction
+    real(wp), intent(out) :: left
+    logical, intent(out) :: over
+    type(state_t) :: resting
+    type(series_t) :: series
+    real(wp) :: push, friction, out, back, change, shrink, height, speed
+    integer :: mode, fault
+    mode = equation_mode(.false., crank%turning /= 0)
+    resting = state
+    resting%v = 0
+    left = 0
+    over = .false.
+    call low_series(system, mode, resting, crank, series, fault)
+    if (fault > 0) return
+    speed = abs(state%v)
+    associate (law => system%friction, force => series%c(:, system%body_hold(mode)))
+      push = direction*force(1)
+      if (push <= system%body_level) return
+      friction = law%kinetic + law%excess
+      out = (push + friction)/system%mass
+      back = (push - friction)/system%mass
+      if (back <= 0) return
+      shrink = sqrt(back/out)*system%contact%restitution
+      if (shrink >= 1) return
+      left = (speed/out + speed/sqrt(back*out))/(1 - shrink)
+      height = speed**2/(2*out)
+      change = abs(force(2))*left + abs(force(3))*left**2 + law%damping*speed + system%stiffness*height
+      if (law%excess > 0) change = change + law%excess*min(1.0_wp, speed/law%stribeck_velocity)
+      change = change/(system%mass*back)
+      over = change <= chatter_uniformity
+      if (height < 8*epsilon(1.0_wp)*(abs(state%x) + abs(series%c(0, system%foot)) + system%free_length)) then
+        over = change <= unflown_uniformity
+      end if
+    end associate
+  end subroutine chatter_dies_out
+
+end module motor_rest

@@ -1,0 +1,21 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> State of a motor beside that of the body that it drives.
+module motor_state
+  use kinds, only: wp
+  implicit none
+  private
+
+  type, public :: motor_state_t
+    !> Crank angle, from 0 to 2 pi [rad], and its speed [rad/s].
+    real(wp) :: phi = 0, w = 0
+    !> Current [A], or integral of the speed control [rad].
+    real(wp) :: y = 0
+    !> 1 or -1: the crank turns this way; 0: its bearing holds it.
+    integer :: turning = 1
+    !> Turns taken off the angle.
+    integer :: turns = 0
+  end type motor_state_t
+
+end module motor_state
