@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The working file of a map, PATH.part: created whole by rank 0, which sends the others the offset of the tiles; then written by all
-!> ranks independently. It is its own checkpoint: each tile has a state and a checksum.
+!> The working file of a map, PATH.part: created whole by rank 0, which sends the others the offset of the tiles; then written by
+!> all ranks independently. It is its own checkpoint: each tile has a state and a checksum.
 module map_file
   use errors, only: error_t, fail
   use files, only: free_bytes, publish_file, remove_file, reserve_file
@@ -292,8 +292,8 @@ contains
     tile_bytes = self%tiling%points(tile)*self%schema%bytes_of_point()
   end function tile_bytes
 
-  !> Takes a tile that is done; it is in the file within half a second, or after `flush`. `values`: (points of the tile in its C order,
-  !> tiled variables in the order of the schema). On an error (code 74) the caller ends all ranks.
+  !> Takes a tile that is done; it is in the file within half a second, or after `flush`. `values`: (points of the tile in its C
+  !> order, tiled variables in the order of the schema). On an error (code 74) the caller ends all ranks.
   subroutine write_tile(self, tile, values, error)
     class(map_file_t), intent(inout) :: self
     integer, intent(in) :: tile

@@ -33,8 +33,8 @@ contains
 
   !> Turns the working file, all of whose tiles are done, into the final file. Collective; the file is closed afterwards. `extra`:
   !> what is known only now, as summary tables; its attributes replace those of the same name. Code 75 if tiles are missing, 74 if
-  !> the disk fails or data is damaged (then the working file can be resumed). `alone`: seconds in which rank 0 worked and the others
-  !> waited.
+  !> the disk fails or data is damaged (then the working file can be resumed). `alone`: seconds in which rank 0 worked and the
+  !> others waited.
   subroutine finalise(file, team, extra, error, alone)
     type(map_file_t), intent(inout) :: file
     class(team_t), intent(in) :: team

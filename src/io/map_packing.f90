@@ -2,8 +2,8 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The tiled variables of a map, from the working file into the final one, by all ranks. Each compresses its share of the chunks;
-!> rank 0 learns their lengths alone, takes their offsets in the file, and each writes its own there. A slab of the grid is read once,
-!> for all variables. Who does what does not show: chunks lie in the order of slabs, variables and C order.
+!> rank 0 learns their lengths alone, takes their offsets in the file, and each writes its own there. A slab of the grid is read
+!> once, for all variables. Who does what does not show: chunks lie in the order of slabs, variables and C order.
 module map_packing
   use boxes, only: copy_common
   use byte_file, only: byte_file_t
