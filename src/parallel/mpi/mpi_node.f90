@@ -138,16 +138,17 @@ contains
     last = int(next + count - 1)
   end subroutine take
 
-  !> Takes up to `wanted` items in a row, the fewer the less is left, so that ranks end together: `first` to `last`.
-  subroutine take_run(self, wanted, first, last)
+  !> Takes up to `wanted` items in a row, the fewer the less is left for the `takers` ranks, so that they end together: `first` to
+  !> `last`.
+  subroutine take_run(self, wanted, takers, first, last)
     class(node_t), intent(in) :: self
-    integer, intent(in) :: wanted
+    integer, intent(in) :: wanted, takers
     integer, intent(out) :: first, last
     integer(int64) :: next, end, count
     call lock(self)
     next = atomic_load(self%words, word_next)
     end = atomic_load(self%words, word_last)
-    count = min(int(wanted, int64), max(1_int64, (end - next + 1)/(run_share*self%size)), end - next + 1)
+    count = min(int(wanted, int64), max(1_int64, (end - next + 1)/(run_share*takers)), end - next + 1)
     call atomic_store(self%words, word_next, next + count)
     call atomic_store(self%words, word_lock, 0_int64)
     first = int(next)

@@ -123,7 +123,7 @@ contains
       item = 0
       call self%poll()
       if (self%node%is_stopped()) return
-      if (self%run_next > self%run_last) call self%node%take_run(run_length(self), self%run_next, self%run_last)
+      if (self%run_next > self%run_last) call self%node%take_run(run_length(self), takers(self), self%run_next, self%run_last)
       if (self%run_last >= self%run_next) exit
       if (self%node%number == 1) return
       if (self%node%is_exhausted()) return
@@ -135,6 +135,12 @@ contains
     self%item_began = self%elapsed()
     call self%log%begin(item, self%item_began)
   end subroutine next
+
+  !> Who takes from the pool of this node: that of rank 0 is the work list of all.
+  pure integer function takers(self)
+    type(mpi_scheduler_t), intent(in) :: self
+    takers = merge(self%ranks, self%node%size, self%node%number == 1)
+  end function takers
 
   !> So many items take about `run_seconds`. What is done in a row lies side by side in the file.
   pure integer function run_length(self)
