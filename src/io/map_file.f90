@@ -6,14 +6,14 @@
 module map_file
   use errors, only: error_t, fail
   use files, only: free_bytes, publish_file, remove_file, reserve_file
-  use h5, only: h5_close, h5_create, h5_file_t, h5_open
+  use h5, only: h5_close, h5_create, h5_exists, h5_file_t, h5_open
   use h5_records, only: h5_create_records, h5_record_t, h5_records_offset
   use kinds, only: int64, real64
   use map_compare, only: check_layout
   use map_layout, only: create_objects, path_of, write_data
   use map_schema, only: schema_t, type_int64
   use output_check, only: check_create, check_resume, working_path
-  use status, only: exit_cannot_create, exit_internal, exit_io
+  use status, only: exit_cannot_create, exit_internal, exit_io, exit_other_case
   use team, only: team_t
   use text, only: to_text
   use tile_record, only: head_begins, head_names, head_types, tile_records
@@ -242,6 +242,10 @@ contains
     first = 0
     if (team%is_root()) then
       call h5_open(working_path(self%path), part, error)
+      if (.not. allocated(error)) then
+        if (.not. h5_exists(part, tile_records)) call fail(error, exit_other_case, ''''//working_path(self%path)// &
+          ''' has no '//tile_records//': the program that began it finishes it')
+      end if
       if (.not. allocated(error)) call h5_records_offset(part, tile_records, described(self), int(self%tiling%count(), int64), &
                                                          first(1), error)
       call h5_close(part, ignored)

@@ -150,6 +150,14 @@ def test_another_version_is_refused(separatrix, folder):
     assert (folder / PART).read_bytes() == before
 
 
+def test_a_file_without_records_is_refused(separatrix, folder):
+    with h5py.File(folder / PART, "r+") as file:
+        del file["tiles/record"]
+    outcome = life.run(separatrix, *life.RUN, "--resume", folder=folder)
+    assert outcome.code == 76
+    assert "the program that began it finishes it" in outcome.messages[0]
+
+
 def test_another_layout_is_refused(separatrix, folder):
     with h5py.File(folder / PART, "r+") as file:
         records = file["tiles/record"]
