@@ -8,8 +8,6 @@
 export OMPI_ALLOW_RUN_AS_ROOT=1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_rmaps_base_oversubscribe=1
-# The default MPI-IO layer loses data silently on a full disk.
-export OMPI_MCA_io=romio321
 # Containers without ptrace.
 export OMPI_MCA_btl_vader_single_copy_mechanism=none
 # One thread per rank.

@@ -11,6 +11,7 @@ module info_driver
   use map_reader, only: open_final, reader_t, variable_info_t
   use map_verify, only: probe_file
   use status, only: exit_io, reason_names
+  use tile_record, only: tile_records
   use text, only: interval_text, join, to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
@@ -107,15 +108,22 @@ contains
     character(len=:), allocatable, intent(inout) :: body
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: states(:)
-    integer :: done
-    if (.not. reader%has('/tiles/state')) return
-    call reader%read_values('/tiles/state', states, error)
-    if (allocated(error)) return
-    done = count(abs(states - 1) <= 0)
-    if (json) then
-      body = body//', "tiles_done": '//to_text(done)//', "tiles": '//to_text(size(states))
+    integer :: done, tiles
+    if (reader%has(tile_records)) then
+      call reader%count_tiles(done, tiles, error)
+    else if (reader%has('/tiles/state')) then
+      call reader%read_values('/tiles/state', states, error)
+      if (allocated(error)) return
+      done = count(abs(states - 1) <= 0)
+      tiles = size(states)
     else
-      body = body//new_line('a')//'  tiles: '//to_text(done)//' of '//to_text(size(states))//' done'
+      return
+    end if
+    if (allocated(error)) return
+    if (json) then
+      body = body//', "tiles_done": '//to_text(done)//', "tiles": '//to_text(tiles)
+    else
+      body = body//new_line('a')//'  tiles: '//to_text(done)//' of '//to_text(tiles)//' done'
     end if
   end subroutine add_tiles
 

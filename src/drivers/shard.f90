@@ -10,21 +10,16 @@ module shard
   use session, only: session_t
   use status, only: exit_done
   use text, only: to_text
+  use tile_order, only: share_of
   implicit none
   private
 
-  public :: in_shard, share_of, shard_path, describe_shard, finish_search, finish_shard
+  public :: in_shard, shard_path, describe_shard, finish_search, finish_shard
 
   !> The catalogues of all slices as `pack_catalogues` makes them.
   character(len=*), parameter, public :: catalogue_dataset = '/shard/catalogue'
 
 contains
-
-  !> The share that has a tile: of `shares` every one has each `shares`-th, so that it has its part of the hard regions.
-  pure integer function share_of(tile, shares)
-    integer, intent(in) :: tile, shares
-    share_of = 1 + modulo(tile - 1, shares)
-  end function share_of
 
   !> Whether share `number` of `shares` has the tile. Without shares (0) all tiles are of this run.
   pure logical function in_shard(tile, number, shares)

@@ -12,9 +12,10 @@ module share_files
   use point_work, only: point_work_t
   use resumption, only: builder_of, read_builder
   use session, only: session_t
-  use shard, only: catalogue_dataset, describe_shard, in_shard, share_of
+  use shard, only: catalogue_dataset, describe_shard, in_shard
   use status, only: exit_bad_case, exit_io, exit_no_input, exit_other_case, exit_resumable
   use text, only: to_text
+  use tile_order, only: share_of
   use tiled_run, only: index_in_block
   implicit none
   private

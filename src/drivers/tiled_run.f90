@@ -21,7 +21,7 @@ module tiled_run
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use shard, only: in_shard
-  use spread_order, only: spread_subscripts
+  use spread_order, only: new_spread_order, spread_order_t, spread_subscripts
   use signals, only: set_farewell
   use status, only: exit_resumable
   use system, only: monotonic_seconds
@@ -88,8 +88,7 @@ contains
       end if
       call open_working(path, schema, grid, shape_of_tiles, session%team, file, error)
     else
-      call create_working(path, schema, grid, shape_of_tiles, session%command%force, session%team, file, &
-                          error, shares=max(1, session%command%shard_count))
+      call create_working(path, schema, grid, shape_of_tiles, session%command%force, session%team, file, error)
     end if
     call session%stop_if(error)
     call set_farewell('stopped within one long trajectory; the tiles done are kept in '//working_path(path)// &
@@ -128,7 +127,7 @@ contains
       mine = pack([(tile, tile=1, file%tile_count())], &
                   [(in_shard(tile, command%shard, command%shard_count), tile=1, file%tile_count())])
     end associate
-    unfinished = pack(mine, [(.not. file%tile_done(mine(tile)), tile=1, size(mine))])
+    unfinished = in_order_of_file(file, pack(mine, [(.not. file%tile_done(mine(tile)), tile=1, size(mine))]))
     watch%total = sum([(file%tiling%points(mine(tile)), tile=1, size(mine))])
     watch%before = note_earlier(session, file, work)
     watch%unfinished = size(unfinished)
@@ -155,6 +154,8 @@ contains
       if (.not. whole) exit
       computed = computed + 1
     end do
+    call file%flush(error)
+    call session%abort_if(error)
     if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
     begun = scheduler%started
     call scheduler%finish()
@@ -164,6 +165,25 @@ contains
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles
+
+  !> Tiles as a list that the scheduler hands out in the order in which they lie in the file.
+  pure function in_order_of_file(file, tiles) result(list)
+    type(map_file_t), intent(in) :: file
+    integer, intent(in) :: tiles(:)
+    integer :: list(size(tiles)), slot, tile, number
+    logical :: wanted(file%tile_count())
+    type(spread_order_t) :: order
+    order = new_spread_order(size(tiles))
+    wanted = .false.
+    wanted(tiles) = .true.
+    number = 0
+    do slot = 1, file%tile_count()
+      tile = file%store%order%tile_at(slot)
+      if (.not. wanted(tile)) cycle
+      number = number + 1
+      list(order%item(number)) = tile
+    end do
+  end function in_order_of_file
 
   !> What the start, the catalogue and the sweep have left of the time limit; 0 = no limit.
   real(wp) function time_left(session)
@@ -241,6 +261,8 @@ contains
     type(error_t), allocatable :: error
     real(wp) :: now
     call self%scheduler%poll()
+    call self%file%flush(error, only_due=.true.)
+    call self%session%abort_if(error)
     now = monotonic_seconds()
     if (self%session%team%is_root() .and. now - self%last_check > check_interval) then
       self%last_check = now

@@ -8,7 +8,6 @@ module h5
   use errors, only: error_t, fail
   use files, only: free_bytes
   use guard, only: end_guard
-  use h5_access, only: set_parallel_access
   use h5_trap, only: trap
   use h5_types, only: find_type, h5_type
   use hdf5, only: &
@@ -20,13 +19,11 @@ module h5
     H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
     h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
     h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
-    h5pset_cache_f, h5pset_sieve_buf_size_f, size_t, &
     h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
     h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, hsize_t
   use kinds, only: int64, int8
   use status, only: exit_cannot_create, exit_io
-  use team, only: team_t
   use text, only: to_text
   use value_types, only: is_float
   implicit none
@@ -138,28 +135,16 @@ contains
     if (.not. allocated(error)) call h5_open(path, file, error, writable=.true.)
   end subroutine h5_create
 
-  !> Opens a file; with a team of several ranks (collective) all of them together. Code 74. Ranks that wait for each other use the
-  !> processor: one rank alone tries first whether the file is damaged, and the time that all take has no limit.
-  recursive subroutine h5_open(path, file, error, writable, team)
+  !> Opens a file in this process alone. Code 74.
+  subroutine h5_open(path, file, error, writable)
     character(len=*), intent(in) :: path
     type(h5_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: writable
-    class(team_t), intent(in), optional :: team
-    type(h5_file_t) :: tried
     integer(hid_t) :: access
     integer :: status, flags, ignored
-    logical :: together
     file%path = path
     flags = H5F_ACC_RDONLY_F
-    together = .false.
-    if (present(team)) together = team%size() > 1
-    if (together) then
-      if (team%is_root()) call h5_open(path, tried, error)
-      if (team%is_root() .and. .not. allocated(error)) call h5_close(tried, error)
-      call team%agree(error)
-      if (allocated(error)) return
-    end if
     call start_library(path, error)
     if (allocated(error)) return
     if (present(writable)) flags = merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable)
@@ -167,18 +152,14 @@ contains
     if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
     if (status >= 0) call h5pset_meta_block_size_f(access, front_bytes, status)
     if (status >= 0) call h5pset_small_data_block_size_f(access, front_bytes, status)
-    ! Without caches of its own for data HDF5 hands over at once what it writes: nothing has to be flushed.
-    if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_cache_f(access, 0, 0_size_t, 0_size_t, 0.0, status)
-    if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call h5pset_sieve_buf_size_f(access, 0_size_t, status)
-    if (together .and. status >= 0) call set_parallel_access(access, team%communicator(), status)
-    call trap('its beginning', path, endless=.not. together)
+    call trap('its beginning', path, endless=.true.)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
     call end_guard()
     if (h5_failed(status, 'open', '', path, error)) return
     call h5pclose_f(access, ignored)
   end subroutine h5_open
 
-  !> Closes the file; a file that is not open stays so. Collective if the file was opened by a team.
+  !> Closes the file; a file that is not open stays so.
   subroutine h5_close(file, error)
     type(h5_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error

@@ -10,7 +10,7 @@ module map_compare
   use map_layout, only: path_of
   use map_schema, only: schema_t, variable_t
   use status, only: exit_other_case
-  use value_types, only: from_bytes, type_float64, type_int64
+  use value_types, only: from_bytes
   implicit none
   private
 
@@ -18,13 +18,12 @@ module map_compare
 
 contains
 
-  !> Code 76 if the file `path` has not the variables of the schema, another tile shape, or another
-  !> attribute `case_identity` in the group `provenance`. `only_read`: it may be of format version 1.
-  subroutine check_layout(path, schema, tile_shape, only_read, error)
+  !> Code 76 if the working file `path` has not the variables of the schema (the tiled ones are compared when it is opened), another
+  !> tile shape, or another attribute `case_identity` in the group `provenance`.
+  subroutine check_layout(path, schema, tile_shape, error)
     character(len=*), intent(in) :: path
     type(schema_t), intent(in) :: schema
     integer(int64), intent(in) :: tile_shape(:)
-    logical, intent(in) :: only_read
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: ignored
     type(h5_file_t) :: file
@@ -46,7 +45,8 @@ contains
     end if
     do i = 1, size(schema%variables)
       if (allocated(error)) exit
-      call compare(file, schema, schema%variables(i), tile_shape, only_read, equal, error)
+      if (schema%variables(i)%tiled) cycle
+      call compare(file, schema, schema%variables(i), tile_shape, equal, error)
       if (.not. equal .and. .not. allocated(error)) then
         call fail(error, exit_other_case, ''''//path//''' has another layout ('//schema%variables(i)%name//')')
       end if
@@ -55,12 +55,11 @@ contains
   end subroutine check_layout
 
   !> Whether the file has the variable with its type and lengths; of `/tiles/tile_shape` also its values.
-  subroutine compare(file, schema, variable, tile_shape, only_read, equal, error)
+  subroutine compare(file, schema, variable, tile_shape, equal, error)
     type(h5_file_t), intent(in) :: file
     type(schema_t), intent(in) :: schema
     type(variable_t), intent(in) :: variable
     integer(int64), intent(in) :: tile_shape(:)
-    logical, intent(in) :: only_read
     logical, intent(out) :: equal
     type(error_t), allocatable, intent(out) :: error
     type(h5_dataset_t) :: dataset
@@ -71,8 +70,6 @@ contains
     call h5_open_dataset(file, path_of(variable%group, variable%name), dataset, error)
     if (allocated(error)) return
     equal = dataset%type == variable%type
-    ! Event words were integers in version 1.
-    if (only_read .and. dataset%type == type_int64) equal = variable%type == type_int64 .or. variable%type == type_float64
     equal = equal .and. size(dataset%lengths) == size(variable%dimensions)
     if (equal) equal = all(dataset%lengths == schema%lengths_of(variable%dimensions))
     if (equal .and. variable%group == 'tiles' .and. variable%name == 'tile_shape') then

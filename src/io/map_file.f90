@@ -1,52 +1,58 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The working file of a map, PATH.part: created whole by rank 0, then written tile by tile by all
-!> ranks independently. It is its own checkpoint: each tile has a state and a checksum.
+!> The working file of a map, PATH.part: created whole by rank 0, which sends the others the offset of the tiles; then written by
+!> all ranks independently. It is its own checkpoint: each tile has a state and a checksum.
 module map_file
-  use checksum, only: crc32
   use errors, only: error_t, fail
   use files, only: free_bytes, publish_file, remove_file, reserve_file
-  use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, &
-    h5_open_dataset, h5_read, h5_write
-  use kinds, only: int64, int8, real64
+  use h5, only: h5_close, h5_create, h5_exists, h5_file_t, h5_open
+  use h5_records, only: h5_create_records, h5_record_t, h5_records_offset
+  use kinds, only: int64, real64
   use map_compare, only: check_layout
   use map_layout, only: create_objects, path_of, write_data
-  use map_schema, only: schema_t, type_int64, type_int8
+  use map_schema, only: schema_t, type_int64
   use output_check, only: check_create, check_resume, working_path
-  use status, only: exit_cannot_create, exit_internal, exit_io
+  use status, only: exit_cannot_create, exit_internal, exit_io, exit_other_case
   use team, only: team_t
   use text, only: to_text
-  use tile_store, only: tile_store_t
+  use tile_record, only: head_begins, head_names, head_types, tile_records
+  use tile_store, only: tile_damaged, tile_store_t, tile_whole
   use tiles, only: new_tiling, tiling_t
-  use value_types, only: bytes_of, from_bytes, to_bytes, type_uint32
   implicit none
   private
 
   public :: create_working, open_working, working_path
+
+  !> Longest name of a variable.
+  integer, parameter :: name_length = 128
 
   type, public :: map_file_t
     !> The name of the final file.
     character(len=:), allocatable :: path
     type(schema_t) :: schema
     type(tiling_t) :: tiling
-    type(h5_file_t) :: part
-    !> Positions in the schema of the tiled variables, and their datasets.
+    !> Positions in the schema of the tiled variables.
     integer, allocatable :: tiled(:)
-    type(h5_dataset_t), allocatable, private :: datasets(:)
-    type(h5_dataset_t), private :: states, checksums
     logical, private :: writable = .true.
-    !> Reads the data of the tiled variables, in their order.
+    !> The tiles of the tiled variables, in their order.
     type(tile_store_t) :: store
     !> Per tile.
     logical, allocatable :: done(:)
+    !> Tiles that this rank has written.
+    integer, private :: own = 0
+    !> Tiles that were done when the file was opened.
+    integer, private :: earlier = 0
   contains
     procedure :: tile_count
     procedure :: tile_done
     procedure :: tile_bytes
+    procedure :: names
+    procedure :: types
     procedure :: write_tile
     procedure :: read_tile
-    procedure :: recheck
+    procedure :: flush => flush_tiles
+    procedure :: count_left
     procedure :: check_name
     procedure :: open => open_part
     procedure :: close => close_part
@@ -54,11 +60,10 @@ module map_file
 
 contains
 
-  !> Creates and opens the working file. Collective. `grid`: names of the dimensions that are cut into
-  !> tiles of `tile_shape`. Code 73 if the final or the working file exists and `force` is false, the
-  !> folder is missing or not writable, or the space is too small. `shares`: only one of so many shares of the tiles
-  !> will be written, so that the file stays sparse (default 1).
-  subroutine create_working(path, schema, grid, tile_shape, force, team, file, error, shares)
+  !> Creates and opens the working file. Collective. `grid`: names of the dimensions that are cut into tiles of `tile_shape`. Code
+  !> 73 if the final or the working file exists and `force` is false, the folder is missing or not writable, or the space is too
+  !> small. The file of one of several shares (attribute `shares` of the group `shard`) stays sparse.
+  subroutine create_working(path, schema, grid, tile_shape, force, team, file, error)
     character(len=*), intent(in) :: path
     type(schema_t), intent(in) :: schema
     character(len=*), intent(in) :: grid(:)
@@ -67,25 +72,23 @@ contains
     class(team_t), intent(in) :: team
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
-    integer, intent(in), optional :: shares
-    integer :: parts
-    parts = 1
-    if (present(shares)) parts = shares
+    integer :: shares
     call prepare(path, schema, grid, tile_shape, file, error)
     if (allocated(error)) return
+    shares = shares_of(schema)
     if (team%is_root()) then
       call check_create(path, force, error)
-      if (.not. allocated(error)) call check_space(file, parts, error)
-      if (.not. allocated(error)) call build(file, parts == 1, error)
+      if (.not. allocated(error)) call check_space(file, shares, error)
+      if (.not. allocated(error)) call build(file, shares == 1, error)
     end if
     call team%agree(error)
     if (allocated(error)) return
     call file%open(team, error)
   end subroutine create_working
 
-  !> Opens the working file of an interrupted run. Collective. Tiles whose data does not match their
-  !> checksum count as not done. Code 76 if the file has another layout, or another `case_identity`
-  !> in the group `provenance` than the schema. `only_read`: the file stays as it is.
+  !> Opens the working file of an interrupted run. Collective. Tiles whose data does not match their checksum count as not done.
+  !> Code 76 if the file has another layout, or another `case_identity` in the group `provenance` than the schema. `only_read`: the
+  !> file stays as it is.
   subroutine open_working(path, schema, grid, tile_shape, team, file, error, only_read)
     character(len=*), intent(in) :: path
     type(schema_t), intent(in) :: schema
@@ -95,23 +98,26 @@ contains
     type(map_file_t), intent(out) :: file
     type(error_t), allocatable, intent(out) :: error
     logical, intent(in), optional :: only_read
-    integer :: mismatches
     call prepare(path, schema, grid, tile_shape, file, error)
     if (allocated(error)) return
     if (present(only_read)) file%writable = .not. only_read
     if (team%is_root()) then
       if (file%writable) call check_resume(path, error)
-      if (.not. allocated(error)) call check_layout(working_path(path), file%schema, file%tiling%shape, &
-                                                      .not. file%writable, error)
+      if (.not. allocated(error)) call check_layout(working_path(path), file%schema, file%tiling%shape, error)
     end if
     call team%agree(error)
     if (allocated(error)) return
     call file%open(team, error)
-    if (allocated(error)) return
-    call file%recheck(team, mismatches, error)
+    if (.not. allocated(error)) call look_at_tiles(file, team, error)
   end subroutine open_working
 
-  !> Sets up the tiling, and the group `tiles` in the schema.
+  !> Of how many shares the file of a schema is one; 1 if of none.
+  pure integer function shares_of(schema)
+    type(schema_t), intent(in) :: schema
+    shares_of = max(1, nint(schema%find_number('shard', 'shares')))
+  end function shares_of
+
+  !> Sets up the tiling, the group `tiles` in the schema, and the records.
   subroutine prepare(path, schema, grid, tile_shape, file, error)
     character(len=*), intent(in) :: path
     type(schema_t), intent(in) :: schema
@@ -119,15 +125,19 @@ contains
     integer(int64), intent(in) :: tile_shape(:)
     type(map_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: names
+    character(len=:), allocatable :: listed
+    character(len=name_length) :: name
     integer :: i
     file%path = path
     file%schema = schema
     call new_tiling(schema%lengths_of(grid), tile_shape, file%tiling, error)
     if (allocated(error)) return
     file%tiled = pack([(i, i=1, size(schema%variables))], [(schema%variables(i)%tiled, i=1, size(schema%variables))])
+    listed = ''
     do i = 1, size(file%tiled)
       associate (variable => schema%variables(file%tiled(i)))
+        name = path_of(variable%group, variable%name)
+        listed = trim(listed//' '//trim(name))
         if (size(variable%dimensions) == size(grid)) then
           if (all(variable%dimensions == grid)) cycle
         end if
@@ -135,37 +145,54 @@ contains
         return
       end associate
     end do
-    names = ''
-    do i = 1, size(file%tiled)
-      associate (variable => schema%variables(file%tiled(i)))
-        names = trim(names//' '//path_of(variable%group, variable%name))
-      end associate
-    end do
-    call file%schema%add_attribute('tiles', 'variables', trim(adjustl(names)))
-    associate (tiles => file%tiling)
-      call file%schema%add_dimension('axis', size(grid, kind=int64))
-      call file%schema%add_dimension('tile', int(tiles%count(), int64))
-      call file%schema%add_variable('tile_shape', type_int64, ['axis'], group='tiles', &
-                                    data=real(tiles%shape, real64), long_name='points of a tile along each axis')
-      call file%schema%add_variable('state', type_int8, ['tile'], group='tiles', &
-                                    long_name='1 = the tile is done', flag_values=[0, 1], flag_meanings='not_done done')
-      call file%schema%add_variable('checksum', type_uint32, ['tile'], group='tiles', &
-                                    long_name='CRC-32 of the data of the tile, variables in file order')
-    end associate
+    call file%schema%add_attribute('tiles', 'variables', trim(adjustl(listed)))
+    call file%schema%add_dimension('axis', size(grid, kind=int64))
+    call file%schema%add_variable('tile_shape', type_int64, ['axis'], group='tiles', data=real(file%tiling%shape, real64), &
+                                  long_name='points of a tile along each axis')
+    call file%store%define(file%tiling, file%types(), shares_of(schema))
     allocate (file%done(file%tiling%count()), source=.false.)
   end subroutine prepare
+
+  !> Paths of the tiled variables.
+  pure function names(self)
+    class(map_file_t), intent(in) :: self
+    character(len=name_length) :: names(size(self%tiled))
+    integer :: i
+    do i = 1, size(self%tiled)
+      associate (variable => self%schema%variables(self%tiled(i)))
+        names(i) = path_of(variable%group, variable%name)
+      end associate
+    end do
+  end function names
+
+  !> Types of the tiled variables.
+  pure function types(self)
+    class(map_file_t), intent(in) :: self
+    integer :: types(size(self%tiled)), i
+    types = [(self%schema%variables(self%tiled(i))%type, i=1, size(self%tiled))]
+  end function types
+
+  !> What HDF5 has to know of a record.
+  function described(file) result(record)
+    type(map_file_t), intent(in) :: file
+    type(h5_record_t) :: record
+    character(len=name_length) :: paths(size(file%tiled))
+    integer :: i
+    paths = file%names()
+    record%names = [character(len=name_length) :: head_names, [(paths(i)(2:), i=1, size(paths))]]
+    record%types = [head_types, file%store%record%types]
+    record%begins = [head_begins, file%store%record%begins]
+    record%shape = file%tiling%shape
+    record%scalars = size(head_names)
+    record%bytes = file%store%record%bytes
+  end function described
 
   subroutine check_space(file, shares, error)
     type(map_file_t), intent(in) :: file
     integer, intent(in) :: shares
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: needed, free
-    integer :: i
-    needed = 0
-    do i = 1, size(file%tiled)
-      needed = needed + product(file%tiling%lengths)*bytes_of(file%schema%variables(file%tiled(i))%type)
-    end do
-    needed = needed/shares
+    needed = file%tiling%count()*file%store%record%bytes/shares
     free = free_bytes(file%path)
     if (free >= 0 .and. free < needed) then
       call fail(error, exit_cannot_create, ''''//file%path//''' needs '//to_text(needed)//' bytes, '// &
@@ -184,11 +211,13 @@ contains
     integer :: i
     name = working_path(file%path)//'.new'
     call h5_create(name, new, error, working=.true.)
-    if (.not. allocated(error)) call create_objects(new, file%schema, error, file%tiling%shape)
+    if (.not. allocated(error)) call create_objects(new, file%schema, working=.true., error=error)
     do i = 1, size(file%schema%variables)
       if (allocated(error)) exit
       if (.not. file%schema%variables(i)%tiled) call write_data(new, file%schema, file%schema%variables(i), error)
     end do
+    ! The last, so that a tail that is cut off costs tiles only.
+    if (.not. allocated(error)) call h5_create_records(new, tile_records, described(file), int(file%tiling%count(), int64), error)
     if (allocated(error)) then
       call h5_close(new, ignored)
     else
@@ -202,25 +231,30 @@ contains
     end if
   end subroutine build
 
-  !> Opens the working file with all ranks. Collective.
+  !> Opens the working file on all ranks; rank 0 alone reads what describes it. Collective.
   subroutine open_part(self, team, error)
     class(map_file_t), intent(inout) :: self
     class(team_t), intent(in) :: team
     type(error_t), allocatable, intent(out) :: error
-    integer :: i
-    call h5_open(working_path(self%path), self%part, error, writable=self%writable, team=team)
-    if (allocated(self%datasets)) deallocate (self%datasets)
-    allocate (self%datasets(size(self%tiled)))
-    do i = 1, size(self%tiled)
-      if (allocated(error)) exit
-      associate (variable => self%schema%variables(self%tiled(i)))
-        call h5_open_dataset(self%part, path_of(variable%group, variable%name), self%datasets(i), error)
-      end associate
-    end do
-    if (.not. allocated(error)) call h5_open_dataset(self%part, '/tiles/state', self%states, error)
-    if (.not. allocated(error)) call h5_open_dataset(self%part, '/tiles/checksum', self%checksums, error)
-    if (.not. allocated(error)) call self%store%locate(self%datasets, self%tiling, error)
-    if (.not. allocated(error)) call self%store%open(working_path(self%path), error)
+    type(error_t), allocatable :: ignored
+    type(h5_file_t) :: part
+    integer(int64) :: first(1)
+    first = 0
+    if (team%is_root()) then
+      call h5_open(working_path(self%path), part, error)
+      if (.not. allocated(error)) then
+        if (.not. h5_exists(part, tile_records)) call fail(error, exit_other_case, ''''//working_path(self%path)// &
+          ''' has no '//tile_records//': the program that began it finishes it')
+      end if
+      if (.not. allocated(error)) call h5_records_offset(part, tile_records, described(self), int(self%tiling%count(), int64), &
+                                                         first(1), error)
+      call h5_close(part, ignored)
+    end if
+    call team%agree(error)
+    if (allocated(error)) return
+    call team%broadcast_integers(first)
+    call self%store%set_offset(first(1))
+    call self%store%open(working_path(self%path), self%writable, error)
     call team%agree(error)
   end subroutine open_part
 
@@ -233,35 +267,14 @@ contains
               'file back under this name the same command with --resume (without --force) goes on')
   end subroutine check_name
 
-  !> Closes the working file; it can be opened again. Collective.
+  !> Writes what waits and closes the working file; it can be opened again. Collective.
   subroutine close_part(self, team, error)
     class(map_file_t), intent(inout) :: self
     class(team_t), intent(in) :: team
     type(error_t), allocatable, intent(out) :: error
-    type(error_t), allocatable :: later
-    integer :: i
-    call self%store%close()
-    if (allocated(self%datasets)) then
-      do i = 1, size(self%datasets)
-        call h5_close_dataset(self%datasets(i), later)
-        call keep_first(later, error)
-      end do
-    end if
-    call h5_close_dataset(self%states, later)
-    call keep_first(later, error)
-    call h5_close_dataset(self%checksums, later)
-    call keep_first(later, error)
-    ! Collective: after an error, too, or the other ranks wait for ever.
-    call h5_close(self%part, later)
-    call keep_first(later, error)
+    call self%store%close(error)
     call team%agree(error)
   end subroutine close_part
-
-  !> Keeps the first of several errors.
-  subroutine keep_first(later, error)
-    type(error_t), allocatable, intent(inout) :: later, error
-    if (.not. allocated(error) .and. allocated(later)) call move_alloc(later, error)
-  end subroutine keep_first
 
   !> The number of tiles.
   pure integer function tile_count(self)
@@ -280,126 +293,86 @@ contains
   pure integer(int64) function tile_bytes(self, tile)
     class(map_file_t), intent(in) :: self
     integer, intent(in) :: tile
-    integer :: i
-    tile_bytes = self%tiling%points(tile)*sum([(bytes_of(self%schema%variables(self%tiled(i))%type), i=1, size(self%tiled))])
+    tile_bytes = self%tiling%points(tile)*self%schema%bytes_of_point()
   end function tile_bytes
 
-  !> Writes a tile and marks it done. `values`: (points of the tile in its C order, tiled variables in
-  !> the order of the schema). On an error (code 74) the caller ends all ranks.
+  !> Takes a tile that is done; it is in the file within half a second, or after `flush`. `values`: (points of the tile in its C
+  !> order, tiled variables in the order of the schema). On an error (code 74) the caller ends all ranks.
   subroutine write_tile(self, tile, values, error)
     class(map_file_t), intent(inout) :: self
     integer, intent(in) :: tile
     real(real64), intent(in) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: lower(size(self%tiling%lengths)), extent(size(self%tiling%lengths)), value
-    integer(int8), allocatable :: bytes(:)
-    integer :: i
-    call self%tiling%block_of(tile, lower, extent)
-    if (size(values, 1) /= product(extent) .or. size(values, 2) /= size(self%tiled)) then
+    if (size(values, 1) /= self%tiling%points(tile) .or. size(values, 2) /= size(self%tiled)) then
       call fail(error, exit_internal, 'tile '//to_text(tile)//' gets values of the wrong shape')
       return
     end if
-    value = 0
-    do i = 1, size(self%tiled)
-      bytes = bytes_in(self%datasets(i)%type, values(:, i))
-      call h5_write(self%datasets(i), bytes, error, lower, extent)
-      if (allocated(error)) return
-      value = crc32(bytes, value)
-    end do
-    call mark(self, tile, 1, value, error)
-    if (.not. allocated(error)) self%done(tile) = .true.
+    call self%store%put(tile, values, error)
+    if (allocated(error)) return
+    if (.not. self%done(tile)) self%own = self%own + 1
+    self%done(tile) = .true.
   end subroutine write_tile
+
+  !> Writes the tiles that wait; with `only_due` only if they wait for half a second. Code 74.
+  subroutine flush_tiles(self, error, only_due)
+    class(map_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: only_due
+    logical :: all
+    all = .true.
+    if (present(only_due)) all = .not. only_due
+    if (all) then
+      call self%store%flush(error)
+    else
+      call self%store%flush_due(error)
+    end if
+  end subroutine flush_tiles
 
   !> The values of a tile that is done, as `write_tile` takes them.
   subroutine read_tile(self, tile, values, error)
-    class(map_file_t), intent(in) :: self
+    class(map_file_t), intent(inout) :: self
     integer, intent(in) :: tile
     real(real64), allocatable, intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    integer(int8), allocatable :: bytes(:)
-    integer :: i
     allocate (values(self%tiling%points(tile), size(self%tiled)))
-    do i = 1, size(self%datasets)
-      call self%store%read_tile(i, tile, bytes, error)
-      if (allocated(error)) return
-      call from_bytes(self%datasets(i)%type, bytes, values(:, i))
-    end do
+    call self%store%get(tile, values, error)
   end subroutine read_tile
 
-  function bytes_in(type, values) result(bytes)
-    integer, intent(in) :: type
-    real(real64), intent(in) :: values(:)
-    integer(int8), allocatable :: bytes(:)
-    allocate (bytes(size(values, kind=int64)*bytes_of(type)))
-    call to_bytes(type, values, bytes)
-  end function bytes_in
+  !> The number of tiles that no rank has done. Collective.
+  integer function count_left(self, team) result(left)
+    class(map_file_t), intent(in) :: self
+    class(team_t), intent(in) :: team
+    integer(int64) :: own(1)
+    own = self%own
+    call team%sum(own)
+    left = self%tile_count() - self%earlier - int(own(1))
+  end function count_left
 
-  subroutine mark(self, tile, state, value, error)
-    class(map_file_t), intent(inout) :: self
-    integer, intent(in) :: tile, state
-    integer(int64), intent(in) :: value
-    type(error_t), allocatable, intent(out) :: error
-    integer(int64) :: corner(1)
-    corner = tile - 1
-    call h5_write(self%checksums, bytes_in(type_uint32, [real(value, real64)]), error, corner, [1_int64])
-    if (allocated(error)) return
-    call h5_write(self%states, [int(state, int8)], error, corner, [1_int64])
-  end subroutine mark
-
-  !> Reads the states of all tiles, and the data of the done ones, shared among the ranks. Tiles that
-  !> do not match their checksum become not done; `mismatches` is their number. Collective.
-  subroutine recheck(self, team, mismatches, error)
+  !> Reads all tiles, each rank its part, and marks those as not done that do not match their checksum. Collective.
+  subroutine look_at_tiles(self, team, error)
     class(map_file_t), intent(inout) :: self
     class(team_t), intent(in) :: team
-    integer, intent(out) :: mismatches
     type(error_t), allocatable, intent(out) :: error
-    integer(int8), allocatable :: states(:), bytes(:)
-    real(real64), allocatable :: expected(:)
     integer(int64), allocatable :: done(:)
-    integer(int64) :: found
-    integer :: tile, claimed
-    mismatches = 0
-    allocate (states(size(self%done)), bytes(4*size(self%done)), expected(size(self%done)))
-    call h5_read(self%states, states, error)
-    if (.not. allocated(error)) call h5_read(self%checksums, bytes, error)
-    call team%agree(error)
-    if (allocated(error)) return
-    call from_bytes(type_uint32, bytes, expected)
-    allocate (done(size(self%done)), source=0_int64)
-    claimed = 0
-    do tile = 1, size(done)
-      if (states(tile) /= 1) cycle
-      claimed = claimed + 1
-      if (mod(claimed, team%size()) /= team%rank()) cycle
-      call tile_checksum(self, tile, found, error)
+    integer, allocatable :: states(:)
+    integer :: first, last, i, tile
+    allocate (done(self%tile_count()), source=0_int64)
+    first = int(team%rank()*int(self%tile_count(), int64)/team%size()) + 1
+    last = int((team%rank() + 1)*int(self%tile_count(), int64)/team%size())
+    allocate (states(max(0, last - first + 1)))
+    call self%store%look(first, states, error)
+    do i = 1, size(states)
       if (allocated(error)) exit
-      if (found == nint(expected(tile), int64)) then
-        done(tile) = 1
-      else
-        if (self%writable) call mark(self, tile, 0, 0_int64, error)
-        if (allocated(error)) exit
-      end if
+      tile = self%store%order%tile_at(first + i - 1)
+      if (states(i) == tile_whole) done(tile) = 1
+      if (states(i) == tile_damaged .and. self%writable) call self%store%drop(tile, error)
     end do
     call team%agree(error)
     if (allocated(error)) return
     call team%sum(done)
     self%done = done == 1
-    mismatches = claimed - count(self%done)
-  end subroutine recheck
-
-  subroutine tile_checksum(self, tile, value, error)
-    class(map_file_t), intent(in) :: self
-    integer, intent(in) :: tile
-    integer(int64), intent(out) :: value
-    type(error_t), allocatable, intent(out) :: error
-    integer(int8), allocatable :: bytes(:)
-    integer :: i
-    value = 0
-    do i = 1, size(self%datasets)
-      call self%store%read_tile(i, tile, bytes, error)
-      if (allocated(error)) return
-      value = crc32(bytes, value)
-    end do
-  end subroutine tile_checksum
+    self%earlier = count(self%done)
+    self%own = 0
+  end subroutine look_at_tiles
 
 end module map_file

@@ -5,37 +5,36 @@
 !> its own name it exists only complete and verified.
 module map_final
   use attribute_seal, only: seal_attributes
+  use checksum, only: crc32
   use errors, only: error_t, fail
   use files, only: publish_file, remove_file
-  use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read, h5_write
+  use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open_dataset, h5_write
   use h5_attributes, only: h5_put_numbers
-  use kinds, only: int64, int8, real64
+  use kinds, only: int64, real64
   use map_file, only: map_file_t, working_path
   use map_layout, only: create_objects, is_compressed, path_of, write_data
   use map_packing, only: packing_t
-  use map_schema, only: schema_t, type_int64
+  use map_schema, only: schema_t, type_int64, type_int8
   use map_verify, only: seal, verify_file
   use output_check, only: check_result
-  use slabs, only: slab, slab_count
   use status, only: exit_io, exit_resumable
   use system, only: monotonic_seconds
   use team, only: team_t
   use text, only: to_text
-  use value_types, only: bytes_of
+  use tile_record, only: values_t
+  use tile_store, only: tile_damaged, tile_whole
+  use value_types, only: bytes_of, type_uint32
   implicit none
   private
 
   public :: finalise, write_whole
 
-  !> Longest path of a variable.
-  integer, parameter :: path_length = 128
-
 contains
 
-  !> Turns the working file, all of whose tiles are done, into the final file. Collective; the file is
-  !> closed afterwards. `extra`: what is known only now, as summary tables; its attributes replace
-  !> those of the same name. Code 75 if tiles are missing, 74 if the disk fails or data is damaged
-  !> (then the working file can be resumed). `alone`: seconds in which rank 0 worked and the others waited.
+  !> Turns the working file, all of whose tiles are done, into the final file. Collective; the file is closed afterwards. `extra`:
+  !> what is known only now, as summary tables; its attributes replace those of the same name. Code 75 if tiles are missing, 74 if
+  !> the disk fails or data is damaged (then the working file can be resumed). `alone`: seconds in which rank 0 worked and the
+  !> others waited.
   subroutine finalise(file, team, extra, error, alone)
     type(map_file_t), intent(inout) :: file
     class(team_t), intent(in) :: team
@@ -43,21 +42,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(real64), intent(out), optional :: alone
     real(real64) :: waited
-    integer :: mismatches, tile, left
+    integer :: left
     if (present(alone)) alone = 0
-    ! Closed and opened again so that each rank sees what the others wrote.
+    left = file%count_left(team)
     call file%close(team, error)
-    if (.not. allocated(error)) call file%open(team, error)
-    if (.not. allocated(error)) call file%recheck(team, mismatches, error)
-    if (.not. allocated(error)) call file%close(team, error)
-    if (allocated(error)) return
-    left = count([(.not. file%tile_done(tile), tile=1, file%tile_count())])
-    if (mismatches > 0) then
-      call fail(error, exit_io, to_text(mismatches)//' tiles of '''//working_path(file%path)// &
-                ''' do not match their checksums; --resume computes them again')
-    else if (left > 0) then
-      call fail(error, exit_resumable, to_text(left)//' tiles of '''//working_path(file%path)//''' are not done')
-    end if
+    if (.not. allocated(error) .and. left > 0) call fail(error, exit_resumable, to_text(left)//' tiles of '''// &
+                                                           working_path(file%path)//''' are not done')
     if (allocated(error)) return
     call repack(file, team, extra, waited, error)
     if (present(alone)) alone = waited
@@ -71,40 +61,38 @@ contains
     real(real64), intent(out) :: alone
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: ignored
-    type(h5_file_t) :: part, new
+    type(h5_file_t) :: new
     type(schema_t) :: schema
     type(packing_t) :: packing
-    integer, allocatable :: picks(:)
     character(len=:), allocatable :: name
     alone = -monotonic_seconds()
     name = file%path//'.new'
-    schema = file%schema
-    call schema%append(extra)
-    call start_packing(file, packing, picks)
-    if (team%is_root()) then
-      call h5_open(working_path(file%path), part, error)
-      if (.not. allocated(error)) call create(name, schema, new, error)
-    end if
+    schema = whole_schema(file, extra)
+    call packing%begin(file%names(), file%types(), file%tiling%lengths, file%tile_count())
+    if (team%is_root()) call create(name, schema, new, error)
+    if (.not. allocated(error)) call file%store%open(working_path(file%path), .true., error)
     call team%agree(error)
     alone = alone + monotonic_seconds()
     if (.not. allocated(error)) then
-      call file%store%open(working_path(file%path), error)
-      call team%agree(error)
-      if (.not. allocated(error)) call packing%pack(file%store, picks, name, new, team, error)
-      call file%store%close()
+      if (is_compressed(file%tiling%lengths)) then
+        call packing%pack(file%store, name, new, team, error)
+      else if (team%is_root()) then
+        call copy_values(file, packing, new, error)
+      end if
+      call check_tiles(file, packing, team, error)
     end if
+    call file%store%close(ignored)
     alone = alone + packing%alone - monotonic_seconds()
     if (team%is_root()) then
-      if (.not. allocated(error)) call fill(new, schema, error, part, size(file%schema%variables), packing)
+      if (.not. allocated(error)) call fill(new, schema, error, packing)
       call complete(new, error)
-      call h5_close(part, ignored)
     end if
     call team%agree(error)
     alone = alone + monotonic_seconds()
     if (.not. allocated(error)) call packing%check(name, error)
     call team%agree(error)
     alone = alone - monotonic_seconds()
-    if (team%is_root()) call publish(name, file%path, error, packing%names)
+    if (team%is_root()) call publish(name, file%path, error, packing%checked_names())
     call team%agree(error)
     alone = alone + monotonic_seconds()
     if (allocated(error)) then
@@ -116,23 +104,41 @@ contains
     call team%agree(error)
   end subroutine repack
 
-  !> What is to be packed by all ranks, and the numbers of its variables among the tiled ones.
-  subroutine start_packing(file, packing, picks)
+  !> The schema of the final file.
+  function whole_schema(file, extra) result(schema)
     type(map_file_t), intent(in) :: file
-    type(packing_t), intent(out) :: packing
-    integer, allocatable, intent(out) :: picks(:)
-    character(len=path_length) :: names(size(file%tiled))
-    integer :: types(size(file%tiled)), i
-    do i = 1, size(file%tiled)
-      associate (variable => file%schema%variables(file%tiled(i)))
-        names(i) = path_of(variable%group, variable%name)
-        types(i) = variable%type
-      end associate
+    type(schema_t), intent(in) :: extra
+    type(schema_t) :: schema
+    schema = file%schema
+    call schema%add_dimension('tile', int(file%tile_count(), int64))
+    call schema%add_variable('state', type_int8, ['tile'], group='tiles', long_name='1 = the tile is done', flag_values=[0, 1], &
+                             flag_meanings='not_done done')
+    call schema%add_variable('checksum', type_uint32, ['tile'], group='tiles', &
+                             long_name='CRC-32 of the data of the tile, variables in file order')
+    call schema%append(extra)
+  end function whole_schema
+
+  !> Code 74 if the data of a tile does not match its checksum; the tile is marked as not done. Collective.
+  subroutine check_tiles(file, packing, team, error)
+    type(map_file_t), intent(in) :: file
+    type(packing_t), intent(inout) :: packing
+    class(team_t), intent(in) :: team
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: tile, damaged
+    call team%agree(error)
+    if (allocated(error)) return
+    call team%sum(packing%states)
+    call team%sum(packing%tile_checksums)
+    damaged = count(packing%states /= tile_whole)
+    if (damaged == 0) return
+    do tile = 1, file%tile_count()
+      if (packing%states(tile) == tile_damaged .and. team%is_root() .and. .not. allocated(error)) call file%store%drop(tile, error)
     end do
-    allocate (picks(0))
-    if (is_compressed(file%tiling%lengths)) picks = [(i, i=1, size(types))]
-    call packing%begin(names(picks), types(picks), file%tiling%lengths)
-  end subroutine start_packing
+    call team%agree(error)
+    if (allocated(error)) return
+    call fail(error, exit_io, to_text(damaged)//' tiles of '''//working_path(file%path)// &
+              ''' do not match their checksums; --resume computes them again')
+  end subroutine check_tiles
 
   !> Writes a file that needs no working file, by one process. Code 73 if it exists and `force` is
   !> false.
@@ -160,7 +166,7 @@ contains
     type(h5_file_t), intent(out) :: new
     type(error_t), allocatable, intent(out) :: error
     call h5_create(name, new, error)
-    if (.not. allocated(error)) call create_objects(new, schema, error)
+    if (.not. allocated(error)) call create_objects(new, schema, .false., error)
   end subroutine create
 
   !> Marks the file as complete, unless there is an error, and closes it.
@@ -188,68 +194,54 @@ contains
     if (allocated(error)) call remove_file(name, ignored)
   end subroutine publish
 
-  !> The data of the variables. The tiled ones among the first `copied` come from the working file: `packing` has packed the
-  !> large ones. The others come from the schema.
-  subroutine fill(new, schema, error, part, copied, packing)
+  !> The data of the variables: the tiled ones are there already, the others come from the schema.
+  subroutine fill(new, schema, error, packing)
     type(h5_file_t), intent(in) :: new
-    type(schema_t), intent(in) :: schema
+    type(schema_t), intent(inout) :: schema
     type(error_t), allocatable, intent(out) :: error
-    type(h5_file_t), intent(in), optional :: part
-    integer, intent(in), optional :: copied
     type(packing_t), intent(in), optional :: packing
     character(len=:), allocatable :: path
-    integer :: i, from_part, packed
-    from_part = 0
-    if (present(copied)) from_part = copied
+    integer :: i, packed
     do i = 1, size(schema%variables)
       path = path_of(schema%variables(i)%group, schema%variables(i)%name)
       packed = 0
-      if (present(packing)) packed = findloc(packing%names == path, .true., dim=1)
-      ! What the case alone decides is not taken from a file that may be damaged.
+      if (present(packing)) then
+        packed = findloc(packing%names == path, .true., dim=1)
+        if (path == '/tiles/state') schema%variables(i)%data = real(packing%states, real64)
+        if (path == '/tiles/checksum') schema%variables(i)%data = real(packing%tile_checksums, real64)
+      end if
       if (packed > 0) then
         call seal(new, path, error, packing%checksums(packed))
-      else if (i <= from_part .and. (schema%variables(i)%tiled .or. schema%variables(i)%group == 'tiles')) then
-        call copy(part, new, path, error)
       else
         call write_data(new, schema, schema%variables(i), error)
+        if (.not. allocated(error)) call seal(new, path, error)
       end if
-      if (packed == 0 .and. .not. allocated(error)) call seal(new, path, error)
       if (allocated(error)) return
     end do
   end subroutine fill
 
-  !> Copies a dataset slab by slab.
-  subroutine copy(part, new, name, error)
-    type(h5_file_t), intent(in) :: part, new
-    character(len=*), intent(in) :: name
+  !> The tiled variables of a map that is too small to be packed.
+  subroutine copy_values(file, packing, new, error)
+    type(map_file_t), intent(in) :: file
+    type(packing_t), intent(inout) :: packing
+    type(h5_file_t), intent(in) :: new
     type(error_t), allocatable, intent(out) :: error
-    type(h5_dataset_t) :: from, to
-    call h5_open_dataset(part, name, from, error)
-    if (.not. allocated(error)) call h5_open_dataset(new, name, to, error)
-    if (.not. allocated(error)) call copy_values(from, to, error)
-    if (.not. allocated(error)) call h5_close_dataset(to, error)
-    if (.not. allocated(error)) call h5_close_dataset(from, error)
-  end subroutine copy
-
-  subroutine copy_values(from, to, error)
-    type(h5_dataset_t), intent(in) :: from, to
-    type(error_t), allocatable, intent(out) :: error
-    integer(int8), allocatable :: bytes(:)
-    integer(int64) :: lower(size(from%lengths)), extent(size(from%lengths)), k
-    if (size(from%lengths) == 0) then
-      allocate (bytes(bytes_of(from%type)))
-      call h5_read(from, bytes, error)
-      if (.not. allocated(error)) call h5_write(to, bytes, error)
-    else
-      do k = 1, slab_count(from%lengths)
-        call slab(from%lengths, k, lower, extent)
-        if (allocated(bytes)) deallocate (bytes)
-        allocate (bytes(product(extent)*bytes_of(from%type)))
-        call h5_read(from, bytes, error, lower, extent)
-        if (.not. allocated(error)) call h5_write(to, bytes, error, lower, extent)
-        if (allocated(error)) return
+    type(h5_dataset_t) :: dataset
+    type(values_t) :: values(size(packing%names))
+    integer :: types(size(packing%names)), v
+    types = file%types()
+    associate (lengths => file%tiling%lengths)
+      do v = 1, size(values)
+        allocate (values(v)%bytes(product(lengths)*bytes_of(types(v))))
       end do
-    end if
+      call file%store%read_block(0*lengths, lengths, values, packing%states, packing%tile_checksums, error)
+    end associate
+    do v = 1, size(values)
+      if (.not. allocated(error)) call h5_open_dataset(new, trim(packing%names(v)), dataset, error)
+      if (.not. allocated(error)) call h5_write(dataset, values(v)%bytes, error)
+      if (.not. allocated(error)) call h5_close_dataset(dataset, error)
+      packing%checksums(v) = crc32(values(v)%bytes, 0_int64)
+    end do
   end subroutine copy_values
 
 end module map_final

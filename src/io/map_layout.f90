@@ -34,60 +34,39 @@ contains
     if (group /= '') path = '/'//group//path
   end function path_of
 
-  !> Creates groups, dimensions, variables and attributes. With a tile shape the file is a
-  !> working file: tiled variables have tiles as chunks, all space is allocated, and theirs is the last, so that a tail
-  !> that is cut off costs tiles only. Otherwise it is a final file: compressed.
-  subroutine create_objects(file, schema, error, tile_shape)
+  !> Creates groups, dimensions, variables and attributes of a final file, or of a working file without its tiles.
+  subroutine create_objects(file, schema, working, error)
     type(h5_file_t), intent(in) :: file
     type(schema_t), intent(in) :: schema
+    logical, intent(in) :: working
     type(error_t), allocatable, intent(out) :: error
-    integer(int64), intent(in), optional :: tile_shape(:)
     integer :: i
-    logical :: working
-    working = present(tile_shape)
-    call create_variables(file, schema, .not. schema%variables%tiled .or. .not. working, error, tile_shape)
-    if (allocated(error)) return
+    do i = 1, size(schema%variables)
+      associate (variable => schema%variables(i))
+        if (working .and. variable%tiled) cycle
+        if (variable%group /= '') call h5_create_group(file, '/'//variable%group, error)
+        if (.not. allocated(error)) call create_variable(file, schema, variable, working, error)
+        if (allocated(error)) return
+      end associate
+    end do
     do i = 1, size(schema%dimensions)
       call create_dimension(file, schema, i, error)
       if (allocated(error)) return
     end do
-    if (working) then
-      call write_attributes(file, schema, error)
-      if (allocated(error)) return
-      call create_variables(file, schema, schema%variables%tiled, error, tile_shape)
-      if (allocated(error)) return
-    end if
     do i = 1, size(schema%variables)
+      if (working .and. schema%variables(i)%tiled) cycle
       call attach_dimensions(file, schema, schema%variables(i), error)
       if (allocated(error)) return
     end do
-    if (.not. working) call write_attributes(file, schema, error)
+    call write_attributes(file, schema, error)
   end subroutine create_objects
 
-  subroutine create_variables(file, schema, chosen, error, tile_shape)
-    type(h5_file_t), intent(in) :: file
-    type(schema_t), intent(in) :: schema
-    logical, intent(in) :: chosen(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer(int64), intent(in), optional :: tile_shape(:)
-    integer :: i
-    do i = 1, size(schema%variables)
-      if (.not. chosen(i)) cycle
-      associate (variable => schema%variables(i))
-        if (variable%group /= '') call h5_create_group(file, '/'//variable%group, error)
-        if (allocated(error)) return
-        call create_variable(file, schema, variable, error, tile_shape)
-        if (allocated(error)) return
-      end associate
-    end do
-  end subroutine create_variables
-
-  subroutine create_variable(file, schema, variable, error, tile_shape)
+  subroutine create_variable(file, schema, variable, working, error)
     type(h5_file_t), intent(in) :: file
     type(schema_t), intent(in) :: schema
     type(variable_t), intent(in) :: variable
+    logical, intent(in) :: working
     type(error_t), allocatable, intent(out) :: error
-    integer(int64), intent(in), optional :: tile_shape(:)
     type(h5_dataset_t) :: dataset
     type(h5_storage_t) :: storage
     integer(int64) :: lengths(size(variable%dimensions))
@@ -98,9 +77,8 @@ contains
       call fail(error, exit_internal, 'variable '//path//' has a dimension that the schema lacks')
       return
     end if
-    if (present(tile_shape)) then
+    if (working) then
       storage%fixed = .true.
-      if (variable%tiled) storage%chunk = tile_shape
     else if (is_compressed(lengths)) then
       storage%chunk = final_chunk(lengths)
       storage%compressed = .true.

@@ -3,11 +3,13 @@
 
 !> Reading a file of Separatrix, of any format version up to that which is written.
 module map_reader
+  use byte_file, only: byte_file_t
   use errors, only: error_t, fail
   use guard, only: end_guard
   use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
     h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
+  use h5_records, only: h5_records_extent
   use h5_stored, only: h5_check_stored
   use h5_list, only: h5_children
   use h5_trap, only: trap
@@ -19,6 +21,7 @@ module map_reader
   use files, only: file_exists, is_text
   use output_check, only: is_folder
   use text, only: to_text
+  use tile_record, only: head_bytes, is_done, tile_records
   use value_types, only: bytes_of, from_bytes, type_names, type_string
   implicit none
   private
@@ -39,6 +42,7 @@ module map_reader
     procedure :: variables
     procedure :: children
     procedure :: has
+    procedure :: count_tiles
     procedure :: lengths
     procedure :: read_values
     procedure :: read_columns
@@ -144,7 +148,7 @@ contains
     do i = 1, size(names)
       if (are_groups(i)) cycle
       path = path_of(group, trim(names(i)))
-      if (is_bare_dimension(self, path)) cycle
+      if (is_bare_dimension(self, path) .or. path == tile_records) cycle
       call h5_open_dataset(self%file, path, dataset, error)
       if (allocated(error)) return
       call push(list, group, trim(names(i)), dataset)
@@ -184,6 +188,29 @@ contains
     character(len=*), intent(in) :: path
     has = h5_exists(self%file, path)
   end function has
+
+  !> How many of a working file's tiles are done. Code 74.
+  subroutine count_tiles(self, done, tiles, error)
+    class(reader_t), intent(in) :: self
+    integer, intent(out) :: done, tiles
+    type(error_t), allocatable, intent(out) :: error
+    type(byte_file_t) :: file
+    integer(int8) :: head(head_bytes)
+    integer(int64) :: offset, bytes, count
+    type(error_t), allocatable :: ignored
+    done = 0
+    tiles = 0
+    call h5_records_extent(self%file, tile_records, offset, bytes, count, error)
+    if (.not. allocated(error)) call file%open(self%path, .false., error)
+    if (allocated(error)) return
+    do tiles = 1, int(count)
+      call file%read(head, offset + (tiles - 1)*bytes, error)
+      if (allocated(error)) exit
+      if (is_done(head)) done = done + 1
+    end do
+    tiles = int(count)
+    call file%close(ignored)
+  end subroutine count_tiles
 
   !> The lengths of a variable in C order.
   subroutine lengths(self, path, values, error)

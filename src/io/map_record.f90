@@ -6,13 +6,13 @@
 module map_record
   use checksum, only: crc32
   use errors, only: error_t
-  use h5, only: h5_close_dataset, h5_dataset_t, h5_open_dataset, h5_read, h5_write
+  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read, h5_write
   use kinds, only: int64, int8, real64
-  use map_file, only: map_file_t
+  use map_file, only: map_file_t, working_path
   use map_layout, only: path_of
   use map_schema, only: schema_t, type_int64
   use team, only: team_t
-  use value_types, only: bytes_of, from_bytes, to_bytes
+  use value_types, only: bytes_of, to_bytes
   implicit none
   private
 
@@ -37,21 +37,26 @@ contains
     character(len=*), intent(in) :: group, name
     integer(int64), allocatable, intent(out) :: rows(:, :)
     type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: ignored
+    type(h5_file_t) :: part
     type(h5_dataset_t) :: dataset
     integer(int8), allocatable :: bytes(:)
-    real(real64), allocatable :: values(:)
-    integer :: columns, i
-    call h5_open_dataset(file%part, path_of(group, name), dataset, error)
-    if (.not. allocated(error)) then
-      columns = int(dataset%lengths(2))
-      allocate (bytes(product(dataset%lengths)*bytes_of(type_int64)), values(product(dataset%lengths)))
-      call h5_read(dataset, bytes, error)
+    integer(int64), allocatable :: lengths(:), stored(:)
+    integer :: i
+    lengths = lengths_of(file%schema, group, name)
+    allocate (bytes(product(lengths)*bytes_of(type_int64)), stored(product(lengths)))
+    if (team%is_root()) then
+      call h5_open(working_path(file%path), part, error)
+      if (.not. allocated(error)) call h5_open_dataset(part, path_of(group, name), dataset, error)
+      if (.not. allocated(error)) call h5_read(dataset, bytes, error)
+      if (.not. allocated(error)) call h5_close_dataset(dataset, error)
+      call h5_close(part, ignored)
+      if (.not. allocated(error)) stored = transfer(bytes, stored)
     end if
-    if (.not. allocated(error)) call h5_close_dataset(dataset, error)
     call team%agree(error)
     if (allocated(error)) return
-    call from_bytes(type_int64, bytes, values)
-    rows = rows_of(values, columns)
+    call team%broadcast_integers(stored)
+    rows = rows_of(real(stored, real64), int(lengths(2)))
     do i = 1, size(rows, 2)
       call keep_row(file%schema, group, name, i, rows(:, i))
     end do
@@ -82,19 +87,38 @@ contains
     integer, intent(in) :: row
     integer(int64), intent(in) :: values(:)
     type(error_t), allocatable, intent(out) :: error
+    type(h5_file_t) :: part
     type(h5_dataset_t) :: dataset
+    type(error_t), allocatable :: ignored
     integer(int8) :: bytes(8*(size(values) + 1))
     integer(int64) :: lower(2)
-    call h5_open_dataset(file%part, path_of(group, name), dataset, error)
-    if (.not. allocated(error) .and. team%is_root()) then
+    if (team%is_root()) then
+      call h5_open(working_path(file%path), part, error, writable=.true.)
+      if (.not. allocated(error)) call h5_open_dataset(part, path_of(group, name), dataset, error)
       call to_bytes(type_int64, real([values, check_of(values)], real64), bytes)
       lower = [int(row - 1, int64), 0_int64]
-      call h5_write(dataset, bytes, error, lower, [1_int64, size(values, kind=int64) + 1])
+      if (.not. allocated(error)) call h5_write(dataset, bytes, error, lower, [1_int64, size(values, kind=int64) + 1])
+      if (.not. allocated(error)) call h5_close_dataset(dataset, error)
+      if (allocated(error)) call h5_close(part, ignored)
+      if (.not. allocated(error)) call h5_close(part, error)
     end if
-    if (.not. allocated(error)) call h5_close_dataset(dataset, error)
     call team%agree(error)
     if (.not. allocated(error)) call keep_row(file%schema, group, name, row, values)
   end subroutine write_row
+
+  !> Rows and columns of a record.
+  pure function lengths_of(schema, group, name) result(lengths)
+    type(schema_t), intent(in) :: schema
+    character(len=*), intent(in) :: group, name
+    integer(int64) :: lengths(2)
+    integer :: i
+    lengths = 0
+    do i = 1, size(schema%variables)
+      associate (variable => schema%variables(i))
+        if (variable%group == group .and. variable%name == name) lengths = schema%lengths_of(variable%dimensions)
+      end associate
+    end do
+  end function lengths_of
 
   !> Puts a row that is in the working file into the schema, from which the final file takes it.
   subroutine keep_row(schema, group, name, row, values)

@@ -71,6 +71,7 @@ module map_schema
     procedure :: bytes_of_point
     procedure :: lengths_of
     procedure :: find_text_attribute
+    procedure :: find_number
   end type schema_t
 
 contains
@@ -242,6 +243,21 @@ contains
       end associate
     end do
   end function find_text_attribute
+
+  !> The value of a numeric attribute; 0 if there is none.
+  pure real(real64) function find_number(self, group, name)
+    class(schema_t), intent(in) :: self
+    character(len=*), intent(in) :: group, name
+    integer :: i
+    find_number = 0
+    if (.not. allocated(self%attributes)) return
+    do i = 1, size(self%attributes)
+      associate (attribute => self%attributes(i))
+        if (attribute%group /= group .or. attribute%name /= name) cycle
+        if (attribute%type /= type_string) find_number = attribute%number
+      end associate
+    end do
+  end function find_number
 
   !> Gives the lists that are not there yet their length 0.
   subroutine complete(self)

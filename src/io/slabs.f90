@@ -11,7 +11,7 @@ module slabs
   public :: final_chunk, slab_count, slab, chunk_count, chunk_corner
 
   !> Values of a chunk in the final file, the side of a square one, and most values of a slab.
-  integer(int64), parameter :: chunk_values = 65536, chunk_side = 256, slab_values = 2_int64**20
+  integer(int64), parameter :: chunk_values = 65536, chunk_side = 256, slab_values = 2_int64**18
 
 contains
 

@@ -12,9 +12,10 @@ module spread_order
   public :: new_spread_order, spread_subscripts
 
   type, public :: spread_order_t
-    integer(int64), private :: length = 0, step = 1
+    integer(int64), private :: length = 0, step = 1, back = 1
   contains
     procedure :: item
+    procedure :: number_of
   end type spread_order_t
 
   real(real64), parameter :: golden = 0.6180339887498949_real64
@@ -30,6 +31,7 @@ contains
     do while (common_divisor(order%step, order%length) > 1)
       order%step = order%step + 1
     end do
+    order%back = inverse(order%step, order%length)
   end function new_spread_order
 
   !> The item that is handed out as number `number` (from 1).
@@ -38,6 +40,13 @@ contains
     integer, intent(in) :: number
     item = 1 + int(modulo((number - 1)*self%step, self%length))
   end function item
+
+  !> The number (from 1) as which an item is handed out.
+  pure integer function number_of(self, item)
+    class(spread_order_t), intent(in) :: self
+    integer, intent(in) :: item
+    number_of = 1 + int(modulo((item - 1)*self%back, self%length))
+  end function number_of
 
   !> Point number `number` of a sample of a grid of so many points along each axis, from 1 along each: the additive recurrence with
   !> square roots of primes. Axes after the eighth repeat the others.
@@ -49,6 +58,26 @@ contains
       subscripts(k) = 1 + int(modulo(0.5_real64 + number*roots(1 + modulo(k - 1, size(roots))), 1.0_real64)*lengths(k))
     end do
   end function spread_subscripts
+
+  !> What times `step` is 1 modulo `length`, by Euclid's extended algorithm; both have no common divisor.
+  pure integer(int64) function inverse(step, length)
+    integer(int64), intent(in) :: step, length
+    integer(int64) :: rest, other, factor, next
+    inverse = 1
+    if (length <= 1) return
+    rest = step
+    other = length
+    factor = 0
+    do while (other > 0)
+      next = inverse - rest/other*factor
+      inverse = factor
+      factor = next
+      next = modulo(rest, other)
+      rest = other
+      other = next
+    end do
+    inverse = modulo(inverse, length)
+  end function inverse
 
   pure integer(int64) function common_divisor(a, b)
     integer(int64), intent(in) :: a, b

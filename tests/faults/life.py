@@ -45,6 +45,18 @@ def launch(
         )
 
 
+def stop_half_way(program: Path, folder: Path) -> None:
+    """Start the run and stop it by a signal when it has done some tiles and not all."""
+    process = launch(program, folder, 0)
+    while not (folder / f"{NAME}.part").exists() or tiles_of(folder)[0] == 0:
+        assert process.poll() is None
+        time.sleep(0.002)
+    time.sleep(0.2)
+    process.terminate()
+    assert process.wait(20) == 75
+    assert 0 < tiles_of(folder)[0] < TILES
+
+
 def ranks_of(process: subprocess.Popen, ranks: int) -> list[int]:
     """The processes that compute: those that mpirun has started so far, or the process itself."""
     if not ranks:
@@ -95,15 +107,9 @@ def stage(folder: Path) -> str:
 def tiles_of(folder: Path) -> tuple[int, int]:
     """How many tiles the working file has done, and how many others hold some data."""
     with h5py.File(folder / f"{NAME}.part", locking=False) as file:
-        state = file["tiles/state"][()]
-        shape = file["tiles/tile_shape"][()]
-        begun = 0
-        columns = -(-file["reason"].shape[1] // shape[1])
-        for tile in np.flatnonzero(state != 1):
-            i, k = divmod(int(tile), columns)
-            rows, cells = slice(i * shape[0], (i + 1) * shape[0]), slice(k * shape[1], (k + 1) * shape[1])
-            begun += bool(np.any(file["regime"][rows, cells]))
-        return int(np.sum(state == 1)), begun
+        records = file["tiles/record"][()]
+    done = records["state"] == 1
+    return int(np.sum(done)), int(np.sum([np.any(values) for values in records["regime"][~done]]))
 
 
 def resume(program: Path, folder: Path, ranks: int) -> Outcome:

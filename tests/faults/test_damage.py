@@ -5,7 +5,6 @@
 import random
 import re
 import shutil
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -16,25 +15,22 @@ import pytest
 
 SEED = 20261122
 PART = f"{life.NAME}.part"
+AXES = ("x0", "v0")
 
 
 @pytest.fixture(scope="module")
-def killed(separatrix, tmp_path_factory):
-    """A folder with a run that was killed half-way."""
-    folder = tmp_path_factory.mktemp("killed")
+def stopped(separatrix, tmp_path_factory):
+    """A folder with a run that was stopped half-way."""
+    folder = tmp_path_factory.mktemp("stopped")
     life.write_case(folder)
-    process = life.launch(separatrix, folder, 0)
-    while not (folder / PART).exists() or life.tiles_of(folder)[0] < life.TILES // 2:
-        assert process.poll() is None
-        time.sleep(0.005)
-    life.kill(process, [process.pid])
+    life.stop_half_way(separatrix, folder)
     return folder
 
 
 @pytest.fixture
-def folder(killed, tmp_path):
+def folder(stopped, tmp_path):
     """A copy of it."""
-    shutil.copytree(killed, tmp_path / "copy")
+    shutil.copytree(stopped, tmp_path / "copy")
     return tmp_path / "copy"
 
 
@@ -42,20 +38,19 @@ def data_of_tiles(part: Path) -> dict[int, list[tuple[int, int]]]:
     """Where the working file holds the data of each tile that is done: (offset, bytes)."""
     extents = {}
     with h5py.File(part, locking=False) as file:
-        state, shape = file["tiles/state"][()], file["tiles/tile_shape"][()]
-        columns = -(-file["reason"].shape[1] // shape[1])
-        for name in file["tiles"].attrs["variables"].split():
-            dataset = file[name]
-            for number in range(dataset.id.get_num_chunks()):
-                chunk = dataset.id.get_chunk_info(number)
-                i, k = (corner // length for corner, length in zip(chunk.chunk_offset, shape, strict=True))
-                tile = int(i * columns + k)
-                # Chunks at the edge of the grid have cells of no point.
-                whole = all(
-                    c + s <= n for c, s, n in zip(chunk.chunk_offset, shape, dataset.shape, strict=True)
-                )
-                if state[tile] == 1 and whole:
-                    extents.setdefault(tile, []).append((chunk.byte_offset, chunk.size))
+        records, shape = file["tiles/record"], file["tiles/tile_shape"][()]
+        columns = -(-len(file[AXES[1]]) // int(shape[1]))
+        whole = [len(file[name]) // length for name, length in zip(AXES, shape, strict=True)]
+        first, width = records.id.get_offset(), records.dtype.itemsize
+        for slot, head in enumerate(records.fields(["tile", "state"])[()]):
+            i, k = divmod(int(head["tile"]) - 1, columns)
+            # Records of tiles at the edge of the grid have cells of no point.
+            if head["state"] != 1 or i >= whole[0] or k >= whole[1]:
+                continue
+            extents[int(head["tile"])] = [
+                (first + slot * width + records.dtype.fields[name[1:]][1], records.dtype[name[1:]].itemsize)
+                for name in file["tiles"].attrs["variables"].split()
+            ]
     return extents
 
 

@@ -15,7 +15,6 @@ import pytest
 from program import STARTS
 
 SEED = 20261123
-LAYERS = ["romio321", "ompio"]
 # Longest wait for the end after the first failure.
 AT_ONCE = 10
 
@@ -79,18 +78,17 @@ def test_every_write_can_fail(
     )
 
 
-@pytest.mark.parametrize("layer", LAYERS)
-def test_a_file_size_limit(mpi_separatrix, tmp_path, reference, amount, figures, layer):
+def test_a_file_size_limit(mpi_separatrix, tmp_path, reference, amount, figures):
     """The limit (RLIMIT_FSIZE) falls on all ranks in the middle of the run."""
     life.write_case(tmp_path)
-    chance = random.Random(f"{SEED} {layer}")
+    chance = random.Random(SEED)
     codes, stages = Counter(), Counter()
     longest = 0.0
     points = amount(2, 20)
     for point in range(points):
         clean(tmp_path)
         ranks = 1 + point % 3
-        process = life.launch(mpi_separatrix, tmp_path, ranks, variables={"OMPI_MCA_io": layer})
+        process = life.launch(mpi_separatrix, tmp_path, ranks)
         wanted = (point + chance.random()) / points * life.TILES
         while process.poll() is None and not reached(tmp_path, wanted):
             time.sleep(0.001)
@@ -139,10 +137,8 @@ def small_disk(tmp_path):
         subprocess.run(["umount", folder], check=True)
 
 
-@pytest.mark.parametrize("layer", LAYERS)
-def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, figures, long_if, layer):
+def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, figures):
     """The disk is too small for the working file, for the final file beside it, or fills up meanwhile."""
-    long_if(layer == "romio321")
     life.write_case(tmp_path)
     process = life.launch(mpi_separatrix, tmp_path, 0)
     part = tmp_path / f"{life.NAME}.part"
@@ -160,9 +156,7 @@ def test_a_small_disk(mpi_separatrix, tmp_path, small_disk, reference, amount, f
         ranks = 1 + point % 3
         started = time.monotonic()
         outcome = life.run(
-            *("env", f"OMPI_MCA_io={layer}", "mpirun", "-n", str(ranks), mpi_separatrix, *life.RUN),
-            folder=folder,
-            timeout=AT_ONCE + 5,
+            *("mpirun", "-n", str(ranks), mpi_separatrix, *life.RUN), folder=folder, timeout=AT_ONCE + 5
         )
         longest = max(longest, time.monotonic() - started)
         codes[outcome.code] += 1

@@ -4,11 +4,11 @@
 
 import re
 import shutil
-import time
 import tomllib
 
 import h5py
 import life
+import numpy as np
 import pytest
 
 PART = f"{life.NAME}.part"
@@ -21,12 +21,7 @@ def stopped(separatrix, tmp_path_factory):
     """A folder with a run that was stopped half-way."""
     folder = tmp_path_factory.mktemp("stopped")
     life.write_case(folder)
-    process = life.launch(separatrix, folder, 0)
-    while not (folder / PART).exists() or life.tiles_of(folder)[0] < life.TILES // 3:
-        assert process.poll() is None
-        time.sleep(0.002)
-    process.terminate()
-    assert process.wait(20) == 75
+    life.stop_half_way(separatrix, folder)
     return folder
 
 
@@ -155,12 +150,29 @@ def test_another_version_is_refused(separatrix, folder):
     assert (folder / PART).read_bytes() == before
 
 
-def test_another_layout_is_refused(separatrix, folder):
+def test_a_file_without_records_is_refused(separatrix, folder):
     with h5py.File(folder / PART, "r+") as file:
-        file.move("settle_time", "time_to_settle")
+        del file["tiles/record"]
     outcome = life.run(separatrix, *life.RUN, "--resume", folder=folder)
     assert outcome.code == 76
-    assert "settle_time" in outcome.messages[0]
+    assert "the program that began it finishes it" in outcome.messages[0]
+
+
+def test_another_layout_is_refused(separatrix, folder):
+    with h5py.File(folder / PART, "r+") as file:
+        records = file["tiles/record"]
+        shape, fields = records.shape, records.dtype.fields
+        other = {
+            "names": [name.replace("settle_time", "time_to_settle") for name in fields],
+            "formats": [field[0] for field in fields.values()],
+            "offsets": [field[1] for field in fields.values()],
+            "itemsize": records.dtype.itemsize,
+        }
+        del file["tiles/record"]
+        file.create_dataset("tiles/record", shape, dtype=np.dtype(other))
+    outcome = life.run(separatrix, *life.RUN, "--resume", folder=folder)
+    assert outcome.code == 76
+    assert "/tiles/record" in outcome.messages[0]
 
 
 def test_another_build_is_reported_and_both_are_kept(separatrix, folder, reference):

@@ -13,10 +13,10 @@ import life
 import pytest
 
 SEED = 20261126
-# Large enough for compressed chunks, and soon computed.
+# Several slabs of compressed chunks, and soon computed.
 RUN = [
     *("basin", "case.toml", "-o", life.NAME, "--force"),
-    *("--set", "axis[1].count=91", "--set", "axis[2].count=97", "--set", "attractors.sample=16"),
+    *("--set", "axis[1].count=270", "--set", "axis[2].count=260", "--set", "attractors.sample=16"),
 ]
 NEW = f"{life.NAME}.new"
 

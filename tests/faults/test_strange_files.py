@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import life
 import pytest
-from program import listing
+from program import change_tile, listing
 
 SMALL = ["--set", "axis[1].count=6", "--set", "axis[2].count=8", "--set", "attractors.sample=4"]
 QUICK = ["basin", "case.toml", *SMALL]
@@ -145,8 +145,7 @@ def test_merge_changes_no_share(separatrix, folder):
     """Not even one that is damaged, which only its own run mends."""
     life.succeed(separatrix, *QUICK, "-o", "map.h5", "--shard", "1/1", folder=folder)
     part = folder / "map.h5.shard-1-of-1.part"
-    with h5py.File(part, "r+") as file:
-        file["x_max"][0, 0] += 1
+    change_tile(part, "x_max")
     before = part.read_bytes()
     outcome = life.run(separatrix, "merge", "map.h5", part.name, folder=folder)
     assert outcome.code == 75, outcome

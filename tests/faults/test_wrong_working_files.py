@@ -87,7 +87,9 @@ def model(separatrix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     life.succeed(separatrix, *RUN, "-o", "map.h5", "--shard", "1/1", folder=folder)
     shutil.copy(folder / SHARE, folder / PART)
     with h5py.File(folder / PART, "r+") as file:
-        file["tiles/state"][1:3] = 0
+        records = file["tiles/record"][()]
+        records["state"][1:3] = 0
+        file["tiles/record"][()] = records
     return folder
 
 

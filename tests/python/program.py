@@ -218,6 +218,22 @@ def differences(first: Path, second: Path) -> list[str]:
     return sorted(name for name in one.keys() | other.keys() if one.get(name) != other.get(name))
 
 
+def tiles_done(part: Path) -> int:
+    """How many tiles a working file has."""
+    with h5py.File(part, locking=False) as file:
+        return int(np.sum(file["tiles/record"].fields("state")[()] == 1))
+
+
+def change_tile(part: Path, name: str) -> None:
+    """Change a value of the first tile that a working file has."""
+    with h5py.File(part, "r+", locking=False) as file:
+        records = file["tiles/record"]
+        number = int(np.flatnonzero(records.fields("state")[()] == 1)[0])
+        record = records[number : number + 1]
+        record[name].flat[0] += 1
+        records[number : number + 1] = record
+
+
 def listing(folder: Path) -> dict[str, bytes]:
     """Every file below a folder with its bytes."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

@@ -26,6 +26,9 @@ class Setting(ctypes.Structure):
         ("service", ctypes.c_double),
         ("pause", ctypes.c_double),
         ("polls_per_tile", ctypes.c_double),
+        ("run", ctypes.c_double),
+        ("write", ctypes.c_double),
+        ("write_tile", ctypes.c_double),
         ("seed", ctypes.c_ulonglong),
     ]
 
@@ -37,13 +40,15 @@ class _Outcome(ctypes.Structure):
         ("tiles", ctypes.POINTER(ctypes.c_long)),
         ("questions", ctypes.POINTER(ctypes.c_long)),
         ("service", ctypes.c_double),
+        ("writes", ctypes.c_long),
         ("longest_queue", ctypes.c_int),
     ]
 
 
-# src/parallel: half of a node's fair share, 100 us between two looks
+# src/parallel: half of a node's fair share, 100 us between two looks, runs of half a second
 SHARE = 0.5
 PAUSE = 100e-6
+RUN = 0.5
 # a message, and an answer of rank 0, on a usual cluster
 LATENCY = 5e-6
 SERVICE = 5e-6
@@ -57,10 +62,13 @@ def setting(
     service: float = SERVICE,
     polls_per_tile: float = 1024,
     share: float = SHARE,
+    write: float = 0.0,
+    write_tile: float = 0.0,
     seed: int = 1,
 ) -> Setting:
-    """Return a machine and what its messages take."""
-    return Setting(ranks, ranks_per_node, share, latency, service, PAUSE, polls_per_tile, seed)
+    """Return a machine and what its messages and writes take."""
+    times = (latency, service, PAUSE, polls_per_tile, RUN, write, write_tile)
+    return Setting(ranks, ranks_per_node, share, *times, seed)
 
 
 @dataclass
@@ -72,6 +80,7 @@ class Outcome:
     tiles: np.ndarray
     questions: np.ndarray
     service: float
+    writes: int
     longest_queue: int
 
     @property
@@ -131,4 +140,4 @@ class Model:
         )
         if self.entry(ctypes.byref(machine), len(costs), costs, ctypes.byref(raw)):
             raise MemoryError("the model of the scheduler")
-        return Outcome(busy, finish, tiles, questions, raw.service, raw.longest_queue)
+        return Outcome(busy, finish, tiles, questions, raw.service, raw.writes, raw.longest_queue)

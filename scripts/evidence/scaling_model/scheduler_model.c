@@ -25,11 +25,19 @@ struct node {
   int exhausted;
 };
 
+struct rank {
+  long next, last; /* positions of its run, from 0; empty if last < next */
+  long held;       /* tiles done and not written */
+  double written;  /* when it wrote last */
+  int waits;       /* its last tile is accounted for */
+};
+
 struct model {
   const struct scheduler_setting *setting;
   const double *cost;
   struct outcome *outcome;
   struct node *nodes;
+  struct rank *own;
   int *node_of, *next_waiting;
   struct event *heap;
   long events, room;
@@ -97,6 +105,37 @@ static long take(struct node *pool, double share, long *first) {
   return count;
 }
 
+/* As mpi_node%take_run: as many positions as take about the time of a run, fewer when little is left for all
+ * who take. */
+static void take_run(struct model *m, int rank, struct node *pool) {
+  struct rank *own = &m->own[rank];
+  double mean = m->outcome->tiles[rank] ? m->outcome->busy[rank] / (double)m->outcome->tiles[rank] : INFINITY;
+  int takers = m->node_of[rank] == 0 ? m->setting->ranks : pool->size;
+  long left = pool->last - pool->next + 1, most = left / (8L * takers);
+  long count = (long)fmin(m->setting->run / mean, 1000);
+  if (count > most)
+    count = most;
+  if (count < 1)
+    count = 1;
+  if (count > left)
+    count = left;
+  own->next = pool->next;
+  own->last = pool->next + count - 1;
+  pool->next += count;
+}
+
+/* Writes what a rank holds, in one call, and returns when it is done. */
+static double write_tiles(struct model *m, double time, int rank) {
+  struct rank *own = &m->own[rank];
+  if (own->held == 0)
+    return time;
+  time += m->setting->write + (double)own->held * m->setting->write_tile;
+  m->outcome->writes++;
+  own->held = 0;
+  own->written = time;
+  return time;
+}
+
 static double pause_end(struct model *m, double time) { return time + m->setting->pause * uniform(m); }
 
 /* Rank 0 looks between two trajectories of its tile, and every pause once it has no tile. */
@@ -145,15 +184,26 @@ static void ask(struct model *m, double time, int rank) {
 static void rank_free(struct model *m, double time, int rank) {
   int number = m->node_of[rank];
   struct node *node = &m->nodes[number];
-  long first;
+  struct rank *own = &m->own[rank];
   /* questions have taken time from the tile of rank 0 */
   if (rank == 0 && !m->root_idle && m->root_cost > 0 && time < m->root_begin + m->root_cost * (1 - 1e-12)) {
     push(m, m->root_begin + m->root_cost, FREE, 0);
     return;
   }
+  if (own->waits) {
+    own->held++;
+    own->waits = 0;
+    if (time - own->written >= m->setting->run)
+      time = write_tiles(m, time, rank);
+  }
+  if (own->next > own->last)
+    take_run(m, rank, node);
+  if (own->next > own->last)
+    time = write_tiles(m, time, rank);
   m->outcome->finish[rank] = time;
-  if (take(node, 0, &first) > 0) {
-    begin_tile(m, time, rank, first);
+  if (own->next <= own->last) {
+    own->waits = 1;
+    begin_tile(m, time, rank, own->next++);
   } else if (number > 0 && !node->exhausted) {
     ask(m, time, rank);
   } else if (rank == 0) {
@@ -204,10 +254,11 @@ static int set_up(struct model *m, long tiles) {
   m->room = 2 * (long)ranks + 16;
   m->nodes = calloc((size_t)nodes, sizeof *m->nodes);
   m->node_of = calloc((size_t)ranks, sizeof *m->node_of);
+  m->own = calloc((size_t)ranks, sizeof *m->own);
   m->next_waiting = calloc((size_t)ranks, sizeof *m->next_waiting);
   m->queue = calloc((size_t)nodes, sizeof *m->queue);
   m->heap = calloc((size_t)m->room, sizeof *m->heap);
-  if (!m->nodes || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
+  if (!m->nodes || !m->own || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
     return 1;
   for (int i = 0; i < nodes; i++) {
     int first = i * per_node, size = per_node < ranks - first ? per_node : ranks - first;
@@ -215,6 +266,7 @@ static int set_up(struct model *m, long tiles) {
   }
   m->nodes[0].last = tiles - 1;
   for (int i = 0; i < ranks; i++) {
+    m->own[i] = (struct rank){.last = -1, .written = -INFINITY};
     m->node_of[i] = i / per_node;
     push(m, 0, FREE, i);
   }
@@ -245,6 +297,7 @@ int simulate(const struct scheduler_setting *setting, long tiles, const double *
     status = m.failed;
   }
   free(m.nodes);
+  free(m.own);
   free(m.node_of);
   free(m.next_waiting);
   free(m.queue);

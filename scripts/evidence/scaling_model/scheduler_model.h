@@ -11,6 +11,9 @@ struct scheduler_setting {
   double service;        /* time of rank 0 for a question, seconds */
   double pause;          /* between two looks of a rank that waits, seconds */
   double polls_per_tile; /* looks of rank 0 during a tile: trajectories of a tile */
+  double run;            /* seconds of the tiles that a rank takes in a row, and between two writes */
+  double write;          /* time of a call that writes, seconds */
+  double write_tile;     /* and of each tile in it */
   unsigned long long seed;
 };
 
@@ -19,6 +22,7 @@ struct outcome {
   double *busy, *finish; /* time in tiles; end of the last tile, or of the wait for one more */
   long *tiles, *questions;
   double service; /* time of rank 0 spent on questions */
+  long writes;    /* calls of all ranks that write tiles */
   int longest_queue;
 };
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from costs import tiles_for
-from model import Model, setting
+from model import Model, Outcome, setting
 from packing import Packing
 
 RANKS_PER_NODE = 128
@@ -22,6 +22,12 @@ TRAJECTORIES_PER_TILE = 1024
 TILE_SECONDS = (0.01, 0.1, 1.0, 10.0)
 LOOKS = (1024, 16, 1)
 SLOW = 50e-6
+CALL = 1e-3
+"""Seconds of a call that writes: a message and a lock of the file system; an assumption."""
+STORES = {"100 GB/s": 1e11, "1 TB/s": 1e12}
+"""Bytes per second that a file system takes from all ranks; assumptions."""
+RECORD_BYTES = 48 * TRAJECTORIES_PER_TILE + 16
+"""A tile in the working file of the case of the packing runs."""
 
 
 @dataclass
@@ -34,8 +40,12 @@ class Simulated:
     """spread: for each of RANKS"""
     neighbours: list[float]
     """With blocks of neighbouring tiles, spread BAR_SPREAD, for each of RANKS."""
+    with_store: dict[str, list[float]]
+    """With the writing of tiles at each of STORES, spread BAR_SPREAD, for each of RANKS."""
     with_file: list[float]
-    """With the final file, spread BAR_SPREAD, for each of RANKS."""
+    """With writing at the last of STORES and the final file, spread BAR_SPREAD, for each of RANKS."""
+    writes: int
+    """Calls that write tiles on MANY_RANKS."""
     by_tiles: dict[int, list[float]]
     """spread: for each of TILES_PER_RANK on MANY_RANKS"""
     by_looks: dict[int, list[float]]
@@ -59,10 +69,16 @@ class Simulation:
         machine, tiles = self.problem(ranks, per_rank, spread, mean or self.mean, **more)
         return self.model.run(machine, tiles).efficiency
 
-    def with_file(self, ranks: int) -> float:
-        """Efficiency with the final file, of a map of the usual size and the bar's spread."""
-        found = self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, self.mean))
+    def stored(self, ranks: int, rate: float) -> Outcome:
+        """Run a map of the usual size and the bar's spread whose ranks share a rate of writing."""
+        times = {"write": CALL, "write_tile": RECORD_BYTES * ranks / rate}
+        return self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, self.mean, **times))
+
+    def with_file(self, ranks: int, rate: float) -> float:
+        """Efficiency with writing and the final file, for which the tiles are read back at the same rate."""
+        found = self.stored(ranks, rate)
         finish = self.packing.seconds(ranks * USUAL * TRAJECTORIES_PER_TILE, ranks)
+        finish += ranks * USUAL * RECORD_BYTES / rate
         return float(found.busy.sum() / (ranks * (found.makespan + finish)))
 
     def problem(self, ranks: int, per_rank: int, spread: float, mean: float, **more):
@@ -91,7 +107,12 @@ class Simulation:
             mean=self.mean,
             by_ranks={s: [self.efficiency(ranks, USUAL, s) for ranks in RANKS] for s in SPREADS},
             neighbours=neighbours,
-            with_file=[self.with_file(ranks) for ranks in RANKS],
+            with_store={
+                name: [self.stored(ranks, rate).efficiency for ranks in RANKS]
+                for name, rate in STORES.items()
+            },
+            with_file=[self.with_file(ranks, max(STORES.values())) for ranks in RANKS],
+            writes=self.stored(MANY_RANKS, max(STORES.values())).writes,
             by_tiles={s: [self.efficiency(MANY_RANKS, n, s) for n in TILES_PER_RANK] for s in SPREADS},
             by_looks={
                 looks: [

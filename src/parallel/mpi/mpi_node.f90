@@ -21,6 +21,9 @@ module mpi_node
   integer, parameter :: word_lock = 0, word_next = 1, word_last = 2, word_refilling = 3, &
     word_exhausted = 4, word_stop = 5, word_done = 6, word_count = 7
 
+  !> A rank takes at most this part of its share of the pool in a row.
+  integer, parameter :: run_share = 8
+
   type, public :: node_t
     !> Rank in the node and size of the node.
     integer :: rank = 0, size = 1
@@ -32,6 +35,7 @@ module mpi_node
     type(c_ptr), private :: words
   contains
     procedure :: take
+    procedure :: take_run
     procedure :: has_work
     procedure :: refill
     procedure :: begin_refill
@@ -133,6 +137,23 @@ contains
     first = int(next)
     last = int(next + count - 1)
   end subroutine take
+
+  !> Takes up to `wanted` items in a row, the fewer the less is left for the `takers` ranks, so that they end together: `first` to
+  !> `last`.
+  subroutine take_run(self, wanted, takers, first, last)
+    class(node_t), intent(in) :: self
+    integer, intent(in) :: wanted, takers
+    integer, intent(out) :: first, last
+    integer(int64) :: next, end, count
+    call lock(self)
+    next = atomic_load(self%words, word_next)
+    end = atomic_load(self%words, word_last)
+    count = min(int(wanted, int64), max(1_int64, (end - next + 1)/(run_share*takers)), end - next + 1)
+    call atomic_store(self%words, word_next, next + count)
+    call atomic_store(self%words, word_lock, 0_int64)
+    first = int(next)
+    last = int(next + count - 1)
+  end subroutine take_run
 
   !> Whether items are left in the pool.
   logical function has_work(self)

@@ -7,7 +7,7 @@
 !> which rank 0 answers in `poll` and in `finish`.
 module mpi_scheduler
   use errors, only: error_t, fail
-  use kinds, only: int64
+  use kinds, only: int64, real64
   use mpi_f08, only: MPI_Allreduce, MPI_ANY_SOURCE, MPI_Bcast, MPI_Comm, MPI_Ibarrier, MPI_IN_PLACE, &
     MPI_INTEGER, MPI_Iprobe, MPI_Isend, MPI_LOGICAL, MPI_Recv, MPI_Request, MPI_Send, MPI_Status, &
     MPI_STATUS_IGNORE, MPI_STATUSES_IGNORE, MPI_SUM, MPI_Test, MPI_Waitall
@@ -25,6 +25,9 @@ module mpi_scheduler
   integer, parameter :: tag_request = 101, tag_reply = 102, tag_stop = 103
   !> Pause between two looks for a message, in microseconds: no core is burnt while waiting.
   integer, parameter :: pause_us = 100
+  !> What a rank takes at once from the pool of its node takes it about so many seconds.
+  real(real64), parameter :: run_seconds = 0.5_real64
+  integer, parameter :: longest_run = 1000
 
   type, extends(scheduler_t), public :: mpi_scheduler_t
     type(MPI_Comm), private :: comm
@@ -36,6 +39,10 @@ module mpi_scheduler
     logical, private :: active = .false.
     logical, private :: busy = .false., stopped = .false.
     integer, private :: my_done = 0, all_done = 0
+    !> Numbers that this rank has taken and not begun.
+    integer, private :: run_next = 1, run_last = 0
+    !> Seconds that its items have taken, and when the present one began.
+    real(real64), private :: seconds_busy = 0, item_began = 0
     !> On rank 0: items done that each node has reported.
     integer, allocatable, private :: reported(:)
     !> Notices of a stop: sent to rank 0, received by rank 0, sent on by rank 0, received by a leader.
@@ -87,6 +94,9 @@ contains
     self%stopped = .false.
     self%my_done = 0
     self%all_done = 0
+    self%run_next = 1
+    self%run_last = 0
+    self%seconds_busy = 0
     self%notices_sent = 0
     self%notices_received = 0
     self%nodes_informed = .false.
@@ -102,9 +112,9 @@ contains
   subroutine next(self, item)
     class(mpi_scheduler_t), intent(inout) :: self
     integer, intent(out) :: item
-    integer :: number, last
     if (self%busy) then
       self%my_done = self%my_done + 1
+      self%seconds_busy = self%seconds_busy + (self%elapsed() - self%item_began)
       call self%node%count_done()
       call self%log%end(self%elapsed())
       self%busy = .false.
@@ -113,16 +123,32 @@ contains
       item = 0
       call self%poll()
       if (self%node%is_stopped()) return
-      call self%node%take(1, number, last)
-      if (last >= number) exit
+      if (self%run_next > self%run_last) call self%node%take_run(run_length(self), takers(self), self%run_next, self%run_last)
+      if (self%run_last >= self%run_next) exit
       if (self%node%number == 1) return
       if (self%node%is_exhausted()) return
       call refill_pool(self)
     end do
     self%busy = .true.
-    item = self%order%item(number)
-    call self%log%begin(item, self%elapsed())
+    item = self%order%item(self%run_next)
+    self%run_next = self%run_next + 1
+    self%item_began = self%elapsed()
+    call self%log%begin(item, self%item_began)
   end subroutine next
+
+  !> Who takes from the pool of this node: that of rank 0 is the work list of all.
+  pure integer function takers(self)
+    type(mpi_scheduler_t), intent(in) :: self
+    takers = merge(self%ranks, self%node%size, self%node%number == 1)
+  end function takers
+
+  !> So many items take about `run_seconds`. What is done in a row lies side by side in the file.
+  pure integer function run_length(self)
+    type(mpi_scheduler_t), intent(in) :: self
+    run_length = 1
+    if (self%my_done == 0) return
+    run_length = max(1, int(min(run_seconds*self%my_done/max(self%seconds_busy, tiny(run_seconds)), real(longest_run, real64))))
+  end function run_length
 
   !> Looks for signals, the time limit and messages.
   subroutine poll(self)

@@ -10,7 +10,7 @@ module parallel
   use mpi_team, only: mpi_team_t, new_mpi_team
   use scheduler, only: scheduler_options_t, scheduler_t
   use serial_scheduler, only: serial_scheduler_t
-  use system, only: default_environment, set_environment
+  use system, only: set_environment
   use team, only: team_t
   implicit none
   private
@@ -30,8 +30,6 @@ contains
     integer :: provided
     call MPI_Initialized(running)
     if (.not. running) then
-      ! The default layer of OpenMPI 4.1 can lose data on a full disk without an error.
-      call default_environment('OMPI_MCA_io', 'romio321')
       call allow_shared_memory()
       ! Threads serve the bodies of a GPU; the first of them alone calls MPI.
       call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)

@@ -148,7 +148,6 @@ def test_a_file_states_how_it_was_made(mpi_separatrix, tmp_path):
     assert "-ffp-contract=off" in record["flags"] and "C++" in record["c_flags"]
     variables = record["environment"].split()
     assert "UCX_TEST_OF_SEPARATRIX=yes" in variables
-    assert "OMPI_MCA_io=romio321" in variables
     assert not any(word.startswith("OMPI_MCA_orte_") for word in variables)
     shown = json.loads(succeed(mpi_separatrix, "info", "map.h5", "--json", folder=tmp_path).out)
     for name in ("version", "commit", "compiler", "flags", "c_flags", "mpi", "hosts", "started", "finished"):

@@ -40,8 +40,3 @@ class Separatrix(CMakePackage):
     def cmake_args(self):
         """Arguments of CMake."""
         return [self.define_from_variant("SEPARATRIX_MPI", "mpi"), self.define("SEPARATRIX_TESTS", False)]
-
-    def setup_run_environment(self, env):
-        """The default MPI-IO layer of OpenMPI 4.1 loses data silently on a full disk."""
-        if "^openmpi@4" in self.spec:
-            env.set("OMPI_MCA_io", "romio321")
