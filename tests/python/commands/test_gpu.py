@@ -285,7 +285,8 @@ def test_the_benchmark_measures_nothing_without_a_gpu(source_dir, separatrix, bu
 
 @pytest.mark.long
 def test_the_page_of_the_benchmark(source_dir, separatrix, tmp_path, on_host, monkeypatch):
-    monkeypatch.syspath_prepend(str(source_dir / "scripts/evidence/bench_peers"))
+    for folder in ("scripts/evidence", "scripts/evidence/bench_peers"):
+        monkeypatch.syspath_prepend(str(source_dir / folder))
     import gpu
 
     runs, size = gpu.Runs(separatrix, tmp_path), gpu.Size(4, 12, 100.0, 1, 1, 12)
