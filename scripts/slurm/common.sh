@@ -9,6 +9,11 @@ separatrix=${SEPARATRIX:-$SEPARATRIX_ROOT/build/bin/separatrix}
 # shellcheck source=scripts/environment.sh
 source "$SEPARATRIX_ROOT/scripts/environment.sh"
 
+# OpenMPI notices a lost host after a minute, not after eight.
+export OMPI_MCA_oob_tcp_keepalive_time=${OMPI_MCA_oob_tcp_keepalive_time:-30}
+export OMPI_MCA_oob_tcp_keepalive_intvl=${OMPI_MCA_oob_tcp_keepalive_intvl:-10}
+export OMPI_MCA_oob_tcp_keepalive_probes=${OMPI_MCA_oob_tcp_keepalive_probes:-3}
+
 # Tiles done in a working file; 0 if there is none.
 tiles_done() {
   if [[ -e $1 ]]; then

@@ -162,7 +162,9 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: held
     character(len=:), allocatable :: refusal
-    if (allocated(error) .and. .not. file_exists(part)) return
+    logical :: begun
+    begun = file_exists(part)
+    if (allocated(error) .and. .not. begun) return
     session%lock_path = part//'.lock'
     call take_lock(session%lock_path, session%lock, refusal, held)
     if (allocated(held)) call move_alloc(held, error)

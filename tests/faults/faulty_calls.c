@@ -5,7 +5,8 @@
    call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
    write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
    MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. `unlockable`: no
-   such file can be locked, as on file systems without locks. Without $FAULT_AT the number of calls is added
+   such file can be locked, as on file systems without locks. `arrive`: the first barrier of MPI without
+   waiting takes $FAULT_AT seconds, once there is such a file. Without $FAULT_AT the number of calls is added
    as a line to the file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -55,7 +56,8 @@ static int fault(const char *path, int writes) {
   if (name == NULL || strstr(path, name) == NULL)
     return 0;
   const long call = ++calls;
-  if (at == 0 || call < at || strcmp(action, "late") == 0 || strcmp(action, "unlockable") == 0)
+  if (at == 0 || call < at || strcmp(action, "late") == 0 || strcmp(action, "unlockable") == 0 ||
+      strcmp(action, "arrive") == 0)
     return 0;
   if (strcmp(action, "kill") == 0)
     die();
@@ -175,6 +177,16 @@ int flock(int descriptor, int operation) {
     return -1;
   }
   return REAL(flock)(descriptor, operation);
+}
+
+/* The C function that the Fortran interface of OpenMPI calls. */
+int PMPI_Ibarrier(void *communicator, void **request);
+int PMPI_Ibarrier(void *communicator, void **request) {
+  static atomic_int arrived;
+  if (action != NULL && strcmp(action, "arrive") == 0 && access(name, F_OK) == 0 &&
+      atomic_fetch_add(&arrived, 1) == 0)
+    sleep((unsigned)at);
+  return REAL(PMPI_Ibarrier)(communicator, request);
 }
 
 int rename(const char *from, const char *to) {
