@@ -17,7 +17,7 @@ program separatrix
   use stability_driver, only: run_stability
   use sweep_driver, only: run_sweep
   use status, only: exit_io
-  use system, only: exit_at_once, exit_program, sleep_microseconds
+  use system, only: default_environment, exit_at_once, exit_program, sleep_microseconds
   use trajectory_driver, only: run_trajectory_command
   use verify_driver, only: run_verify
   use version_text, only: print_version
@@ -30,6 +30,8 @@ program separatrix
 
   ! Work that is not shared among the processes of mpirun is done and reported by the first of them.
   first = launched_rank() == 0
+  ! Runs have a lock of their own; those of HDF5 fail where the file system has none.
+  call default_environment('HDF5_USE_FILE_LOCKING', 'FALSE')
   call read_command_line(command, error)
   if (.not. allocated(error)) then
     if (command%help) then

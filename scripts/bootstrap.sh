@@ -86,7 +86,7 @@ find_python() {
 # What .venv depends on; it is made again if the interpreter is gone or broken.
 wanted() {
   .venv/bin/python --version
-  cat requirements.txt pyproject.toml
+  cat requirements.lock pyproject.toml
 }
 
 make_venv() {
@@ -103,7 +103,7 @@ make_venv() {
   echo "bootstrap: installing the Python packages into .venv"
   # Modules are compiled when they are first imported, most of them never.
   local install=(.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile)
-  "${install[@]}" -r requirements.txt
+  "${install[@]}" --require-hashes -r requirements.lock
   # The Python package alone: the program is that of build/.
   "${install[@]}" -e . --config-settings=wheel.cmake=false
   wanted > "$stamp"
@@ -111,10 +111,10 @@ make_venv() {
 
 add_development() {
   local stamp=.venv/development.txt
-  if ! cmp -s requirements-dev.txt "$stamp"; then
-    echo "bootstrap: installing requirements-dev.txt into .venv"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
-    cp requirements-dev.txt "$stamp"
+  if ! cmp -s requirements-dev.lock "$stamp"; then
+    echo "bootstrap: installing requirements-dev.lock into .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+    cp requirements-dev.lock "$stamp"
   fi
 }
 
@@ -123,7 +123,7 @@ add_packages() {
   local module=$1 list=$2
   if ! .venv/bin/python -c "import $module" 2> /dev/null; then
     echo "bootstrap: installing $list into .venv"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$list"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r "$list"
   fi
 }
 
@@ -133,8 +133,8 @@ if $develop; then
   add_development
 fi
 if $browser; then
-  add_packages playwright requirements-browser.txt
+  add_packages playwright requirements-browser.lock
 fi
 if $docs; then
-  add_packages myst_parser requirements-docs.txt
+  add_packages myst_parser requirements-docs.lock
 fi

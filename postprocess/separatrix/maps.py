@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.cases import Case, as_case, linspace, quantity
+from separatrix.cores import cores
 from separatrix.errors import (
     GIVEN_UP,
     USAGE,
@@ -25,7 +26,7 @@ from separatrix.errors import (
 from separatrix.labelling import Labelling, SecondLookError, axis_values, can_label
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
-from separatrix.runner import StoppedError, cores, run
+from separatrix.runner import StoppedError, run
 
 __all__ = ["basin", "points", "sweep"]
 
@@ -113,8 +114,6 @@ class _Work:
         if not resume:
             for share in shares:
                 share.unlink(missing_ok=True)
-        # A share that another process writes is read without a lock.
-        unlocked = {"HDF5_USE_FILE_LOCKING": "FALSE"}
         first = [*base, "-o", str(target), "--shard", f"1/{count}"]
         found = []
         if self.command == "basin":
@@ -124,7 +123,7 @@ class _Work:
         commands = [[*first, "--resume"]]
         for i in range(2, count + 1):
             commands.append([*base, "-o", str(target), "--shard", f"{i}/{count}", "--resume", *found])
-        run(commands, report, None, rename, unlocked, self.time_limit)
+        run(commands, report, None, rename, time_limit=self.time_limit)
         joined = ["merge", str(target), *map(str, shares), "--json"]
         given_up = None
         try:

@@ -65,7 +65,6 @@ def run(
     progress: Progress,
     ranks: int | None = None,
     rename: Mapping[str, str] | None = None,
-    environment: Mapping[str, str] | None = None,
     time_limit: float | None = None,
     take: Callable[[dict], object] | None = None,
 ) -> None:
@@ -80,7 +79,7 @@ def run(
     events: queue.Queue = queue.Queue()
     interrupted = False
     try:
-        running = [_start(arguments, events, ranks, progress, environment) for arguments in commands]
+        running = [_start(arguments, events, ranks, progress) for arguments in commands]
         _follow(running, events, progress, time_limit, take)
     except KeyboardInterrupt:
         interrupted = True
@@ -116,17 +115,11 @@ def run_at_once(
         raise KeyboardInterrupt(f"{command[0]} was stopped; {kept}") from None
 
 
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0))
-
-
 def _start(
     arguments: Sequence[str],
     events: queue.Queue,
     ranks: int | None,
     progress: Progress,
-    environment: Mapping[str, str] | None,
 ) -> _Process:
     command = [*_launcher(ranks), str(program_path()), *arguments]
     # These compute and report their progress.
@@ -140,7 +133,7 @@ def _start(
         stderr=subprocess.PIPE,
         text=True,
         errors="replace",
-        env={**_MPI_ENVIRONMENT, **os.environ, **(environment or {})} if ranks or environment else None,
+        env={**_MPI_ENVIRONMENT, **os.environ} if ranks else None,
         # A group of its own: Ctrl-C reaches this process alone, which then asks the program to stop.
         process_group=0,
         preexec_fn=_end_with_parent(),

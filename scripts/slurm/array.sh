@@ -25,8 +25,6 @@ if [[ ! -e $found ]]; then
   echo "$found is missing; search.sh makes it" >&2
   exit 66
 fi
-# The first share is written while the others read its attractors.
-export HDF5_USE_FILE_LOCKING=FALSE
 srun --mpi="${SEPARATRIX_SRUN_MPI:-pmix}" "$separatrix" basin "$case_file" -o "$output" --shard "$share/$shares" --resume \
   --catalogue "$found" --log "$name.log.jsonl" "$@"
 end_job $? "$name.part"

@@ -9,6 +9,11 @@ separatrix=${SEPARATRIX:-$SEPARATRIX_ROOT/build/bin/separatrix}
 # shellcheck source=scripts/environment.sh
 source "$SEPARATRIX_ROOT/scripts/environment.sh"
 
+# OpenMPI notices a lost host after a minute, not after eight.
+export OMPI_MCA_oob_tcp_keepalive_time=${OMPI_MCA_oob_tcp_keepalive_time:-30}
+export OMPI_MCA_oob_tcp_keepalive_intvl=${OMPI_MCA_oob_tcp_keepalive_intvl:-10}
+export OMPI_MCA_oob_tcp_keepalive_probes=${OMPI_MCA_oob_tcp_keepalive_probes:-3}
+
 # Tiles done in a working file; 0 if there is none.
 tiles_done() {
   if [[ -e $1 ]]; then
@@ -18,23 +23,37 @@ tiles_done() {
   fi
 }
 
-# end_job CODE FILE.part: after code 75 puts the job into the queue again, unless no tile was finished since its last
-# start: then it would never end. Any other code ends the job.
+# Launches in a row that may fail without a new tile.
+failures_allowed=${SEPARATRIX_RETRIES:-3}
+
+# end_job CODE FILE.part: puts the job into the queue again after a stop (75), and after a launch that failed, which is
+# any code that is not one of the program. Without a new tile since the last start neither goes on for ever.
 end_job() {
-  local code=$1 part=$2 finished before=0
-  if ((code != 75)); then
+  local code=$1 part=$2 finished before=0 failures=0
+  if ((code == 0 || (code >= 64 && code <= 78 && code != 75))); then
     rm -f "$part.tiles"
     exit "$code"
   fi
   finished=$(tiles_done "$part")
+  finished=${finished:-0}
   if [[ -e $part.tiles ]]; then
-    before=$(< "$part.tiles")
+    read -r before failures < "$part.tiles"
   fi
-  if ((finished <= before)); then
+  if ((finished > before)); then
+    failures=0
+  elif ((code == 75)); then
     echo "no tile was finished since the last start ($finished are done): the job needs more time, or smaller tiles" >&2
     exit 75
   fi
-  echo "$finished" > "$part.tiles"
+  if ((code != 75)); then
+    failures=$((failures + 1))
+    echo "the launch failed with code $code, $failures of at most $failures_allowed times without a new tile" >&2
+  fi
+  if ((failures > failures_allowed)); then
+    rm -f "$part.tiles"
+    exit "$code"
+  fi
+  echo "$finished $failures" > "$part.tiles"
   local job=$SLURM_JOB_ID
   if [[ -n ${SLURM_ARRAY_TASK_ID:-} ]]; then
     job=${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID
@@ -43,5 +62,5 @@ end_job() {
   scontrol requeue "$job"
   # The batch system ends this script.
   sleep 60
-  exit 75
+  exit "$code"
 }

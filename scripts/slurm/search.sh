@@ -18,3 +18,4 @@ shift 3
 
 srun --mpi="${SEPARATRIX_SRUN_MPI:-pmix}" "$separatrix" basin "$case_file" -o "$output" --shard "1/$shares" --resume \
   --search-only --log "$output.search.log.jsonl" "$@"
+end_job $? "$output.shard-1-of-$shares.part"

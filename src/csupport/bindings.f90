@@ -15,7 +15,7 @@ module bindings
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
     c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
-    c_core_list, c_may_use_core, c_online_cores, c_cpu_name, c_environment, &
+    c_core_list, c_may_use_core, c_online_cores, c_core_quota, c_cpu_name, c_environment, &
     c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_has_name, &
     c_close_bytes
 
@@ -181,6 +181,11 @@ module bindings
       import :: c_int
     end function c_online_cores
 
+    real(c_double) function c_core_quota(root) bind(c, name='separatrix_core_quota')
+      import :: c_char, c_double
+      character(kind=c_char), intent(in) :: root(*)
+    end function c_core_quota
+
     integer(c_int) function c_cpu_name(text, size) bind(c, name='separatrix_cpu_name')
       import :: c_char, c_int
       character(kind=c_char), intent(out) :: text(*)
@@ -252,10 +257,10 @@ module bindings
       character(kind=c_char), intent(in) :: path(*)
     end function c_remove_file
 
-    integer(c_int) function c_take_lock(path, descriptor) bind(c, name='separatrix_take_lock')
+    integer(c_int) function c_take_lock(path, descriptor, refusal) bind(c, name='separatrix_take_lock')
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), intent(out) :: descriptor
+      integer(c_int), intent(out) :: descriptor, refusal
     end function c_take_lock
 
     subroutine c_give_lock(path, descriptor) bind(c, name='separatrix_give_lock')

@@ -127,9 +127,10 @@ int separatrix_publish_file(const char *from, const char *to) {
 int separatrix_remove_file(const char *path) { return unlink(path) == 0 || errno == ENOENT ? 0 : errno; }
 
 /* Takes the lock of the file `path`, which is made for it: *descriptor is what holds it. -1 where another
-   process has it. Where files cannot be locked *descriptor is -1, and the status 0. */
-int separatrix_take_lock(const char *path, int *descriptor) {
+   process has it. Where files cannot be locked *descriptor is -1, the status 0 and *refusal the errno. */
+int separatrix_take_lock(const char *path, int *descriptor, int *refusal) {
   struct stat held, named;
+  *refusal = 0;
   for (;;) {
     *descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (*descriptor < 0)
@@ -139,8 +140,10 @@ int separatrix_take_lock(const char *path, int *descriptor) {
     if (status == 0 && fstat(*descriptor, &held) == 0 && stat(path, &named) == 0 &&
         held.st_ino == named.st_ino)
       return 0;
-    if (status != 0 && status != EWOULDBLOCK)
+    if (status != 0 && status != EWOULDBLOCK) {
       unlink(path);
+      *refusal = status;
+    }
     close(*descriptor);
     *descriptor = -1;
     if (status != 0)

@@ -83,15 +83,16 @@ contains
   end subroutine remove_file
 
   !> Locks `path`, a file made for that, until `give_lock` or the end of the process; code 73 if another process has it.
-  !> `lock` is what to give back; -1 on a file system without locks.
-  subroutine take_lock(path, lock, error)
+  !> `lock` is what to give back; -1 on a file system without locks, with the system's reason in `refusal`.
+  subroutine take_lock(path, lock, refusal, error)
     character(len=*), intent(in) :: path
     integer, intent(out) :: lock
+    character(len=:), allocatable, intent(out) :: refusal
     type(error_t), allocatable, intent(out) :: error
-    integer(c_int) :: descriptor
-    integer(c_int) :: number
-    number = c_take_lock(path//c_null_char, descriptor)
+    integer(c_int) :: descriptor, number, refused
+    number = c_take_lock(path//c_null_char, descriptor, refused)
     lock = descriptor
+    if (refused /= 0) refusal = reason_of(refused)
     if (number < 0) then
       call fail(error, exit_cannot_create, "another run is at work on this file; it has the lock '"//path//"'")
     else
@@ -133,10 +134,16 @@ contains
     integer, intent(in) :: code
     character(len=*), intent(in) :: action, path
     type(error_t), allocatable, intent(out) :: error
-    character(kind=c_char) :: reason(128)
-    if (number == 0) return
-    call c_error_text(number, reason, int(size(reason), c_int))
-    call fail(error, code, action//' '''//path//''': '//from_c(reason))
+    if (number /= 0) call fail(error, code, action//' '''//path//''': '//reason_of(number))
   end subroutine test_status
+
+  !> The system's text for an errno.
+  function reason_of(number) result(text)
+    integer(c_int), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(kind=c_char) :: reason(128)
+    call c_error_text(number, reason, int(size(reason), c_int))
+    text = from_c(reason)
+  end function reason_of
 
 end module files

@@ -4,8 +4,8 @@
 !> Clock, host, memory and environment of this process.
 module system
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_core_list, c_cpu_name, c_crashed, c_default_environment, c_environment, c_exit, c_exit_now, c_fork, &
-    c_host_name, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_set_environment, &
+  use bindings, only: c_core_list, c_core_quota, c_cpu_name, c_crashed, c_default_environment, c_environment, c_exit, c_exit_now, &
+    c_fork, c_host_name, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_set_environment, &
     c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
   use kinds, only: int64, real64
   implicit none
@@ -13,7 +13,7 @@ module system
 
   public :: monotonic_seconds, utc_now, resident_bytes, host_name, stderr_is_terminal, &
     default_environment, set_environment, sleep_microseconds, exit_program, exit_at_once, fork_process, has_crashed, &
-    from_c, core_list, may_use_core, online_cores, cpu_name, environment_text
+    from_c, core_list, may_use_core, online_cores, core_quota, cpu_name, environment_text
 
 contains
 
@@ -67,6 +67,16 @@ contains
   integer function online_cores()
     online_cores = int(c_online_cores())
   end function online_cores
+
+  !> Cores whose time the control groups of this process allow; huge without a limit. `root`: where /proc and /sys are ('').
+  real(real64) function core_quota(root)
+    character(len=*), intent(in), optional :: root
+    character(len=:), allocatable :: folder
+    folder = ''
+    if (present(root)) folder = root
+    core_quota = real(c_core_quota(folder//c_null_char), real64)
+    if (core_quota <= 0) core_quota = huge(core_quota)
+  end function core_quota
 
   !> The name of the processor; 'unknown' if the system does not report it.
   function cpu_name() result(text)

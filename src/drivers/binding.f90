@@ -6,7 +6,7 @@
 module binding
   use journal, only: journal_t, json_text
   use kinds, only: wp
-  use system, only: core_list, host_name, may_use_core, online_cores
+  use system, only: core_list, core_quota, host_name, may_use_core, online_cores
   use team, only: host_length, team_t
   use text, only: to_text
   implicit none
@@ -21,7 +21,7 @@ contains
     class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
     character(len=host_length), allocatable :: names(:)
-    real(wp), allocatable :: hosts(:), masks(:), all_cores(:)
+    real(wp), allocatable :: hosts(:), masks(:), all_cores(:), quotas(:)
     character(len=host_length) :: mine
     integer :: cores, host, i
     mine = host_name()
@@ -29,6 +29,7 @@ contains
     call team%gather([real(findloc(names == mine, .true., dim=1), wp)], hosts)
     cores = online_cores()
     call team%gather([real(cores, wp)], all_cores)
+    call team%gather([core_quota()], quotas)
     ! Ranks may have hosts of different size: the largest decides how many cores are asked for.
     call team%allgather([real(cores, wp)], masks)
     cores = nint(maxval(masks))
@@ -36,16 +37,17 @@ contains
     if (.not. team%is_root()) return
     do host = 1, size(names)
       call report_host(journal, trim(names(host)), pack([(i, i=1, size(hosts))], nint(hosts) == host), &
-                       reshape(masks, [cores, size(hosts)]) > 0.5_wp, nint(all_cores))
+                       reshape(masks, [cores, size(hosts)]) > 0.5_wp, nint(all_cores), quotas)
     end do
   end subroutine report_binding
 
-  !> `allowed(core, rank)`; `ranks` are those of the host, from 1.
-  subroutine report_host(journal, name, ranks, allowed, all_cores)
+  !> `allowed(core, rank)`; `ranks` are those of the host, from 1; `quotas`: cores whose time a rank's control group allows.
+  subroutine report_host(journal, name, ranks, allowed, all_cores, quotas)
     type(journal_t), intent(inout) :: journal
     character(len=*), intent(in) :: name
     integer, intent(in) :: ranks(:), all_cores(:)
     logical, intent(in) :: allowed(:, :)
+    real(wp), intent(in) :: quotas(:)
     character(len=:), allocatable :: lists, warning
     logical :: bound
     integer :: i
@@ -60,6 +62,8 @@ contains
       ', "cores": '//to_text(all_cores(ranks(1)))//', "bound": '//to_text(bound)//', "rank_cores": '//json_text(lists), &
       plain=size(all_cores) > 1)
     warning = conflict(allowed(:, ranks))
+    if (len(warning) == 0 .and. minval(quotas(ranks)) < size(ranks)) warning = 'the control group of a rank allows the '// &
+      'processor time of '//to_text(minval(quotas(ranks)), 2)//' cores, to '//to_text(size(ranks))//' ranks'
     if (len(warning) > 0) call journal%line('warning', 'warning: host '//name//': '//warning, '"host": '//json_text(name))
   end subroutine report_host
 

@@ -17,7 +17,7 @@ module device_choice
   use refined_tile, only: layers_of
   use refinement, only: automatic_block
   use status, only: exit_usage
-  use system, only: host_name, may_use_core, online_cores
+  use system, only: core_quota, host_name, may_use_core, online_cores
   use team, only: host_length, team_t
   use text, only: join, parse_integer, to_text
   implicit none
@@ -142,7 +142,7 @@ contains
   integer function threads_of(neighbours) result(threads)
     integer, intent(in) :: neighbours
     integer :: cores, i
-    cores = online_cores()
+    cores = ceiling(min(real(online_cores(), wp), core_quota()))
     threads = asked_number(threads_variable, max(1, min(cores/neighbours, count([(may_use_core(i), i=0, cores - 1)]))))
   end function threads_of
 

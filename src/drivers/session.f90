@@ -14,7 +14,7 @@ module session
   use command_table, only: command_number, command_row_t, rows
   use device_choice, only: choose_device, device_text
   use errors, only: error_t, fail
-  use files, only: give_lock, take_lock
+  use files, only: file_exists, give_lock, take_lock
   use journal, only: journal_t, json_text
   use lane_gpu, only: use_gpu
   use launcher, only: launched_ranks
@@ -133,8 +133,7 @@ contains
     type(error_t), allocatable :: error
     if (self%team%is_root()) then
       call check_outputs(self%command, path, tiled, error)
-      self%lock_path = working_path(path)//'.lock'
-      if (tiled .and. .not. allocated(error)) call take_lock(self%lock_path, self%lock, error)
+      if (tiled) call lock_output(self, working_path(path), error)
     end if
     call self%stop_if(error)
     if (self%alone) call start_team(self%team)
@@ -155,6 +154,23 @@ contains
       plain=self%gpus > 0 .or. self%command%device /= 'auto')
     call warn_about(self%command%name, self%the_case, self%journal)
   end subroutine begin
+
+  !> Takes the lock of the working file `part`. A living run is the reason of its own working file, instead of `error`.
+  subroutine lock_output(session, part, error)
+    type(session_t), intent(inout) :: session
+    character(len=*), intent(in) :: part
+    type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: held
+    character(len=:), allocatable :: refusal
+    logical :: begun
+    begun = file_exists(part)
+    if (allocated(error) .and. .not. begun) return
+    session%lock_path = part//'.lock'
+    call take_lock(session%lock_path, session%lock, refusal, held)
+    if (allocated(held)) call move_alloc(held, error)
+    if (allocated(refusal) .and. .not. allocated(error)) call session%journal%line('warning', "warning: '"//session%lock_path// &
+      "' cannot be locked ("//refusal//'): nothing prevents a second run from writing the same file')
+  end subroutine lock_output
 
   subroutine unlock(session)
     type(session_t), intent(inout) :: session

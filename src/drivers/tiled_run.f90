@@ -10,6 +10,7 @@ module tiled_run
   use journal, only: duration_text, size_text
   use kinds, only: int64, wp
   use lane_gpu, only: seconds_waited
+  use last_wait, only: last_wait_t
   use map_file, only: create_working, map_file_t, open_working, working_path
   use map_final, only: finalise
   use map_reader, only: open_final, reader_t
@@ -117,6 +118,7 @@ contains
     logical, intent(out) :: complete
     class(scheduler_t), allocatable, target :: scheduler
     type(tile_watch_t) :: watch
+    type(last_wait_t) :: last_wait
     type(error_t), allocatable :: error
     integer, allocatable :: mine(:), unfinished(:)
     integer(int64) :: computed(1)
@@ -137,6 +139,7 @@ contains
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
     call session%stop_if(error)
+    call last_wait%begin(working_path(file%path), size(mine), size(mine) - size(unfinished), session%team)
     watch%scheduler => scheduler
     watch%session => session
     watch%file => file
@@ -157,6 +160,8 @@ contains
     call file%flush(error)
     call session%abort_if(error)
     if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
+    call last_wait%wait(session%team, scheduler, error)
+    call session%abort_if(error)
     begun = scheduler%started
     call scheduler%finish()
     call write_tile_times(session, scheduler, unfinished)

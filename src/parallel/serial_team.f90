@@ -15,6 +15,8 @@ module serial_team
     procedure :: size => size_of
     procedure :: communicator
     procedure :: barrier
+    procedure :: arrive
+    procedure :: all_arrived
     procedure :: abort => abort_with
     procedure :: broadcast_text
     procedure :: broadcast_integers
@@ -56,6 +58,21 @@ contains
     associate (unused => self)
     end associate
   end subroutine barrier
+
+  !> Nobody to wait for.
+  subroutine arrive(self)
+    class(serial_team_t), intent(inout) :: self
+    associate (unused => self)
+    end associate
+  end subroutine arrive
+
+  !> True: there is nobody else.
+  logical function all_arrived(self)
+    class(serial_team_t), intent(inout) :: self
+    associate (unused => self)
+    end associate
+    all_arrived = .true.
+  end function all_arrived
 
   !> Ends the program at once with this exit code.
   subroutine abort_with(self, code)

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The processes that work on one run. Children: serial_team, mpi_team. Every procedure but
-!> `rank`, `size`, `is_root`, `communicator` and `abort` is collective.
+!> `rank`, `size`, `is_root`, `communicator`, `all_arrived` and `abort` is collective.
 module team
   use errors, only: error_t
   use kinds, only: int64, real64
@@ -18,6 +18,8 @@ module team
     procedure(number_of), deferred :: size
     procedure(number_of), deferred :: communicator
     procedure(act), deferred :: barrier
+    procedure(act_finally), deferred :: arrive
+    procedure(condition_of), deferred :: all_arrived
     procedure(abort_with), deferred :: abort
     procedure(broadcast_text_to), deferred :: broadcast_text
     procedure(broadcast_integers_to), deferred :: broadcast_integers
@@ -46,11 +48,17 @@ module team
       class(team_t), intent(in) :: self
     end subroutine act
 
-    !> Gives the communicator back, and ends MPI if this team started it.
+    !> `close`: gives the communicator back, and ends MPI if this team started it. `arrive`: begins a barrier without waiting.
     subroutine act_finally(self)
       import :: team_t
       class(team_t), intent(inout) :: self
     end subroutine act_finally
+
+    !> Whether all ranks have called `arrive`. Not collective.
+    logical function condition_of(self)
+      import :: team_t
+      class(team_t), intent(inout) :: self
+    end function condition_of
 
     !> Ends the program on all ranks with this exit code; does not return.
     subroutine abort_with(self, code)

@@ -4,8 +4,10 @@
 /* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
    call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
    write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
-   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. Without $FAULT_AT
-   the number of calls is added as a line to the file $FAULT_COUNT when the process ends. */
+   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. `unlockable`: no
+   such file can be locked, as on file systems without locks. `arrive`: the first barrier of MPI without
+   waiting takes $FAULT_AT seconds, once there is such a file. Without $FAULT_AT the number of calls is added
+   as a line to the file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -17,6 +19,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/types.h>
 #include <sys/uio.h>
 #include <unistd.h>
@@ -53,7 +56,8 @@ static int fault(const char *path, int writes) {
   if (name == NULL || strstr(path, name) == NULL)
     return 0;
   const long call = ++calls;
-  if (at == 0 || call < at || strcmp(action, "late") == 0)
+  if (at == 0 || call < at || strcmp(action, "late") == 0 || strcmp(action, "unlockable") == 0 ||
+      strcmp(action, "arrive") == 0)
     return 0;
   if (strcmp(action, "kill") == 0)
     die();
@@ -65,14 +69,19 @@ static int fault(const char *path, int writes) {
   return writes ? atoi(action) : 0;
 }
 
-static int fault_of(int descriptor, int writes) {
-  char link[64], path[PATH_MAX];
+static int path_of(int descriptor, char path[PATH_MAX]) {
+  char link[64];
   snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
-  const ssize_t length = readlink(link, path, sizeof path - 1);
+  const ssize_t length = readlink(link, path, PATH_MAX - 1);
   if (length < 0)
     return 0;
   path[length] = '\0';
-  return fault(path, writes);
+  return 1;
+}
+
+static int fault_of(int descriptor, int writes) {
+  char path[PATH_MAX];
+  return path_of(descriptor, path) ? fault(path, writes) : 0;
 }
 
 #define GUARD(number)                                                                                        \
@@ -158,6 +167,26 @@ int fsync(int descriptor) {
   if (number < 0)
     die();
   return REAL(fsync)(descriptor);
+}
+
+int flock(int descriptor, int operation) {
+  char path[PATH_MAX];
+  if (action != NULL && strcmp(action, "unlockable") == 0 && path_of(descriptor, path) &&
+      strstr(path, name) != NULL) {
+    errno = ENOLCK;
+    return -1;
+  }
+  return REAL(flock)(descriptor, operation);
+}
+
+/* The C function that the Fortran interface of OpenMPI calls. */
+int PMPI_Ibarrier(void *communicator, void **request);
+int PMPI_Ibarrier(void *communicator, void **request) {
+  static atomic_int arrived;
+  if (action != NULL && strcmp(action, "arrive") == 0 && access(name, F_OK) == 0 &&
+      atomic_fetch_add(&arrived, 1) == 0)
+    sleep((unsigned)at);
+  return REAL(PMPI_Ibarrier)(communicator, request);
 }
 
 int rename(const char *from, const char *to) {

@@ -9,9 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from separatrix.cases import Case
+from separatrix.cores import cores
 from separatrix.errors import BAD_DATA, SeparatrixError
 from separatrix.measuring.sampling import NO_START
-from separatrix.runner import cores
 from separatrix.simulate import Attractor, Catalogue, section_points
 from separatrix.variables import KINDS
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from separatrix.cores import cores
 from separatrix.errors import SeparatrixError
 from separatrix.simulate import LABEL_VARIABLES, StopFlag
 from separatrix.variables import CATALOGUE, FORMAT_VERSION, MAP, attributes
@@ -72,7 +73,7 @@ def _compute(
         part = live.Lattice(lattice.across, (b + db * first, db, min(_ROWS, rows - first)), False)
         return live.compute(machine, across, up, at, part, changed, flag)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         bands = list(pool.map(band, range(0, rows, _ROWS)))
     return {
         name: np.ascontiguousarray(np.concatenate([one[name] for one in bands]).reshape(rows, columns).T)

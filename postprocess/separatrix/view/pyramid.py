@@ -8,13 +8,13 @@ cell of a variable of classes has its two commonest classes and their shares; of
 the numbers in it, of the grazing margin the smallest.
 """
 
-import os
 import threading
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from separatrix.cores import cores
 from separatrix.view.files import ResultFile
 from separatrix.words import decode_word
 
@@ -160,7 +160,7 @@ class Plane:
             stride *= 2
         before = 0
         try:
-            with ThreadPoolExecutor(os.cpu_count()) as pool:
+            with ThreadPoolExecutor(cores()) as pool:
                 while stride and not self._ended:
                     blocks = [
                         (i, j, stride)

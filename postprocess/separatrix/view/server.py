@@ -23,8 +23,10 @@ from importlib import resources
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
+from separatrix.cores import cores
 from separatrix.errors import SeparatrixError
 from separatrix.simulate import StoppedError
+from separatrix.view.connections import Connections
 from separatrix.view.packing import pack
 from separatrix.view.protocol import REQUESTS, Desk, RefusedError
 
@@ -43,6 +45,8 @@ _POLICY = (
 )
 _HOSTS = ("127.0.0.1", "localhost", "[::1]")
 _CONNECTIONS = 128
+#: Seconds for one request to arrive, however many parts it has.
+_ARRIVAL = 20
 _LONGEST_ADDRESS = 4096
 # what keeps a core busy; as many at a time as there are cores
 _HEAVY = ("motion", "download", "attractors", "points")
@@ -56,9 +60,15 @@ class Handler(BaseHTTPRequestHandler):
     # Head and body in two packets would wait for a delayed acknowledgement, 40 ms.
     disable_nagle_algorithm = True
     wbufsize = -1
+    # Of an answer as a whole.
     timeout = 20
     server_version = "separatrix-view"
     sys_version = ""
+
+    def handle_one_request(self) -> None:
+        """Bound the time in which the request arrives."""
+        self.server.connections.expect(self.connection)
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         """Answer a request, or send the page."""
@@ -74,6 +84,7 @@ class Handler(BaseHTTPRequestHandler):
         self._serve(acting=True)
 
     def _serve(self, acting: bool) -> None:
+        self.server.connections.work(self.connection)
         self.server.last_used = time.monotonic()
         try:
             status, kind, body = self._answer(acting)
@@ -98,6 +109,7 @@ class Handler(BaseHTTPRequestHandler):
         problem = self._intruder()
         if problem:
             return _failure(HTTPStatus.FORBIDDEN, problem)
+        self.server.connections.trust(self.connection)
         return self._request(address.path.removeprefix("/api/"), address.query, acting)
 
     def _intruder(self) -> str:
@@ -187,8 +199,8 @@ class _Serving(socketserver.ThreadingMixIn):
         self.desk = desk
         self.token = secrets.token_urlsafe(32)
         self.last_used = time.monotonic()
-        self._connections = threading.BoundedSemaphore(_CONNECTIONS)
-        self._heavy = threading.BoundedSemaphore(max(2, os.cpu_count() or 1))
+        self.connections = Connections(_CONNECTIONS, _ARRIVAL)
+        self._heavy = threading.BoundedSemaphore(max(2, cores()))
         self._light = threading.BoundedSemaphore(16)
         self._keeping = threading.BoundedSemaphore(1)
 
@@ -199,20 +211,22 @@ class _Serving(socketserver.ThreadingMixIn):
         return self._heavy if name in _HEAVY else self._keeping if name == "keep" else self._light
 
     def process_request(self, request: object, client_address: object) -> None:
-        """Begin a connection; further ones wait in the queue of the system."""
-        self._connections.acquire()
-        try:
+        """Begin a connection, or refuse it at once: nothing here may wait."""
+        if self.connections.admit(request):
             super().process_request(request, client_address)
-        except BaseException:
-            self._connections.release()
-            raise
+        else:
+            self.shutdown_request(request)
+
+    def service_actions(self) -> None:
+        """End connections whose request has not arrived in time."""
+        self.connections.cut_late()
 
     def process_request_thread(self, request: object, client_address: object) -> None:
         """Serve a connection to its end."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._connections.release()
+            self.connections.forget(request)
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Ignore errors of clients that have gone."""

@@ -6,7 +6,8 @@ module mpi_team
   use kinds, only: int64, real64
   use mpi_f08, only: MPI_Abort, MPI_Allgather, MPI_Allgatherv, MPI_Allreduce, MPI_Barrier, MPI_Bcast, &
     MPI_CHARACTER, MPI_Comm, MPI_Comm_dup, MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, &
-    MPI_Finalize, MPI_Gatherv, MPI_IN_PLACE, MPI_INTEGER, MPI_INTEGER8, MPI_REAL8, MPI_SUM
+    MPI_Finalize, MPI_Gatherv, MPI_Ibarrier, MPI_IN_PLACE, MPI_INTEGER, MPI_INTEGER8, MPI_REAL8, MPI_Request, &
+    MPI_STATUS_IGNORE, MPI_SUM, MPI_Test
   use team, only: team_t
   implicit none
   private
@@ -17,11 +18,15 @@ module mpi_team
     type(MPI_Comm) :: comm
     integer, private :: my_rank = 0, my_size = 1
     logical, private :: owns_mpi = .false.
+    !> The barrier that `arrive` has begun.
+    type(MPI_Request), private :: everyone
   contains
     procedure :: rank => rank_of
     procedure :: size => size_of
     procedure :: communicator
     procedure :: barrier
+    procedure :: arrive
+    procedure :: all_arrived
     procedure :: abort => abort_with
     procedure :: broadcast_text
     procedure :: broadcast_integers
@@ -67,6 +72,18 @@ contains
     class(mpi_team_t), intent(in) :: self
     call MPI_Barrier(self%comm)
   end subroutine barrier
+
+  !> Begins a barrier without waiting.
+  subroutine arrive(self)
+    class(mpi_team_t), intent(inout) :: self
+    call MPI_Ibarrier(self%comm, self%everyone)
+  end subroutine arrive
+
+  !> Whether all ranks have called `arrive`.
+  logical function all_arrived(self)
+    class(mpi_team_t), intent(inout) :: self
+    call MPI_Test(self%everyone, all_arrived, MPI_STATUS_IGNORE)
+  end function all_arrived
 
   !> Ends all ranks with this exit code.
   subroutine abort_with(self, code)

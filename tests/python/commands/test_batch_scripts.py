@@ -128,3 +128,39 @@ def test_a_stopped_job_comes_again_unless_it_got_nowhere(scheduler, separatrix, 
         assert ("goes into the queue again" in ended.stdout) == again
         assert ("no tile was finished" in ended.stderr) == (not again)
     assert (work / "scontrol.txt").read_text() == "requeue 7\n"
+
+
+def test_a_launch_that_fails_is_tried_again_a_few_times(scheduler, tmp_path):
+    """Killed ranks, a broken node: no code of the program. Its own codes end the job at once."""
+    work = tmp_path / "work"
+    alone = scheduler | {"SLURM_JOB_ID": "7", "SLURM_SUBMIT_DIR": str(work), "SEPARATRIX_RETRIES": "2"}
+    program = tmp_path / "program"
+
+    def launch(code: int) -> tuple[int, bool]:
+        program.write_text(
+            f"#!/usr/bin/env bash\n[[ $1 == info ]] || exit {code}\necho '\"tiles_done\": 5'\n"
+        )
+        program.chmod(0o755)
+        (work / "scontrol.txt").unlink(missing_ok=True)
+        command = [SCRIPTS / "srun.sh", "case.toml", "map.h5"]
+        environment = alone | {"SEPARATRIX": str(program)}
+        ended = subprocess.run(command, cwd=work, env=environment, capture_output=True, text=True)
+        return ended.returncode, (work / "scontrol.txt").exists()
+
+    assert [launch(137) for _ in range(3)] == [(137, True), (137, True), (137, False)]
+    assert not (work / "map.h5.part.tiles").exists()
+    # A new tile begins the count again.
+    (work / "map.h5.part").touch()
+    (work / "map.h5.part.tiles").write_text("4 2\n")
+    assert [launch(1) for _ in range(3)] == [(1, True), (1, True), (1, False)]
+    for code in (0, 65, 73, 74, 76, 78):
+        assert launch(code) == (code, False)
+
+
+def test_a_search_that_fails_to_launch_is_tried_again(scheduler, tmp_path):
+    work = tmp_path / "work"
+    alone = scheduler | {"SLURM_JOB_ID": "7", "SLURM_SUBMIT_DIR": str(work), "SEPARATRIX": "false"}
+    command = [SCRIPTS / "search.sh", "3", "case.toml", "map.h5"]
+    ended = subprocess.run(command, cwd=work, env=alone, capture_output=True, text=True)
+    assert ended.returncode == 1
+    assert (work / "scontrol.txt").read_text() == "requeue 7\n"

@@ -5,6 +5,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -97,3 +98,29 @@ def test_only_the_integrator_asks_what_kind_of_machine_it_moves(source_dir):
     above = [p for p in sources if p.parent.name not in asking and p.name not in knowing]
     assert len(above) > 150
     assert [p.name for p in above if asks.search(p.read_text())] == []
+
+
+def test_a_wheel_builds_what_it_installs(source_dir):
+    """From a new clone, where no other target has been built before."""
+    settings = tomllib.loads((source_dir / "pyproject.toml").read_text())["tool"]["scikit-build"]
+    texts = [path.read_text() for path in (*source_dir.glob("apps/*.txt"), *source_dir.glob("src/*/*.txt"))]
+    installed = {
+        name
+        for text in texts
+        for names in re.findall(r"install\(TARGETS ([a-z_ ]+)", text)
+        for name in names.split()
+    }
+    assert installed and installed == set(settings["build"]["targets"])
+
+
+def test_every_pinned_package_has_hashes(source_dir):
+    """Lists that bootstrap.sh installs, as scripts/lock writes them."""
+    lists = re.findall(r"requirements\S*\.lock", (source_dir / "scripts/bootstrap.sh").read_text())
+    assert len(set(lists)) == 4
+    for name in set(lists):
+        wanted = (source_dir / name).with_suffix(".txt").read_text()
+        entries = re.split(r"\n(?=\S)", (source_dir / name).read_text().split("\n", 1)[1].rstrip("\n"))
+        assert all(re.match(r"\S+==\S+ .*\\\n    --hash=sha256:[0-9a-f]{64}", entry) for entry in entries)
+        locked = {entry.split()[0].lower() for entry in entries}
+        pinned = {line.lower() for line in wanted.splitlines() if line and line[0] not in "#-"}
+        assert pinned <= locked

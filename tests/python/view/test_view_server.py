@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The viewer's server attacked: nothing leaks, nothing dies."""
 
+import contextlib
 import http.client
 import json
 import os
@@ -18,6 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from separatrix.view.connections import Connections
 from separatrix.view.packing import unpack
 from separatrix.view.protocol import Desk
 from separatrix.view.server import ASSETS, Server, UnixServer
@@ -138,7 +140,7 @@ def test_refuses_other_methods_and_bad_requests(server: Server) -> None:
 
 def test_a_thousand_requests_at_once(server: Server) -> None:
     """All are answered rightly, and the server goes on; silent connections do not stop it."""
-    silent = [socket.create_connection(("127.0.0.1", server.server_address[1])) for _ in range(40)]
+    waiting = [socket.create_connection(("127.0.0.1", server.server_address[1])) for _ in range(40)]
     paths = [(TILE, MOTION, "/api/describe", "/app.js", "/nothing")[i % 5] for i in range(1000)]
     expected = {path: get(server, path)[1] for path in set(paths)}
     with ThreadPoolExecutor(100) as pool:
@@ -147,9 +149,72 @@ def test_a_thousand_requests_at_once(server: Server) -> None:
     assert counted == {200: 800, 404: 200}
     for path, (_, body, _) in zip(paths, answers, strict=True):
         assert body == expected[path]
-    for one in silent:
+    for one in waiting:
         one.close()
     assert get(server, TILE)[0] == 200
+
+
+def silent(server: Server, count: int, data: bytes = b"") -> list[socket.socket]:
+    """Connections without a token that have sent the beginning of a request and wait."""
+    opened = []
+    for _ in range(count):
+        one = socket.create_connection(("127.0.0.1", server.server_address[1]), timeout=5)
+        one.sendall(data)
+        opened.append(one)
+    return opened
+
+
+def test_connections_without_a_token_block_nobody(server: Server) -> None:
+    """However many; those that have shown the token stay."""
+    kept = http.client.HTTPConnection("127.0.0.1", server.server_address[1], timeout=5)
+
+    def ask() -> int:
+        kept.request("GET", TILE, headers={"X-Separatrix-Token": server.token})
+        answer = kept.getresponse()
+        answer.read()
+        return answer.status
+
+    assert ask() == 200
+    opened = silent(server, 300, b"GET / HTTP/1.1\r\n")
+    own = kept.sock
+    assert ask() == 200 and kept.sock is own
+    assert get(server, TILE)[0] == 200
+    for one in opened:
+        one.close()
+    kept.close()
+
+
+def test_full_of_connections_with_the_token(server: Server) -> None:
+    """A further one is refused at once, and the server goes on."""
+    connections = []
+    for _ in range(128):
+        one = http.client.HTTPConnection("127.0.0.1", server.server_address[1], timeout=10)
+        one.request("GET", "/api/describe", headers={"X-Separatrix-Token": server.token})
+        one.getresponse().read()
+        connections.append(one)
+    (further,) = silent(server, 1)
+    assert further.recv(1) == b""
+    for one in connections:
+        one.close()
+    deadline = time.monotonic() + 10
+    while True:
+        with contextlib.suppress(OSError, http.client.HTTPException):
+            assert get(server, TILE)[0] == 200
+            break
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_a_request_arrives_as_a_whole_in_time(server: Server) -> None:
+    """A header now and then does not keep a connection open."""
+    server.connections = Connections(4, 1.0)
+    (one,) = silent(server, 1, b"GET / HTTP/1.1\r\n")
+    began = time.monotonic()
+    with contextlib.suppress(OSError):
+        while time.monotonic() - began < 10:
+            one.sendall(b"X: y\r\n")
+            time.sleep(0.1)
+    assert time.monotonic() - began < 5
 
 
 def test_only_loopback(server: Server) -> None:
@@ -210,6 +275,21 @@ def test_the_command_ends_cleanly(results: dict[str, Path], how: signal.Signals)
     process.send_signal(how)
     assert process.wait(10) == 0
     assert process.stderr.read() == "Ctrl-C ends the viewer\n"
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_the_command_ends_beside_waiting_connections(results: dict[str, Path], how: signal.Signals) -> None:
+    """At once, with more of them than are served."""
+    process, address = start_command(results)
+    port = int(re.search(r":(\d+)/", address)[1])
+    opened = [socket.create_connection(("127.0.0.1", port)) for _ in range(200)]
+    for one in opened:
+        one.sendall(b"GET / HTTP/1.1\r\n")
+    time.sleep(0.5)
+    began = time.monotonic()
+    process.send_signal(how)
+    assert process.wait(30) == 0
+    assert time.monotonic() - began < 5
 
 
 def test_the_command_ends_when_idle(results: dict[str, Path]) -> None:
