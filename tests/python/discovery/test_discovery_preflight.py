@@ -183,3 +183,71 @@ def test_a_velocity_is_recognised_where_x_moves_less_than_its_noise_from_sample_
     else:
         with pytest.raises(SeparatrixError, match="'v' is not the velocity of 'x'"):
             check_velocity(record, notes)
+
+
+SLOW = """\
+[body]
+mass = 1
+gravity = 9.81
+[restoring]
+law = "linear"
+stiffness = 88.8
+free_length = 0.4
+[friction]
+law = "coulomb"
+kinetic_coefficient = 0.2
+[contact]
+law = "newton"
+restitution = 0.5
+upper = 1.1
+[drive]
+law = "fourier"
+ratio = 0.2
+mean = 0.31
+cosine = [0.095]
+sine = [0.0]
+"""
+
+
+def slow(amplitude: float, scale: float, noise: float = 8e-6) -> Record:
+    """A body about 0.71 m that moves slowly with an amplitude, under a drive of some scale."""
+    t = np.arange(40_000) / 2000
+    x = 0.71 + amplitude * np.cos(0.2 * np.sqrt(88.8) * t)
+    x += noise * np.random.default_rng(3).standard_normal(t.size)
+    header = {"drive_ratio": 0.2, "drive_scale": scale, "phase": 0.0}
+    return make_record("slow", {"t": t, "x": x}, header)
+
+
+def at_rest(noise: float = 8e-6) -> Record:
+    t = np.arange(4000) / 2000
+    return make_record("rest", {"t": t, "x": 0.7 + noise * np.random.default_rng(4).standard_normal(t.size)})
+
+
+@pytest.mark.parametrize(("amplitude", "scale"), [(0.007, 0.3), (0.007, 1.0), (2e-3, 0.1), (2e-5, 0.3)])
+def test_a_small_motion_is_that_of_the_machine_under_its_drive(amplitude, scale):
+    prepared = prepare(slow(amplitude, scale), Model.from_text(SLOW), at_rest())
+    assert prepared.sigma == pytest.approx(8e-6, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "scale", "factor"),
+    [(0.09, 1.0, 1e-3), (0.09, 1.0, 1e3), (0.007, 0.3, 1e-3), (0.007, 0.3, 1e3)],
+)
+def test_wrong_units_are_refused_whatever_the_drive(amplitude, scale, factor):
+    record = slow(amplitude, scale)
+    record.x = factor * record.x
+    with pytest.raises(SeparatrixError, match="wrong units"):
+        prepare(record, Model.from_text(SLOW))
+
+
+def test_a_motion_below_the_noise_of_a_sample_is_seen_by_its_slow_part():
+    assert prepare(slow(8e-6, 0.3), Model.from_text(SLOW), at_rest()).sigma_stated
+    with pytest.raises(SeparatrixError, match="nothing but noise"):
+        prepare(slow(0.0, 0.3), Model.from_text(SLOW), at_rest())
+
+
+def test_a_rest_record_that_moves_slowly_is_refused_beside_a_small_motion():
+    rest = slow(1e-4, 0.3)
+    rest.file = "rest.csv"
+    with pytest.raises(SeparatrixError, match="rest.csv: .* slowly: not a record at rest"):
+        prepare(slow(8e-5, 0.3), Model.from_text(SLOW), rest)

@@ -258,6 +258,14 @@ def _size(fitted: Fitted, i: int) -> float:
     return 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
 
 
+def sliding_speed(fitted: Fitted) -> float:
+    """Usual speed of the body while it moves: at rest no speed of friction is seen."""
+    fit = fitted.fit
+    v = fit.evaluation.v[fitted.problem.segments.inside & fit.good[:, None]]
+    v = v[v != 0]
+    return float(np.sqrt(np.mean(v**2))) if v.size else 0.0
+
+
 def _together_clear(fitted: Fitted, columns: list[int]) -> bool:
     """Whether the 95 % region of several parameters is without zero, though the interval of each may have it.
 
@@ -317,7 +325,7 @@ def admissible(one: ScoredCandidate, base: Fitted, options: Options) -> tuple[bo
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear) and not _together_clear(one.fitted, inside):
         return False, "its 95 % intervals contain zero"
-    usual = float(np.sqrt(np.mean(fit.evaluation.v[fit.good] ** 2))) if fit.good.any() else 0.0
+    usual = sliding_speed(one.fitted)
     lowest, highest = options.drive_scales
     for i, value in enumerate(fit.values):
         if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
