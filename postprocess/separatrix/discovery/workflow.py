@@ -65,10 +65,10 @@ def investigate(
     scales = seen.scales(data, fitted)
     if predicted is not None:
         _prepare_held_out(predicted, data, seen.model, fitted, scales.mass)
-    context = SearchContext(data, predicted, scales, options)
+    context = SearchContext(data, predicted, scales, options, deadline=began + (options.time_limit or np.inf))
     found = search(SearchState(context, fitted))
     # the noise of the base may have been measured again
-    findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps)
+    findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps, found.stopped)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings

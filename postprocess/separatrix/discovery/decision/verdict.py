@@ -41,6 +41,7 @@ class Findings:
     decision: Decision
     held_out_chosen: str
     steps: tuple[Step, ...] = ()
+    stopped: str = ""
     maps: list[Map] = field(default_factory=list)
 
 
@@ -79,6 +80,7 @@ def verdict_of(findings: Findings) -> dict:
         "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
         "reasons": list(decision.reasons),
+        "stopped_before": findings.stopped,
         "search": [one._asdict() for one in findings.steps],
         "asked_for": None if context.options.candidates is None else list(context.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
