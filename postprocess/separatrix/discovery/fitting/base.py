@@ -45,7 +45,7 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
 
 
 def _same_far_minimum(one: Fit, other: Fit) -> bool:
-    """Whether two fits from afar follow the same segments as badly: a machine that lacks much has one minimum."""
+    """Whether two fits of a machine that lacks much follow the same segments as badly."""
     if one.good.sum() != other.good.sum() or one.reduced_chi2 < FIT.near_base**2:
         return False
     return abs(one.total - other.total) < FIT.alike_behind * one.total

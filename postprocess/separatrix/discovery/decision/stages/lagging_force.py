@@ -48,9 +48,9 @@ def lagging_force(state: SearchState) -> SearchState:
     ]
     stiffness = float(values_of(line, free)[0]) if free else parameters[_STIFFNESS].value
     reason = (
-        f"friction falls in proportion to the speed, by {-slope:.3g} N s/m up to {fastest:.3g} m/s, as damping "
-        f"that supplies energy: a spring force that lags by {-slope / stiffness:.2g} s does the same. A record "
-        "with another spring separates them: the damping of a lag grows with the stiffness"
+        f"friction falls in proportion to the speed, by {-slope:.3g} N s/m up to {fastest:.3g} m/s, as "
+        f"damping that supplies energy: a spring force that lags by {-slope / stiffness:.2g} s does the same. "
+        "A record with another spring separates them: the damping of a lag grows with the stiffness"
     )
     decision = state.decision.because(reason)
     return state.decided(
