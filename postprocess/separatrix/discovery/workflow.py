@@ -55,6 +55,10 @@ def investigate(
     unique_names([*training, *held_out])
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[seen.prepare(one, still) for one in group] for group in (training, held_out)]
+    if all(one.rests for one in prepared[0]):
+        raise SeparatrixError(
+            f"{training[0].file}: the body rests in all records to be fitted: nothing but noise"
+        )
     data = seen.gather(prepared[0], options)
     predicted = seen.gather(prepared[1], options) if held_out else None
     options.progress("fitting the base machine", 0.05)

@@ -11,7 +11,7 @@ from separatrix.discovery.measured.condense import Samples, whole
 from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import resolution_of, white_noise
-from separatrix.discovery.measured.sizes import check_size, moves
+from separatrix.discovery.measured.sizes import at_rest, check_size, moves
 from separatrix.discovery.measured.smoother import Smoothed
 from separatrix.discovery.policy import RECORDS
 from separatrix.discovery.wording import units_of
@@ -43,6 +43,8 @@ class Prepared:
     phase_stated: bool = True
     drive_scale: float = 1.0
     origin: float = 0.0
+    # whether the body does not move: dry friction holds it
+    rests: bool = False
     notes: list[str] = field(default_factory=list)
     # fitted rows: all samples, or fewer with the same information
     samples: Samples | None = None
@@ -122,9 +124,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     unit = units_of(model.parameters).position
     sigma = _noise(record, rest, resolution, unit, notes)
-    if not moves(record, sigma, rest, unit):
-        scatter = f"{record.file}: x scatters by {np.std(record.x):.3g} {unit}"
-        raise SeparatrixError(f"{scatter} at a noise of {sigma:.3g} {unit}: nothing but noise")
+    rests = not moves(record, sigma, rest, unit)
     prepared = Prepared(
         record,
         sigma,
@@ -137,6 +137,8 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     prepared.sigma_stated = rest is not None or bool(record.header.get("sensor_noise_sigma_m"))
     prepared.velocity_sigma_stated = bool(record.header.get("sensor_noise_sigma_m_s"))
     _find_drive(prepared, model)
+    if rests:
+        at_rest(prepared, model)
     check_size(prepared, model)
     return prepared
 

@@ -37,6 +37,16 @@ def moves(record: Record, sigma: float, rest: Record | None, unit: str) -> bool:
     return _slow_scatter(record.x) > RECORDS.moving * sigma
 
 
+def at_rest(prepared: "Prepared", model) -> None:
+    """Mark a record in which dry friction may hold the body all the time; refuse another one without motion."""
+    record, unit = prepared.record, units_of(model.parameters).position
+    text = f"x scatters by {np.std(record.x):.3g} {unit} at a noise of {prepared.sigma:.3g} {unit}"
+    if not _may_hold(model.parameters, _foot(prepared, model.parameters)):
+        raise SeparatrixError(f"{record.file}: {text}: nothing but noise")
+    prepared.rests = True
+    prepared.notes.append(f"{text}: the body rests, as friction may hold it against this drive")
+
+
 def _slow_scatter(x: np.ndarray) -> float:
     """Scatter of the means of blocks, which of white noise is that of a sample."""
     width = max(1, x.size // RECORDS.slow_blocks)

@@ -47,10 +47,11 @@ def lagging_force(state: SearchState) -> SearchState:
         replace(one, value=parameters[one.path].value) for one in line.problem.free if one.path == _STIFFNESS
     ]
     stiffness = float(values_of(line, free)[0]) if free else parameters[_STIFFNESS].value
+    lag = -slope / stiffness
     reason = (
         f"friction falls in proportion to the speed, by {-slope:.3g} N s/m up to {fastest:.3g} m/s, as "
-        f"damping that supplies energy: a spring force that lags by {-slope / stiffness:.2g} s does the same. "
-        "A record with another spring separates them: the damping of a lag grows with the stiffness"
+        f"damping that supplies energy: a spring force that lags by {lag:.2g} s does the same. A record "
+        " with another spring separates them: the damping of a lag grows with the stiffness"
     )
     decision = state.decision.because(reason)
     return state.decided(
