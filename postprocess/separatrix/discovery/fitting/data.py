@@ -218,9 +218,19 @@ def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.
     slow[:-1] |= seen.v[:-1] * seen.v[1:] <= 0
     for shift in (-1, 1):
         slow |= np.roll(slow, shift)
+    slow &= ~_within_rests(seen)
     nearest = np.clip(np.searchsorted(at, np.arange(count)), 1, at.size - 1)
     nearest -= np.arange(count) - at[nearest - 1] < at[nearest] - np.arange(count)
     return hit[nearest], slow[nearest], float(np.median(np.abs(seen.state[:, 2])) / 0.6745)
+
+
+def _within_rests(seen: Smoothed) -> np.ndarray:
+    """Samples within a rest and away from its ends, where no friction jumps."""
+    margin = FIT.rest_margin * float(np.median(np.diff(seen.t)))
+    rests = [
+        (begin + margin, end - margin) for begin, end in stick_intervals(seen) if end - begin > 2 * margin
+    ]
+    return in_intervals(seen.t, rests)
 
 
 def oscillation_samples(x: np.ndarray) -> int:

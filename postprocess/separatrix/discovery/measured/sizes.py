@@ -38,7 +38,7 @@ def moves(record: Record, sigma: float, rest: Record | None, unit: str) -> bool:
 
 
 def at_rest(prepared: "Prepared", model) -> None:
-    """Mark a record in which dry friction may hold the body all the time; refuse another one without motion."""
+    """Mark a record in which dry friction may hold the body; refuse another one without motion."""
     record, unit = prepared.record, units_of(model.parameters).position
     text = f"x scatters by {np.std(record.x):.3g} {unit} at a noise of {prepared.sigma:.3g} {unit}"
     if not _may_hold(model.parameters, _foot(prepared, model.parameters)):
