@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Slow stick-slip, sampled fast: long rests cost few rows, and the laws of friction are told apart."""
+"""Slow stick-slip, sampled fast: long rests cost few rows, and the laws of friction are distinguished."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_the_right_machine_leaves_noise_of_rests_that_cost_few_rows(slow_case):
         ("dahl", "dahl", False),
     ],
 )
-def test_laws_of_friction_are_told_apart_in_slow_stick_slip(slow_case, hidden, name, small):
+def test_laws_of_friction_are_distinguished_in_slow_stick_slip(slow_case, hidden, name, small):
     folder = slow_case(hidden, 23, small)
     paths = [folder / one for one in FILES]
     verdict = discover(folder / "base.toml", paths[:2], paths[2:], rest=folder / "rest.csv")
