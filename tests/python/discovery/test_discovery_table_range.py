@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A table says nothing beyond its knots: held-out segments there count neither for nor against it."""
+"""A table is not known beyond its knots: held-out segments there count neither for nor against it."""
 
 from types import SimpleNamespace
 
