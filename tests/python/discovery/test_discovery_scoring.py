@@ -285,7 +285,7 @@ def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatc
     monkeypatch.setattr(flexible, "knots_at", lambda member, seen, count: np.arange(count))
     monkeypatch.setattr(flexible, "fit_member", lambda *_: next(made))
     member = SimpleNamespace(seen=lambda _: None, values=("force",), knots="", effect="friction_curve")
-    found = SimpleNamespace(base=base, scored=[], predicted=None)
+    found = SimpleNamespace(base=base, scored=[], predicted=None, tables=[])
     found.score = lambda one, _: ScoredCandidate(
         one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3
     )

@@ -99,9 +99,9 @@ def _fit_table(
     """The table of a family, from a `known` machine."""
     best = None
     seen = member.seen(known)
-    ahead = max(
-        (one.fitted for one in found.scored if one.fitted.fit.converged), default=None, key=_closeness
-    )
+    # also tables of other families: one that closes the gap makes the others short
+    done = [*found.scored, *(one for *_, one in found.tables if one is not None)]
+    ahead = max((one.fitted for one in done if one.fitted.fit.converged), default=None, key=_closeness)
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in FIT.knots:
             knots = knots_at(member, seen, count)
