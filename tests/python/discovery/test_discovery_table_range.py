@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from separatrix.discovery.decision.misfit import misses
-from separatrix.discovery.decision.table_range import within_tables
+from separatrix.discovery.decision.scoring import extrapolates
+from separatrix.discovery.decision.table_range import scored_segments, within_tables
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH
 
@@ -45,7 +46,7 @@ def predicted(beyond: int, effect: str = "friction_position_curve", chi2: float 
     ],
 )
 def test_segments_beyond_the_knots_are_not_scored_unless_too_few_are_left(beyond, effect, expected):
-    assert np.count_nonzero(within_tables(predicted(beyond, effect))) == expected
+    assert np.count_nonzero(scored_segments(predicted(beyond, effect))) == expected
 
 
 def test_a_table_misses_a_record_only_within_its_knots():
@@ -55,3 +56,14 @@ def test_a_table_misses_a_record_only_within_its_knots():
     bad = predicted(5)
     bad.fit.chi2[5:] = 400.0
     assert misses(bad, trained, Options())
+
+
+@pytest.mark.parametrize(
+    ("beyond", "left", "passes"), [(COUNT, 1e3, True), (COUNT, 1e6, False), (5, 1e3, False), (0, 1e3, False)]
+)
+def test_a_table_that_is_hardly_known_there_must_close_the_gap_all_the_same(beyond, left, passes):
+    prediction = predicted(beyond)
+    prediction.excess = left
+    one = SimpleNamespace(prediction=prediction, held_out=1e6)
+    assert extrapolates(one, Options()) == passes
+    assert np.count_nonzero(~within_tables(prediction)) == beyond

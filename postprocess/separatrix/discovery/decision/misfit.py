@@ -5,7 +5,7 @@
 import numpy as np
 from scipy.stats import chi2
 
-from separatrix.discovery.decision.table_range import within_tables
+from separatrix.discovery.decision.table_range import scored_segments
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, explained
@@ -102,7 +102,7 @@ def _followed(prediction: Prediction) -> tuple[np.ndarray, float]:
 
     The few that may be in a wrong minimum are left out, and those beyond what a fitted table covers.
     """
-    fit, kept = prediction.fit, prediction.good & within_tables(prediction)
+    fit, kept = prediction.fit, prediction.good & scored_segments(prediction)
     in_local_minimum = suspicious(fit)
     if in_local_minimum.size <= SEARCH.most_in_local_minimum:
         kept[in_local_minimum] = False

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import binom, chi2
 
+from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
@@ -372,12 +373,21 @@ def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None
     return gain > least**2 * fit.samples
 
 
+def extrapolates(one: ScoredCandidate, options: Options) -> bool:
+    """Whether a table is hardly known along held-out records, and yet leaves little of their gap."""
+    if one.prediction is None or within_tables(one.prediction).sum() >= SEARCH.few_segments:
+        return False
+    return _held_out_closed(one, options)
+
+
 def _all_closed(one: ScoredCandidate, options: Options) -> bool:
     """Whether the gap is closed but for a small share of another cause, where it was fitted and predicted."""
     left = max(one.ceiling.closable, one.ceiling.fit.excess, 0.0)
     if left > options.remaining * (2 * one.training + left):
         return False
-    if one.prediction is None:
-        return True
+    return one.prediction is None or _held_out_closed(one, options)
+
+
+def _held_out_closed(one: ScoredCandidate, options: Options) -> bool:
     left = max(one.prediction.excess, 0.0)
     return left <= options.remaining * (2 * one.held_out + left)

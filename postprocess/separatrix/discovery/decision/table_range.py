@@ -21,8 +21,14 @@ _VARIABLES: dict[tuple[str, str], Callable[[Likelihood, Fit], np.ndarray | None]
 """Variables of the tables of one body by effect and key of their knots."""
 
 
-def within_tables(prediction: Prediction) -> np.ndarray:
+def scored_segments(prediction: Prediction) -> np.ndarray:
     """Which segments can be scored; all of them where too few stay within the tables, or there is none."""
+    within = within_tables(prediction)
+    return within if within.sum() >= SEARCH.few_segments else np.ones(within.size, bool)
+
+
+def within_tables(prediction: Prediction) -> np.ndarray:
+    """Which segments stay within the knots of the tables of the machine."""
     problem, fit = prediction.problem, prediction.fit
     within = np.ones(fit.chi2.size, bool)
     for (effect, key), variable in _VARIABLES.items():
@@ -33,7 +39,7 @@ def within_tables(prediction: Prediction) -> np.ndarray:
         slack = SEARCH.beyond_knots * np.ptp(knots)
         beyond = (seen < knots.min() - slack) | (seen > knots.max() + slack)
         within &= ~np.any(beyond & problem.segments.inside, axis=1)
-    return within if within.sum() >= SEARCH.few_segments else np.ones(within.size, bool)
+    return within
 
 
 def _knots(parameters: dict, path: str) -> np.ndarray:
