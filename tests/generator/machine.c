@@ -103,7 +103,8 @@ static double holding_force(const struct machine *m, const struct motion *b, dou
 
 /* Share of dry friction at a position. */
 static double roughness(const struct machine *m, double x) {
-  double profile = m->friction_wave > 0 ? sin(m->friction_wave * x) / m->friction_wave : x;
+  double profile =
+      m->friction_wave > 0 ? sin(m->friction_wave * x + m->friction_wave_phase) / m->friction_wave : x;
   return fmax(0, 1 + m->friction_slope * profile);
 }
 

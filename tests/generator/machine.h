@@ -30,7 +30,7 @@ struct machine {
    * 1 m. */
   double quadratic_exponent, stribeck_exponent, cubic_exponent, contact_exponent;
   double restitution_shape, restitution_constant;
-  double friction_wave; /* of friction over position [1/m] */
+  double friction_wave, friction_wave_phase; /* of friction over position [1/m], at x = 0 [rad] */
 
   /* What the catalogue does not have. Drifts and waves are functions of the time since the record began. */
   double stiffness_wave, stiffness_wave_frequency;

@@ -29,7 +29,7 @@ SCALARS = (
     " restitution_slope contact_stiffness contact_damping lower"
     " ripple_sine ripple_cosine ripple_harmonic"
     " quadratic_exponent stribeck_exponent cubic_exponent contact_exponent"
-    " restitution_shape restitution_constant friction_wave"
+    " restitution_shape restitution_constant friction_wave friction_wave_phase"
     " stiffness_wave stiffness_wave_frequency friction_drift second_mass second_stiffness second_damping"
     " delayed_stiffness delay restitution_wave restitution_wave_frequency maxwell_stiffness maxwell_time"
 ).split()

@@ -56,6 +56,7 @@ def discover(
     partial: bool = False,
     quick: bool = False,
     seed: int = 1,
+    time_limit: float | None = None,
     progress: bool | Report | None = None,
 ) -> Discovery:
     """Find where records and a case disagree, name the missing effect or abstain, and add it to the case.
@@ -79,6 +80,9 @@ def discover(
         A first look: fewer starts and candidates.
     seed
         Of all random choices.
+    time_limit
+        Seconds after which the search ends with the best verdict so far, which is not tested to the end. An
+        error where nothing may be named yet.
     progress
         As for `basin`; what is counted are thousandths of the work.
 
@@ -105,7 +109,7 @@ def discover(
     with Progress(progress) as report:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,
-            compare=compare,
+            compare=compare, time_limit=time_limit,
             progress=lambda stage, done: report("steps", round(1000 * done), 1000),
         )  # fmt: skip
         if out is not None:

@@ -82,6 +82,7 @@ def _run(chosen: argparse.Namespace) -> None:
         compare=chosen.compare,
         segment_periods=chosen.segment_periods,
         segment_seconds=chosen.segment_seconds,
+        time_limit=chosen.time_limit,
         candidates=chosen.effects and tuple(chosen.effects),
         progress=(lambda stage, done: None) if chosen.quiet else Progress(),
     )
@@ -217,6 +218,12 @@ def _parser() -> Parser:
         help="longest segment in drive periods [1]",
     )
     parser.add_argument("--segment-seconds", metavar="S", type=positive, help="longest segment in seconds")
+    parser.add_argument(
+        "--time-limit",
+        metavar="S",
+        type=positive,
+        help="end the search after so many seconds with the best verdict so far, marked as such",
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument("--version", action="version", version=f"separatrix-discover {__version__}")
     return parser

@@ -30,6 +30,8 @@ class Options:
     compare: str = "motion"
     # name effects that help though a gap remains that none closes
     partial: bool = False
+    # seconds after which the search ends with what it knows; None = no limit
+    time_limit: float | None = None
     # None = the whole catalogue
     candidates: tuple[str, ...] | None = None
     # fmt: off

@@ -55,6 +55,10 @@ def investigate(
     unique_names([*training, *held_out])
     options.progress("reading and smoothing the records", 0.0)
     prepared = [[seen.prepare(one, still) for one in group] for group in (training, held_out)]
+    if all(one.rests for one in prepared[0]):
+        raise SeparatrixError(
+            f"{training[0].file}: the body rests in all records to be fitted: nothing but noise"
+        )
     data = seen.gather(prepared[0], options)
     predicted = seen.gather(prepared[1], options) if held_out else None
     options.progress("fitting the base machine", 0.05)
@@ -65,10 +69,10 @@ def investigate(
     scales = seen.scales(data, fitted)
     if predicted is not None:
         _prepare_held_out(predicted, data, seen.model, fitted, scales.mass)
-    context = SearchContext(data, predicted, scales, options)
+    context = SearchContext(data, predicted, scales, options, deadline=began + (options.time_limit or np.inf))
     found = search(SearchState(context, fitted))
     # the noise of the base may have been measured again
-    findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps)
+    findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps, found.stopped)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings

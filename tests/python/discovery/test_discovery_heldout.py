@@ -23,7 +23,7 @@ def prediction(chi2, score, misfit):
     chi2 = np.asarray(chi2, float)
     every = np.ones(chi2.size, bool)
     fit = SimpleNamespace(chi2=chi2, counts=np.full(chi2.size, 50), good=every, converged=True)
-    problem = SimpleNamespace(free=[])
+    problem = SimpleNamespace(free=[], model=SimpleNamespace(parameters={}))
     return Prediction(
         np.asarray(score, float), every, np.zeros(chi2.size, int), problem, fit, misfit, np.zeros((0, 0))
     )

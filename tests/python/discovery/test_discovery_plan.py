@@ -4,15 +4,18 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from separatrix.discovery.decision import plan
 from separatrix.discovery.decision.plan import Stage, search
 from separatrix.discovery.decision.rounds import SearchContext
-from separatrix.discovery.decision.state import Decision, SearchState
+from separatrix.discovery.decision.state import Choice, Decision, SearchState
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import FIT, RECORDS, SEARCH
 from separatrix.discovery.policy.row import SOURCES, rows_of
+from separatrix.errors import SeparatrixError
 
 NONE = Decision("none", [], [], [], [], None, None)
 
@@ -112,3 +115,59 @@ def test_the_pages_show_stages_gates_and_thresholds_as_they_are(
     assert (docs / "reference" / "discovery.md").read_text().endswith(discovery.page())
     guide = (docs / discovery.GUIDE).read_text()
     assert discovery.with_gates(guide) == guide
+
+
+def limited(monkeypatch, *stages: Stage, deadline: float = 0.0) -> SearchState:
+    """The end of a walk whose time limit is over once something is known."""
+    monkeypatch.setattr(plan, "PLAN", stages)
+    monkeypatch.setattr(SearchState, "in_words", lambda _: "")
+    context = SearchContext(None, None, None, Options(time_limit=60.0), deadline=deadline)
+    return search(SearchState(context, None))
+
+
+def knows(outcome: str):
+    """A stage that knows a best effect and decides."""
+    gates = dict.fromkeys(("detect", "stable", "admissible", "converged", "adequate"), True)
+    best = SimpleNamespace(gates=gates, evidence=100.0)
+    decision = replace(NONE, outcome=outcome) if outcome else None
+    return lambda state: replace(state, one=Choice(best, []), decision=decision)
+
+
+def test_a_name_that_the_time_limit_keeps_from_its_tests_is_in_doubt(monkeypatch) -> None:
+    stages = (
+        Stage("one effect", lambda state: state.open, knows("named"), "always"),
+        Stage("tests", lambda state: True, lambda state: pytest.fail("late"), "names are tested"),
+    )
+    found = limited(monkeypatch, *stages)
+    assert (found.decision.outcome, found.stopped) == ("ambiguous", "tests")
+    assert "time limit of 60 s, before 'tests'" in found.decision.reasons[-1]
+    stages = (stages[0],)
+    assert limited(monkeypatch, *stages).decision.outcome == "named"
+
+
+def test_a_stage_is_ended_in_its_middle(monkeypatch) -> None:
+    def slow(state: SearchState) -> SearchState:
+        state.context.deadline = 0.0
+        state.context.report("fitting the next one")
+        pytest.fail("went on after the time limit")
+
+    stages = (
+        Stage("one effect", lambda state: state.open, knows("not-in-catalogue"), "always"),
+        Stage("tests", lambda state: True, slow, "always"),
+    )
+    found = limited(monkeypatch, *stages, deadline=np.inf)
+    assert (found.decision.outcome, found.stopped) == ("not-in-catalogue", "tests")
+
+
+def test_a_search_that_may_name_nothing_at_its_time_limit_has_no_verdict(monkeypatch) -> None:
+    def nothing(state: SearchState) -> SearchState:
+        state = knows("")(state)
+        state.one.best.gates["detect"] = False
+        return state
+
+    stages = (
+        Stage("one effect", lambda state: state.one is None, nothing, "always"),
+        Stage("no effect", lambda state: True, lambda state: pytest.fail("late"), "always"),
+    )
+    with pytest.raises(SeparatrixError, match=r"time limit of 60 s, before 'no effect': no verdict"):
+        limited(monkeypatch, *stages)

@@ -10,7 +10,8 @@ from separatrix.discovery.fitting.one_body import BodyInMotion
 from separatrix.discovery.measured.preflight import check_velocity, prepare
 from separatrix.discovery.measured.records import Record, make_record
 from separatrix.discovery.measured.segments import padded
-from separatrix.discovery.workflow import _split
+from separatrix.discovery.measured.smoother import in_intervals, smooth, stick_intervals
+from separatrix.discovery.workflow import _split, discover
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
 
@@ -183,3 +184,103 @@ def test_a_velocity_is_recognised_where_x_moves_less_than_its_noise_from_sample_
     else:
         with pytest.raises(SeparatrixError, match="'v' is not the velocity of 'x'"):
             check_velocity(record, notes)
+
+
+SLOW = """\
+[body]
+mass = 1
+gravity = 9.81
+[restoring]
+law = "linear"
+stiffness = 88.8
+free_length = 0.4
+[friction]
+law = "coulomb"
+kinetic_coefficient = 0.2
+[contact]
+law = "newton"
+restitution = 0.5
+upper = 1.1
+[drive]
+law = "fourier"
+ratio = 0.2
+mean = 0.31
+cosine = [0.095]
+sine = [0.0]
+"""
+
+
+def slow(amplitude: float, scale: float, noise: float = 8e-6) -> Record:
+    """A body about 0.71 m that moves slowly with an amplitude, under a drive of some scale."""
+    t = np.arange(40_000) / 2000
+    x = 0.71 + amplitude * np.cos(0.2 * np.sqrt(88.8) * t)
+    x += noise * np.random.default_rng(3).standard_normal(t.size)
+    header = {"drive_ratio": 0.2, "drive_scale": scale, "phase": 0.0}
+    return make_record("slow", {"t": t, "x": x}, header)
+
+
+def at_rest(noise: float = 8e-6) -> Record:
+    t = np.arange(4000) / 2000
+    return make_record("rest", {"t": t, "x": 0.7 + noise * np.random.default_rng(4).standard_normal(t.size)})
+
+
+@pytest.mark.parametrize(("amplitude", "scale"), [(0.007, 0.3), (0.007, 1.0), (2e-3, 0.1), (2e-5, 0.3)])
+def test_a_small_motion_is_that_of_the_machine_under_its_drive(amplitude, scale):
+    prepared = prepare(slow(amplitude, scale), Model.from_text(SLOW), at_rest())
+    assert prepared.sigma == pytest.approx(8e-6, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "scale", "factor"),
+    [(0.09, 1.0, 1e-3), (0.09, 1.0, 1e3), (0.007, 0.3, 1e-3), (0.007, 0.3, 1e3)],
+)
+def test_wrong_units_are_refused_whatever_the_drive(amplitude, scale, factor):
+    record = slow(amplitude, scale)
+    record.x = factor * record.x
+    with pytest.raises(SeparatrixError, match="wrong units"):
+        prepare(record, Model.from_text(SLOW))
+
+
+def test_a_motion_below_the_noise_of_a_sample_is_seen_by_its_slow_part():
+    prepared = prepare(slow(8e-6, 0.3), Model.from_text(SLOW), at_rest())
+    assert prepared.sigma_stated
+    assert not prepared.rests
+
+
+def test_a_rest_record_that_moves_slowly_is_refused_beside_a_small_motion():
+    rest = slow(1e-4, 0.3)
+    rest.file = "rest.csv"
+    with pytest.raises(SeparatrixError, match="rest.csv: .* slowly: not a record at rest"):
+        prepare(slow(8e-5, 0.3), Model.from_text(SLOW), rest)
+
+
+def test_a_body_that_friction_holds_all_the_time_is_a_record_of_the_machine():
+    """A weak drive leaves it at rest, which bounds friction from below; a strong one does not."""
+    prepared = prepare(slow(0.0, 0.3), Model.from_text(SLOW), at_rest())
+    assert prepared.rests
+    assert "the body rests" in prepared.notes[-1]
+    for factor in (1e-3, 1e3):
+        record = slow(0.0, 0.3)
+        record.x = factor * record.x
+        with pytest.raises(SeparatrixError, match="wrong units"):
+            prepare(record, Model.from_text(SLOW))
+    with pytest.raises(SeparatrixError, match="nothing but noise"):
+        prepare(slow(0.0, 1.0), Model.from_text(SLOW), at_rest())
+
+
+def test_records_in_which_the_body_rests_all_the_time_are_refused():
+    with pytest.raises(SeparatrixError, match="rests in all records"):
+        discover(Model.from_text(SLOW), [slow(0.0, 0.3)], [slow(0.09, 1.0)])
+
+
+def test_a_start_in_a_rest_has_no_speed():
+    """A body that turns moves on; one that sticks shows the noise of the smoother alone."""
+    t = np.arange(600) / 100
+    still = (t > 2) & (t < 4)
+    x = np.where(still, 0.5, 0.5 + 0.2 * np.where(t < 3, 2 - t, t - 4))
+    x = x + 1e-5 * np.random.default_rng(1).standard_normal(t.size)
+    seen = smooth(t, x, 1e-5, 600)
+    inside = in_intervals(t, stick_intervals(seen))
+    assert inside[(t > 2.3) & (t < 3.7)].mean() > 0.9
+    assert not inside[(t < 1.8) | (t > 4.2)].any()
+    assert not in_intervals(t, []).any()

@@ -15,6 +15,7 @@ from separatrix.discovery.decision.scoring import (
     beyond_doubt,
     held_out_bounds,
     predicts,
+    sliding_speed,
     stable,
 )
 from separatrix.discovery.decision.stages import conclusions, function, one_effect
@@ -284,7 +285,7 @@ def test_a_table_that_cannot_follow_what_the_base_can_is_no_finer_one(monkeypatc
     monkeypatch.setattr(flexible, "knots_at", lambda member, seen, count: np.arange(count))
     monkeypatch.setattr(flexible, "fit_member", lambda *_: next(made))
     member = SimpleNamespace(seen=lambda _: None, values=("force",), knots="", effect="friction_curve")
-    found = SimpleNamespace(base=base, scored=[], predicted=None)
+    found = SimpleNamespace(base=base, scored=[], predicted=None, tables=[])
     found.score = lambda one, _: ScoredCandidate(
         one, None, base.fit.total - one.fit.total, 0.0, np.zeros(0), 3
     )
@@ -487,3 +488,17 @@ def test_forms_of_one_family_leave_the_family_in_no_doubt():
     both = ["friction over speed", "spring over extension"]
     assert families(pair, one("quadratic_drag", "cubic_spring")) == both
     assert families(pair, one("quadratic_drag")) == []
+
+
+def test_rest_does_not_lower_the_speed_that_a_stribeck_velocity_is_compared_with():
+    """Nor do samples beside a short segment, or segments that are not followed."""
+    v = np.array([[0.3, 0.0, -0.3, 0.0], [0.3, 0.3, 7.0, 7.0], [9.0, 9.0, 9.0, 9.0]])
+    inside = np.array([[True] * 4, [True, True, False, False], [True] * 4])
+    evaluation = SimpleNamespace(v=v)
+    moving = SimpleNamespace(
+        fit=SimpleNamespace(evaluation=evaluation, good=np.array([True, True, False])),
+        problem=SimpleNamespace(segments=SimpleNamespace(inside=inside)),
+    )
+    assert sliding_speed(moving) == pytest.approx(0.3)
+    evaluation.v = np.zeros_like(v)
+    assert sliding_speed(moving) == 0

@@ -114,14 +114,32 @@ def test_laws_of_another_shape_have_their_shape(generator):
     extension = np.abs(machine.free_length + machine.mean - states[:, simulator.X])
     energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * extension**2 / 2 + 30 * extension**3 / 3
     assert energy == pytest.approx(energy[0], rel=1e-9)
-    machine = machine_of(generator, scale=0.0, upper=simulator.NOWHERE, friction_slope=0.5, friction_wave=9.0)
+    rough = {"friction_slope": 0.5, "friction_wave": 9.0, "friction_wave_phase": 0.6}
+    machine = machine_of(generator, scale=0.0, upper=simulator.NOWHERE, **rough)
     states, _ = fly(generator, machine, 1.1, 0.0, periods=1, samples=8000)
     x = states[:, simulator.X]
     extension = machine.free_length + machine.mean - x
     energy = states[:, simulator.V] ** 2 / 2 + machine.stiffness * extension**2 / 2
     middle = (x[1:] + x[:-1]) / 2
-    work = np.sum(machine.coulomb * (1 + 0.5 * np.sin(9 * middle) / 9) * np.abs(np.diff(x)))
+    work = np.sum(machine.coulomb * (1 + 0.5 * np.sin(9 * middle + 0.6) / 9) * np.abs(np.diff(x)))
     assert energy[0] - energy[-1] == pytest.approx(work, rel=1e-5)
+
+
+@pytest.mark.parametrize("small", [False, True])
+def test_slow_records_stick_and_a_small_drive_hardly_moves(generator, tmp_path, source_dir, small):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(source_dir / "tests" / "generator"))
+        import slow
+    case = slow.draw_slow(SEED, 1, "stribeck", small)
+    slow.write_slow(tmp_path, case)
+    x = [np.loadtxt(tmp_path / name, delimiter=",", skiprows=8)[:, 1] for name in ("first.csv", "second.csv")]
+    assert all(one.size > slow.SAMPLES[0] / 2 for one in x)
+    still = np.abs(x[0][200:] - x[0][:-200]) < 8 * slow.NOISE
+    assert 0.2 < still.mean() < 0.95
+    assert np.ptp(x[0]) > 0.2
+    assert (np.ptp(x[1]) < 0.02) == small
+    rest = np.loadtxt(tmp_path / slow.REST, delimiter=",", skiprows=3)[:, 1]
+    assert np.std(rest) == pytest.approx(slow.NOISE, rel=0.1)
 
 
 def effects_of_program() -> list[tuple[str, dict, dict]]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from separatrix.discovery.decision.gates import weigh_imperfections
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate, admissible, clear_of, margin
+from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import fit_member, fits_machine, knots_at
 from separatrix.discovery.fitting.joint_effects import effect_of
@@ -98,9 +99,9 @@ def _fit_table(
     """The table of a family, from a `known` machine."""
     best = None
     seen = member.seen(known)
-    ahead = max(
-        (one.fitted for one in found.scored if one.fitted.fit.converged), default=None, key=_closeness
-    )
+    # also tables of other families: one that closes the gap makes the others short
+    done = [*found.scored, *(one for *_, one in found.tables if one is not None)]
+    ahead = max((one.fitted for one in done if one.fitted.fit.converged), default=None, key=_closeness)
     for alike in (True, False) if len(member.values) > 1 and member.knots else (False,):
         for count in FIT.knots:
             knots = knots_at(member, seen, count)
@@ -125,7 +126,7 @@ def _fit_table(
             else:
                 known = made
             one = found.score(made, context.predict(made, found.predicted))
-            if best is not None and one.evidence < best.evidence + margin(best, one, context.options):
+            if best is not None and _lead(one, best) < margin(best, one, context.options):
                 best.fitted.finer = made
                 if _pointless(best.fitted, made, ahead):
                     break
@@ -138,6 +139,15 @@ def _fit_table(
         if best is not None:
             known = best.fitted
     return best
+
+
+def _lead(one: ScoredCandidate, other: ScoredCandidate) -> float:
+    """Evidence of a table over one of other knots, without what both only extrapolate."""
+    if one.prediction is None or other.prediction is None:
+        return one.evidence - other.evidence
+    within = within_tables(one.prediction) & within_tables(other.prediction)
+    parts = (one.held_out_parts - other.held_out_parts)[~within]
+    return one.evidence - other.evidence - float(parts.sum())
 
 
 def _closeness(one: Fitted) -> float:

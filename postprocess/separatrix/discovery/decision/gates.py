@@ -15,6 +15,7 @@ from separatrix.discovery.decision.scoring import (
     beyond_doubt,
     clear_of,
     detection,
+    extrapolates,
     held_out_bounds,
     predicts,
     scored,
@@ -176,7 +177,8 @@ def _predicted(trial: Trial) -> bool | None:
     best = trial.best
     if best.prediction is None:
         return None
-    return best.leaves == LITTLE or not refuted(best.prediction, best.fitted.fit, trial.options)
+    little = best.leaves == LITTLE or extrapolates(best, trial.options)
+    return little or not refuted(best.prediction, best.fitted.fit, trial.options)
 
 
 GATES = (

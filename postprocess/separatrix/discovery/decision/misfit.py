@@ -5,6 +5,7 @@
 import numpy as np
 from scipy.stats import chi2
 
+from separatrix.discovery.decision.table_range import scored_segments
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, explained
@@ -97,8 +98,11 @@ def predicted_chi2(prediction: Prediction, fitted: Fit) -> float:
 
 
 def _followed(prediction: Prediction) -> tuple[np.ndarray, float]:
-    """Held-out segments without the few that may be in a wrong minimum, and their degrees of freedom."""
-    fit, kept = prediction.fit, prediction.good.copy()
+    """Held-out segments that can be scored, and their degrees of freedom.
+
+    The few that may be in a wrong minimum are left out, and those beyond what a fitted table covers.
+    """
+    fit, kept = prediction.fit, prediction.good & scored_segments(prediction)
     in_local_minimum = suspicious(fit)
     if in_local_minimum.size <= SEARCH.most_in_local_minimum:
         kept[in_local_minimum] = False

@@ -5,9 +5,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from separatrix.discovery.decision.rounds import OutOfTimeError
 from separatrix.discovery.decision.scoring import NOISE
 from separatrix.discovery.decision.stages.character import character, has_gap
 from separatrix.discovery.decision.stages.conclusions import few_segments, named, no_effect, not_all
+from separatrix.discovery.decision.stages.cut_short import cut_short
 from separatrix.discovery.decision.stages.function import function, function_alone, of_several, only_follows
 from separatrix.discovery.decision.stages.function_of_name import (
     form_refuted,
@@ -17,6 +19,7 @@ from separatrix.discovery.decision.stages.function_of_name import (
 )
 from separatrix.discovery.decision.stages.hidden_state import can_be_hidden, hidden_state
 from separatrix.discovery.decision.stages.in_part import effects_in_part, nearest
+from separatrix.discovery.decision.stages.lagging_force import lagging_force, may_lag
 from separatrix.discovery.decision.stages.one_effect import every_effect, one_effect
 from separatrix.discovery.decision.stages.rig_imperfections import (
     beside_imperfections,
@@ -43,7 +46,7 @@ class Stage:
 
 
 def search(state: SearchState) -> SearchState:
-    """Walk along the plan to its end; a stage may send the search back to the first one."""
+    """Walk along the plan to its end or its time limit; a stage may send the search back to the first one."""
     position, done = 0, _FIRST
     while position < len(PLAN):
         stage = PLAN[position]
@@ -52,9 +55,13 @@ def search(state: SearchState) -> SearchState:
             continue
         left = sum(one.work for one in PLAN[position:])
         span = done, done + (_LAST - done) * stage.work / (stage.work + left)
-        state = replace(state, context=replace(state.context, span=span))
-        state.context.report(f"{stage.name}: {stage.reason}")
-        state = stage.run(state)
+        known = state.one is not None
+        state = replace(state, context=replace(state.context, span=span, has_result=known))
+        try:
+            state.context.report(f"{stage.name}: {stage.reason}")
+            state = stage.run(state)
+        except OutOfTimeError:
+            return cut_short(state, stage.name)
         state = replace(state, steps=(*state.steps, Step(stage.name, stage.reason, state.in_words())))
         done = span[1]
         if state.begins_again:
@@ -177,6 +184,8 @@ PLAN = (
         "an effect is part of the machine", work=2),
     Stage("table or form", lambda state: not state.in_part and form_refuted(state), table_or_form,
         "the function of the family has another form than the one that is named"),
+    Stage("lagging force", may_lag, lagging_force,
+        "friction that falls with the speed may be a force that lags"),
 )
 # fmt: on
 """Every stage in the order in which it is looked at."""

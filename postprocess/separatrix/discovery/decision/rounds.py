@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One round of the search: every candidate screened, refitted, and predicting the held-out records."""
 
+import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,6 +31,10 @@ from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH
 
 
+class OutOfTimeError(Exception):
+    """The time limit is over in the middle of a stage, whose work is lost."""
+
+
 @dataclass
 class SearchContext:
     """Data, scales and options of a search."""
@@ -40,9 +45,19 @@ class SearchContext:
     options: Options
     # the part of all work that the present stage is
     span: tuple[float, float] = (0.0, 1.0)
+    # clock time at which the search ends; whether something is known by then that may be reported
+    deadline: float = np.inf
+    has_result: bool = False
+
+    @property
+    def late(self) -> bool:
+        """Whether the time limit is over."""
+        return time.monotonic() > self.deadline
 
     def report(self, text: str, part: float = 0.0) -> None:
-        """Report what begins, a part of the present stage being over."""
+        """Report what begins, a part of the present stage being over; out of time, the stage ends here."""
+        if self.has_result and self.late:
+            raise OutOfTimeError
         first, last = self.span
         self.options.progress(text, first + (last - first) * part)
 
@@ -126,6 +141,8 @@ def run_round(
     ranked = list(known)
     chosen.sort(key=lambda name: ranked.index(name) if name in ranked else len(ranked))
     for number, name in enumerate(chosen):
+        if context.late and found.scored:
+            break
         context.report(f"fitting {name}", number / len(chosen))
         fitted = refit(
             context.training,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import binom, chi2
 
+from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
@@ -258,6 +259,14 @@ def _size(fitted: Fitted, i: int) -> float:
     return 1.0 if fitted.problem.free[i].positive else abs(fitted.fit.values[i])
 
 
+def sliding_speed(fitted: Fitted) -> float:
+    """Usual speed of the body while it moves: at rest no speed of friction is seen."""
+    fit = fitted.fit
+    v = fit.evaluation.v[fitted.problem.segments.inside & fit.good[:, None]]
+    v = v[v != 0]
+    return float(np.sqrt(np.mean(v**2))) if v.size else 0.0
+
+
 def _together_clear(fitted: Fitted, columns: list[int]) -> bool:
     """Whether the 95 % region of several parameters is without zero, though the interval of each may have it.
 
@@ -317,7 +326,7 @@ def admissible(one: ScoredCandidate, base: Fitted, options: Options) -> tuple[bo
         return False, "its parameters are at their bounds: the wrong sign"
     if not any(clear) and not _together_clear(one.fitted, inside):
         return False, "its 95 % intervals contain zero"
-    usual = float(np.sqrt(np.mean(fit.evaluation.v[fit.good] ** 2))) if fit.good.any() else 0.0
+    usual = sliding_speed(one.fitted)
     lowest, highest = options.drive_scales
     for i, value in enumerate(fit.values):
         if free[i].path == "effect.stribeck.velocity" and free[i].physical(value) > usual:
@@ -364,12 +373,21 @@ def sizeable(gain: float, fit: Fit, options: Options, least: float | None = None
     return gain > least**2 * fit.samples
 
 
+def extrapolates(one: ScoredCandidate, options: Options) -> bool:
+    """Whether a table is hardly known along held-out records, and yet leaves little of their gap."""
+    if one.prediction is None or within_tables(one.prediction).sum() >= SEARCH.few_segments:
+        return False
+    return _held_out_closed(one, options)
+
+
 def _all_closed(one: ScoredCandidate, options: Options) -> bool:
     """Whether the gap is closed but for a small share of another cause, where it was fitted and predicted."""
     left = max(one.ceiling.closable, one.ceiling.fit.excess, 0.0)
     if left > options.remaining * (2 * one.training + left):
         return False
-    if one.prediction is None:
-        return True
+    return one.prediction is None or _held_out_closed(one, options)
+
+
+def _held_out_closed(one: ScoredCandidate, options: Options) -> bool:
     left = max(one.prediction.excess, 0.0)
     return left <= options.remaining * (2 * one.held_out + left)

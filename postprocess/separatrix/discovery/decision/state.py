@@ -121,6 +121,8 @@ class SearchState:
     # whether the plan begins again from its first stage
     begins_again: bool = False
     steps: tuple[Step, ...] = ()
+    # the stage before which the time limit ended the search; '' for a whole one
+    stopped: str = ""
 
     @property
     def open(self) -> bool:

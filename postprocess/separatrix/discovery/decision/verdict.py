@@ -16,6 +16,7 @@ from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import LARGER_NOISE, LITTLE, ScoredCandidate
 from separatrix.discovery.decision.stages.rig_imperfections import in_words
 from separatrix.discovery.decision.state import Decision, Step
+from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
@@ -41,6 +42,7 @@ class Findings:
     decision: Decision
     held_out_chosen: str
     steps: tuple[Step, ...] = ()
+    stopped: str = ""
     maps: list[Map] = field(default_factory=list)
 
 
@@ -79,6 +81,7 @@ def verdict_of(findings: Findings) -> dict:
         "leaves": best.leaves if decision.accepted else "",
         "p_value": best.p if decision.accepted else None,
         "reasons": list(decision.reasons),
+        "stopped_before": findings.stopped,
         "search": [one._asdict() for one in findings.steps],
         "asked_for": None if context.options.candidates is None else list(context.options.candidates),
         "units": asdict(units_of(findings.base.model.parameters)),
@@ -263,6 +266,12 @@ def _of_accepted(best: ScoredCandidate) -> list[str]:
         notes.append(
             f"reduced chi^2 is {size:.3g} with effect.{best.name}, and no force explains more: the noise "
             f"is taken to be {np.sqrt(size):.3g} times as large as it was stated or measured to be"
+        )
+    beyond = 0 if best.prediction is None else int(np.count_nonzero(~within_tables(best.prediction)))
+    if beyond:
+        notes.append(
+            f"{beyond} of {best.prediction.good.size} held-out segments reach values beyond the table of "
+            f"effect.{best.name}, where it is not known: they do not count against it"
         )
     if best.prediction is not None and best.prediction.with_imperfections:
         notes.append(

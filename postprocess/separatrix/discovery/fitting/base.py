@@ -33,12 +33,22 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
             (fit.values, [1, data.last]),
         ):
             problem, fit = fit_stages(data, model, free, begin, stages=stages, most=40)
+            same = _same_far_minimum(fit, best.fit)
             if _follows_better(fit, best.fit):
                 best = Fitted((), model, problem, fit, ())
+            if same:
+                break
     if best.fit.converged:
         return best
     fit = minimise(best.problem, best.fit.values, best.fit.starts, patient=True)
     return best if fit.good.sum() < best.fit.good.sum() else Fitted((), model, best.problem, fit, ())
+
+
+def _same_far_minimum(one: Fit, other: Fit) -> bool:
+    """Whether two fits of a machine that lacks much follow the same segments as badly."""
+    if one.good.sum() != other.good.sum() or one.reduced_chi2 < FIT.near_base**2:
+        return False
+    return abs(one.total - other.total) < FIT.alike_behind * one.total
 
 
 def _follows_better(fit: Fit, best: Fit) -> bool:

@@ -18,7 +18,14 @@ from separatrix.discovery.measured.condense import condense, stride
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
 from separatrix.discovery.measured.signals import jumps, white_noise
-from separatrix.discovery.measured.smoother import Smoothed, impact_table, reversals, smooth, stick_intervals
+from separatrix.discovery.measured.smoother import (
+    Smoothed,
+    impact_table,
+    in_intervals,
+    reversals,
+    smooth,
+    stick_intervals,
+)
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
@@ -79,8 +86,11 @@ class Data:
         segments = self.stages[stage]
         starts = np.zeros((segments.count, 2))
         for r, (one, smoothed) in enumerate(zip(self.prepared, self.smoothed, strict=True)):
-            rows = segments.record == r
-            starts[rows] = smoothed.at(one.samples.t[segments.first[rows]])
+            rows = np.flatnonzero(segments.record == r)
+            t = one.samples.t[segments.first[rows]]
+            starts[rows] = smoothed.at(t)
+            # of a body that sticks the smoother shows noise, from which a fit of its start would not return
+            starts[rows[in_intervals(t, stick_intervals(smoothed))], 1] = 0.0
         return starts
 
     def smoothed_errors(self, stage: int) -> np.ndarray:
@@ -116,7 +126,9 @@ def gather(prepared: list[Prepared], periods: float, seconds: float | None) -> D
     smoothed, lengths = [], []
     for one in prepared:
         record = one.record
-        oscillation = oscillation_samples(record.x)
+        # noise does not oscillate
+        resting = one.period_samples if one.rests else None
+        oscillation = resting or oscillation_samples(record.x)
         smoothed.append(_smoothed(one, oscillation))
         if seconds is not None:
             length = seconds / record.interval
@@ -206,9 +218,19 @@ def _events(count: int, at: np.ndarray, seen: Smoothed) -> tuple[np.ndarray, np.
     slow[:-1] |= seen.v[:-1] * seen.v[1:] <= 0
     for shift in (-1, 1):
         slow |= np.roll(slow, shift)
+    slow &= ~_within_rests(seen)
     nearest = np.clip(np.searchsorted(at, np.arange(count)), 1, at.size - 1)
     nearest -= np.arange(count) - at[nearest - 1] < at[nearest] - np.arange(count)
     return hit[nearest], slow[nearest], float(np.median(np.abs(seen.state[:, 2])) / 0.6745)
+
+
+def _within_rests(seen: Smoothed) -> np.ndarray:
+    """Samples within a rest and away from its ends, where no friction jumps."""
+    margin = FIT.rest_margin * float(np.median(np.diff(seen.t)))
+    rests = [
+        (begin + margin, end - margin) for begin, end in stick_intervals(seen) if end - begin > 2 * margin
+    ]
+    return in_intervals(seen.t, rests)
 
 
 def oscillation_samples(x: np.ndarray) -> int:

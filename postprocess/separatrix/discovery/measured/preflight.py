@@ -11,6 +11,7 @@ from separatrix.discovery.measured.condense import Samples, whole
 from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.sizes import at_rest, check_size, moves
 from separatrix.discovery.measured.smoother import Smoothed
 from separatrix.discovery.policy import RECORDS
 from separatrix.discovery.wording import units_of
@@ -42,6 +43,8 @@ class Prepared:
     phase_stated: bool = True
     drive_scale: float = 1.0
     origin: float = 0.0
+    # whether the body does not move: dry friction holds it
+    rests: bool = False
     notes: list[str] = field(default_factory=list)
     # fitted rows: all samples, or fewer with the same information
     samples: Samples | None = None
@@ -121,16 +124,7 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     resolution = record.header.get("sensor_resolution_m") or resolution_of(record.x)
     unit = units_of(model.parameters).position
     sigma = _noise(record, rest, resolution, unit, notes)
-    if np.std(record.x) < 5 * sigma:
-        if rest is not None:
-            raise SeparatrixError(
-                f"{rest.file}: x scatters by {sigma:.3g} {unit}, in {record.file} by {np.std(record.x):.3g} "
-                f"{unit}: not a record at rest"
-            )
-        raise SeparatrixError(
-            f"{record.file}: x scatters by {np.std(record.x):.3g} {unit} at a noise of {sigma:.3g} {unit}: "
-            "nothing but noise"
-        )
+    rests = not moves(record, sigma, rest, unit)
     prepared = Prepared(
         record,
         sigma,
@@ -143,7 +137,9 @@ def prepare(record: Record, model, rest: Record | None = None) -> Prepared:
     prepared.sigma_stated = rest is not None or bool(record.header.get("sensor_noise_sigma_m"))
     prepared.velocity_sigma_stated = bool(record.header.get("sensor_noise_sigma_m_s"))
     _find_drive(prepared, model)
-    _check_size(prepared, model)
+    if rests:
+        at_rest(prepared, model)
+    check_size(prepared, model)
     return prepared
 
 
@@ -319,45 +315,6 @@ def _with_its_force(record: Record, model, notes: list[str]) -> Record:
                 f"every {usual:.6g} s: a measured force needs one rate"
             )
     return record
-
-
-def _check_size(prepared: Prepared, model) -> None:
-    """Refuse a record far larger or smaller than the machine: wrong units, or another machine."""
-    sizes = [
-        abs(p.value)
-        for path, p in model.parameters.items()
-        if path.startswith(("drive.cosine", "drive.sine", "drive.amplitude"))
-    ]
-    sizes += [
-        abs(p.value) for path, p in model.parameters.items() if path in ("contact.upper", "contact.lower")
-    ]
-    sizes = [size for size in sizes if 0 < size < 1e100]
-    if prepared.frequency is None or not sizes:
-        return
-    unit = units_of(model.parameters).position
-    spread, expected = float(np.ptp(prepared.record.x)), max(sizes)
-    if not 1 / RECORDS.size_ratio < spread / expected < RECORDS.size_ratio:
-        raise SeparatrixError(
-            f"{prepared.record.file}: x ranges over {spread:.3g} {unit}, the machine over "
-            f"{expected:.3g} {unit}: "
-            "wrong units, or a record of another machine"
-        )
-    for path, sign in (("contact.upper", 1), ("contact.lower", -1)):
-        barrier = model.parameters.get(path)
-        if barrier is None or abs(barrier.value) > 1e100 or _is_soft(model):
-            continue
-        beyond = sign * (prepared.record.x - barrier.value)
-        if np.median(beyond) > 0:
-            row = int(np.argmax(beyond))
-            raise SeparatrixError(
-                f"{prepared.record.file}: x lies beyond {path} = {barrier.value:g} {unit} most of the time "
-                f"({prepared.record.x[row]:g} {unit} at {prepared.record.t[row]:g} s): "
-                "a record of another machine"
-            )
-
-
-def _is_soft(model) -> bool:
-    return "contact.stiffness" in model.parameters
 
 
 def check_velocity(record: Record, notes: list[str]) -> None:

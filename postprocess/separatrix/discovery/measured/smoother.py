@@ -131,6 +131,15 @@ def stick_intervals(smoothed: Smoothed) -> list[tuple[float, float]]:
     ]
 
 
+def in_intervals(t: np.ndarray, intervals: list[tuple[float, float]]) -> np.ndarray:
+    """Which times lie in one of some ascending intervals, their ends included."""
+    if not intervals:
+        return np.zeros(t.size, bool)
+    begin, end = np.array(intervals).T
+    last = np.searchsorted(begin, t, "right") - 1
+    return (last >= 0) & (t <= end[last])
+
+
 def reversals(smoothed: Smoothed) -> np.ndarray:
     """Times at which the velocity changes its sign without an impact [s]."""
     v, t = smoothed.v, smoothed.t

@@ -53,6 +53,8 @@ class Fit:
         "share of the time between impacts that is not compared")
     at_rest_errors: float = row(3.0, "1", "test",
         "standard errors of the speed within which a body may be at rest")
+    rest_margin: float = row(4.0, "interval", "test",
+        "distance from the ends of a rest up to which friction may jump, in intervals of the smoother")
     # fitting/fit.py
     huber: float = row(1.5, "1", "test", "residual over its noise from which Huber's loss is linear")
     fit_tolerance: float = row(0.02, "1", "campaign", "decrement at which a fit ends")

@@ -54,7 +54,12 @@ class Records:
         "difference of a stated drive frequency from that of the crank angle")
     uneven_pieces: float = row(1e-2, "interval", "rig",
         "difference of the intervals of two pieces with a measured force")
-    size_ratio: float = row(50.0, "1", "test", "ratio of a record to its machine that is an error of units")
+    size_ratio: float = row(50.0, "1", "test",
+        "ratio of a record to what its drive lets the machine do that is an error of units")
+    holding: float = row(0.25, "1", "rig",
+        "dry friction of the case over the force of the drive from which it may hold the body")
+    moving: float = row(5.0, "1", "test", "scatter of a motion over that of noise")
+    slow_blocks: int = row(64, "1", "test", "blocks whose means show a slow motion below the noise")
     speed_ratio: float = row(2.0, "1", "test",
         "ratio of the velocity to the slope of the position that is one")
     most_lag: int = row(4, "sample", "rig", "samples by which x may lag behind v")

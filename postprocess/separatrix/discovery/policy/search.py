@@ -33,6 +33,13 @@ class Search:
     table_leaves: float = row(0.5, "1", "campaign", "share of a gap left by a table that is not fitted again")
     table_far_behind: float = row(30.0, "log-likelihood", "campaign",
         "distance at which a table is far behind a closed form")
+    # decision/stages/lagging_force.py
+    lag_sure: float = row(3.0, "standard error", "test", "fall of friction over speed that is no chance")
+    lag_curved: float = row(0.1, "1", "campaign",
+        "share of the gain up to which a falling friction is proportional to the speed")
+    # decision/table_range.py
+    beyond_knots: float = row(0.005, "1", "test",
+        "distance beyond the knots of a table, over their range, up to which it is known")
     # decision/gates.py
     weighed_share: float = row(0.2, "1", "campaign",
         "least share of the best evidence for imperfections to be weighed")

@@ -8,7 +8,7 @@ from separatrix.discovery.decision.flexible import flexible_member
 from separatrix.discovery.decision.gates import pass_gates, score_ceiling
 from separatrix.discovery.decision.misfit import misses
 from separatrix.discovery.decision.rounds import Round, SearchContext
-from separatrix.discovery.decision.scoring import ScoredCandidate
+from separatrix.discovery.decision.scoring import ScoredCandidate, extrapolates
 from separatrix.discovery.decision.stages.conclusions import conclude
 from separatrix.discovery.decision.state import Choice, SearchState
 from separatrix.discovery.fitting.rig import cleaned_prediction
@@ -56,7 +56,7 @@ def of_several(context: SearchContext, one: ScoredCandidate) -> bool:
     Two closed forms may replace a table of friction for each direction with fewer parameters. A function that
     follows the fitted but not the held-out records may have absorbed another effect.
     """
-    if context.options.quick or one.prediction is None:
+    if context.options.quick or one.prediction is None or extrapolates(one, context.options):
         return _of_two_directions(one)
     return _of_two_directions(one) or misses(one.prediction, one.fitted.fit, context.options)
 
@@ -68,6 +68,8 @@ def only_follows(context: SearchContext, one: ScoredCandidate) -> bool:
     """
     prediction = one.prediction
     if prediction is None or not misses(prediction, one.fitted.fit, context.options):
+        return False
+    if extrapolates(one, context.options):
         return False
     prediction = replace(prediction, fit=cleaned_prediction(one.fitted, prediction))
     return misses(prediction, one.fitted.fit, context.options)

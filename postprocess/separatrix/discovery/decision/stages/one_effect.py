@@ -65,6 +65,8 @@ def _gap(context: SearchContext, found: Round) -> Ceiling:
 def _renewing(context: SearchContext, found: Round, measured: bool, everything: bool = False) -> Round:
     """Repeat the round as long as it shows that its base can be fitted better."""
     for _ in range(SEARCH.renewals):
+        if context.late:
+            break
         lower = renewed(context, found, measured)
         if lower is None:
             break
