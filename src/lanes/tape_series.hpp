@@ -1,0 +1,175 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// Taylor series of all nodes of a tape, of many trajectories at once: an operation is looked up once per order
+// for all of them. What `tape_series.f90` does for one.
+#ifndef SEPARATRIX_TAPE_SERIES_HPP
+#define SEPARATRIX_TAPE_SERIES_HPP
+
+#include "lane_elementary.hpp"
+#include "tape_types.hpp"
+
+namespace {
+
+enum { orders = tape_order + 1 };
+
+typedef vec series[orders];
+
+// Values of the nodes in the present order; series of those that later orders need.
+struct tape_values {
+  vec now[most_tape_nodes], first[most_tape_nodes];
+  series of[most_tape_series];
+};
+
+// Sum of a(i) b(k - i), i = from ... k - until. In two parts, so that additions need not wait for each other.
+inline vec products(const vec *a, const vec *b, int k, int from, int until) {
+  vec even = {}, odd = {};
+  even = 0;
+  odd = 0;
+  int i = from;
+  for (; i < k - until; i += 2) {
+    even += a[i] * b[k - i];
+    odd += a[i + 1] * b[k - i - 1];
+  }
+  if (i == k - until)
+    even += a[i] * b[k - i];
+  return even + odd;
+}
+
+inline vec square_term(const vec *a, int k) {
+  vec total = 0;
+  for (int i = 0; i < (k + 1) / 2; i++)
+    total += a[i] * a[k - i];
+  total += total;
+  return k % 2 == 0 ? total + a[k / 2] * a[k / 2] : total;
+}
+
+// Values at the state.
+inline void evaluate(const tape_machine &m, const vec *z, vec slip, tape_values &t) {
+  for (int i = 0; i < m.nodes; i++) {
+    const tape_node &n = m.node[i];
+    const vec &a = t.first[n.first], &b = t.first[n.second];
+    vec y, other;
+    switch (n.operation) {
+    case tape_variable:
+      y = z[n.first];
+      break;
+    case tape_slip:
+      y = slip;
+      break;
+    case tape_add:
+      y = a + b;
+      break;
+    case tape_subtract:
+      y = a - b;
+      break;
+    case tape_multiply:
+    case tape_scale:
+      y = a * b;
+      break;
+    case tape_divide:
+    case tape_divide_steady:
+      y = a / b;
+      break;
+    case tape_negative:
+      y = -a;
+      break;
+    case tape_square:
+      y = a * a;
+      break;
+    case tape_sqrt:
+      y = square_root(a);
+      break;
+    case tape_exp:
+      y = exponential(a);
+      break;
+    case tape_log:
+      y = logarithm(a);
+      break;
+    case tape_sin:
+      sine_cosine(a, y, other);
+      break;
+    case tape_cos:
+      sine_cosine(a, other, y);
+      break;
+    default:
+      y = n.value;
+    }
+    t.first[i] = y;
+    if (n.series >= 0)
+      t.of[n.series][0] = y;
+    if (n.slopes >= 0)
+      t.of[n.slopes][0] = 0;
+    for (int k = 1; n.steady && n.series >= 0 && k < orders; k++)
+      t.of[n.series][k] = 0;
+    t.now[i] = n.steady ? vec(0.0) : y;
+  }
+}
+
+// Coefficient k > 0 of a node from lower ones and those of its arguments.
+inline vec coefficient(const tape_node &n, int k, tape_values &t) {
+  const vec &a = t.now[n.first], &b = t.now[n.second];
+  switch (n.operation) {
+  case tape_add:
+    return a + b;
+  case tape_subtract:
+    return a - b;
+  case tape_multiply:
+    return products(t.of[n.first_series], t.of[n.second_series], k, 0, 0);
+  case tape_scale:
+    return t.first[n.first] * b;
+  case tape_divide:
+    return (a - products(t.of[n.series], t.of[n.second_series], k, 0, 1)) / t.first[n.second];
+  case tape_divide_steady:
+    return a / t.first[n.second];
+  case tape_negative:
+    return -a;
+  case tape_square:
+    return square_term(t.of[n.first_series], k);
+  case tape_sqrt:
+    return (a - products(t.of[n.series], t.of[n.series], k, 1, 1)) / (2 * t.of[n.series][0]);
+  case tape_exp:
+  case tape_sin:
+    return products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) / double(k);
+  case tape_cos:
+    return -(products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) / double(k));
+  case tape_log:
+    return (a * double(k) - products(t.of[n.slopes], t.of[n.second_series], k, 1, 1)) /
+           (double(k) * t.first[n.first]);
+  default:
+    return 0;
+  }
+}
+
+// Series of the variables, and of all nodes whose series are kept, the last but one order included.
+inline void expand(const tape_machine &m, const vec *z, vec slip, tape_values &t) {
+  evaluate(m, z, slip, t);
+  t.of[m.hold][tape_order] = 0;
+  if (m.throws >= 0)
+    t.of[m.throws][tape_order] = 0;
+  for (int k = 1; k < orders; k++) {
+    for (int i = 0; i < m.variables; i++)
+      t.of[i][k] = t.now[m.rate[i]] * (m.unit / k);
+    if (k == tape_order)
+      return;
+    if (k == 1)
+      for (int i = 0; i < m.variables; i++)
+        if (m.node[m.rate[i]].steady)
+          t.of[i][1] = t.first[m.rate[i]] * m.unit;
+    for (int i = 0; i < m.nodes; i++) {
+      const tape_node &n = m.node[i];
+      if (n.steady)
+        continue;
+      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient(n, k, t);
+      t.now[i] = y;
+      if (n.series >= 0)
+        t.of[n.series][k] = y;
+      if (n.slopes >= 0)
+        t.of[n.slopes][k] = y * double(k);
+    }
+  }
+}
+
+} // namespace
+
+#endif
