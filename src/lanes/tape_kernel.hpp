@@ -7,6 +7,7 @@
 #define SEPARATRIX_TAPE_KERNEL_HPP
 
 #include "tape_motion.hpp"
+#include <cstdio>
 
 namespace {
 
@@ -32,7 +33,7 @@ inline vec attractors_reached(const tape_machine &m, const tape_batch &batch, co
 }
 
 // Past the section, or up to it where a lane stops there.
-inline void pass_section(const tape_machine &m, const tape_batch &batch, mask past, vec at, vec *end, tape_group &g) {
+[[gnu::noinline]] inline void pass_section(const tape_machine &m, const tape_batch &batch, mask past, vec at, vec *end, tape_group &g) {
   vec cross = zero_of(g.p[tape_phase], two_pi, -1, past, at);
   vec there[most_tape_variables], when = g.s.time + cross * g.span;
   for (int i = 0; i < m.variables; i++)
@@ -58,7 +59,7 @@ inline void pass_section(const tape_machine &m, const tape_batch &batch, mask pa
 }
 
 // What the events of a step do; the lanes that are left to the event loop.
-inline mask take_events(const tape_machine &m, tape_event &e, vec *end, vec &slip, tape_group &g) {
+[[gnu::noinline]] inline mask take_events(const tape_machine &m, tape_event &e, vec *end, vec &slip, tape_group &g) {
   vec force = value_at(g.t.of[m.hold], e.at * (g.span / m.unit)), next;
   mask left = e.left;
   slip = g.s.slip;
@@ -90,12 +91,14 @@ inline mask take_events(const tape_machine &m, tape_event &e, vec *end, vec &sli
 }
 
 // One step of the lanes that are flying.
-inline void step(const tape_machine &m, const tape_batch &batch, tape_group &g) {
+static double sumnat,sumlen;static long sumnn; static long rounds, lane_steps, unclears, lefts, evs, secs, nat; struct rep{~rep(){fprintf(stderr,"nat %g len %g rounds %ld lane_steps %ld unclear %ld left %ld events %ld sections %ld natural %ld\n",sumnat/sumnn,sumlen/sumnn,rounds,lane_steps,unclears,lefts,evs,secs,nat);}} report_;
+inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tape_group &g) {
   mask flying = g.c.status == lane_flying;
-  expand(m, g.s.z, g.s.slip, g.t);
+  expand(m, fresh, g.s.z, g.s.slip, g.t);
   vec natural = natural_length(m, g), left_time = (g.c.until - g.s.time) / m.unit;
+  for(int i=0;i<8;i++){if(flying.low[i]){sumnat+=natural.low[i];sumnn++;}}
   vec length = smaller(smaller(natural, left_time), g.s.limit);
-  mask left = prove_step(m, length, g);
+  mask left = prove_step(m, length, g);for(int i=0;i<8;i++){if(flying.low[i]){sumlen+=g.span.low[i]/m.unit;}}
   mask to_end = flying & (g.span >= g.c.until - g.s.time);
   tape_event e = find_event(m, g);
   mask unclear = flying & e.unclear & ~left;
@@ -116,8 +119,10 @@ inline void step(const tape_machine &m, const tape_batch &batch, tape_group &g) 
   moves = moves & ~left;
   put(g.c.status, flying & left, lane_left);
   put(g.s.limit, moves, 1e300);
+  rounds++; lane_steps+=count(flying); unclears+=count(unclear); lefts+=count(left&flying); evs+=count(moves&(e.turns|e.hits)); nat+=count(moves&~(e.turns|e.hits));
   mask past = moves & (end[tape_phase] >= two_pi);
   put(g.s.time, moves & ~past, g.s.time + e.at * g.span);
+  secs+=count(past);
   if (any(past))
     pass_section(m, batch, past, e.at, end, g);
   moves = moves & (g.c.status == lane_flying);
@@ -140,8 +145,8 @@ inline void fly_tape(const tape_machine &m, lane_batch &control, tape_batch &bat
     put(g.c.status, sent, lane_flying);
     for (int i = 0; i < tape_members; i++)
       memcpy((vec *)&g.s + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
-    while (!any(sent & (g.c.status != lane_flying)))
-      step(m, batch, g);
+    for (bool fresh = true; !any(sent & (g.c.status != lane_flying)); fresh = false)
+      step(m, batch, fresh, g);
     g.c.exchange(control.fields, first, [](double *to, const vec &from) { memcpy(to, &from, sizeof from); });
     for (int i = 0; i < tape_members; i++)
       memcpy((double *)&batch.fields + i * lanes + first, (const vec *)&g.s + i, sizeof(vec));

@@ -12,7 +12,7 @@ namespace {
 
 const double two_pi = 6.283185307179586;
 // Remainders are bounded a little above; shares of forces and speeds within which the event loop decides.
-const double above = 1.01, doubt = 1e-11;
+const double above = 1.01, inside = 1 + 1e-9, doubt = 1e-11;
 // Shortest step, as a part of that by the last coefficients.
 const double shortest_share = 1e-3;
 // Least change of the push of a stop, as its share, over a bounce that chatter does not end with; ten times
@@ -49,18 +49,28 @@ struct tape_group {
   vec error[most_tape_variables];
 };
 
-// The same for every lane: no lane looks at another.
-inline vec by_level(const double *table, int stride, const int *level) {
+// Number of the first of `count` sizes above `need`, or of the last, for every lane.
+inline void find_size(const double *sizes, int count, vec need, int *found) {
+  double needs[vec_size];
+  memcpy(needs, &need, sizeof need);
+  for (int i = 0; i < vec_size; i++) {
+    found[i] = 0;
+    while (found[i] < count - 1 && !(needs[i] < sizes[found[i]]))
+      found[i]++;
+  }
+}
+
+inline vec by_box(const double *table, int stride, const int *box) {
   double out[vec_size];
   for (int i = 0; i < vec_size; i++)
-    out[i] = table[level[i] * stride];
+    out[i] = table[box[i] * stride];
   vec y;
   memcpy(&y, out, sizeof y);
   return y;
 }
 
 // Length of the step by the last two coefficients, in units.
-inline vec natural_length(const tape_machine &m, const tape_group &g) {
+[[gnu::noinline]] inline vec natural_length(const tape_machine &m, const tape_group &g) {
   vec reach = 30;
   for (int i = 0; i < m.variables; i++) {
     vec size = rough_logarithm(larger(magnitude(g.s.z[i]), m.sizes[i]) * m.tolerance);
@@ -70,43 +80,48 @@ inline vec natural_length(const tape_machine &m, const tape_group &g) {
   return rough_exponential(reach);
 }
 
-// Sets the variables over the step, shortened to what is proven; the lanes that no box holds.
-inline mask prove_step(const tape_machine &m, vec length, tape_group &g) {
-  vec need = 0;
+// Sets the variables over a step of `length`, in units; `size`: bounds of their magnitudes.
+inline void set_variables(const tape_machine &m, vec length, vec *size, tape_group &g) {
+  series power;
+  power[0] = 1;
+  for (int k = 1; k < orders; k++)
+    power[k] = power[k - 1] * length;
   for (int i = 0; i < m.variables; i++) {
-    if (i == tape_phase)
-      continue;
-    vec total = 0, power = 1;
+    vec total = 0;
     for (int k = 0; k < orders; k++) {
-      total += magnitude(g.t.of[i][k]) * power;
-      power *= length;
+      g.p[i][k] = g.t.of[i][k] * power[k];
+      total += magnitude(g.p[i][k]);
     }
-    need = larger(need, total / m.box[0][i]);
+    size[i] = total;
   }
-  double needs[vec_size];
-  int level[vec_size];
-  memcpy(needs, &need, sizeof need);
-  for (int i = 0; i < vec_size; i++) {
-    level[i] = 0;
-    while (level[i] < tape_levels - 1 && !(needs[i] * m.box[0][tape_speed] < 0.999 * m.box[level[i]][tape_speed]))
-      level[i]++;
+}
+
+// The same, shortened to what is proven; the lanes that no box holds.
+[[gnu::noinline]] inline mask prove_step(const tape_machine &m, vec length, tape_group &g) {
+  vec size[most_tape_variables];
+  set_variables(m, length, size, g);
+  vec need = 0, speed = size[tape_speed] * (inside / m.box[tape_speed]);
+  for (int i = tape_x; i < m.variables; i++)
+    need = larger(need, size[i] * (inside / m.box[i]));
+  int box[vec_size], level[vec_size];
+  find_size(m.speed, tape_speeds, speed, box);
+  find_size(m.level_size, tape_levels, need, level);
+  for (int i = 0; i < vec_size; i++)
+    box[i] = box[i] * tape_levels + level[i];
+  vec longest = by_box(m.longest, 1, box);
+  mask lost =
+      ~((speed < m.speed[tape_speeds - 1]) & (need < m.level_size[tape_levels - 1]) & (longest > 0.0));
+  if (any(length > longest)) {
+    length = smaller(length, longest);
+    set_variables(m, length, size, g);
   }
-  mask lost = ~(need * m.box[0][tape_speed] < 0.999 * m.box[tape_levels - 1][tape_speed]);
-  vec longest = by_level(m.longest, 1, level);
-  length = smaller(length, longest);
   g.span = length * m.unit;
-  vec share = length / longest, shrink = 1;
+  vec share = length / longest, shrink = above;
   for (int k = 0; k < orders; k++)
     shrink *= share;
-  for (int i = 0; i < m.variables; i++) {
-    vec power = 1, total = 0;
-    for (int k = 0; k < orders; k++) {
-      g.p[i][k] = g.t.of[i][k] * power;
-      total += magnitude(g.p[i][k]) * double(k + 1);
-      power *= length;
-    }
-    g.error[i] = by_level(&m.remainder[0][i], most_tape_variables, level) * shrink * above + 2.3e-16 * total;
-  }
+  for (int i = 0; i < m.variables; i++)
+    g.error[i] =
+        by_box(&m.remainder[0][i], most_tape_variables, box) * shrink + (orders * 2.3e-16) * size[i];
   return lost;
 }
 
@@ -117,7 +132,7 @@ struct tape_event {
   mask turns, hits, unclear, left;
 };
 
-inline tape_event find_event(const tape_machine &m, const tape_group &g) {
+[[gnu::noinline]] inline tape_event find_event(const tape_machine &m, const tape_group &g) {
   const double n = tape_order;
   tape_event e;
   const vec *w = g.p[tape_speed], *v = g.p[tape_v], *x = g.p[tape_x];
@@ -156,12 +171,12 @@ inline tape_event find_event(const tape_machine &m, const tape_group &g) {
 inline mask slips_on(const tape_machine &m, vec force, vec &slip) {
   slip = pick(force > 0.0, 1.0, -1.0);
   vec size = magnitude(force);
-  return size - m.level > doubt * (size + m.level);
+  return size - m.hold_level > doubt * (size + m.hold_level);
 }
 
 // Whether impacts certainly do not end here, with `speed` after one and `push` against the stop.
 inline mask bounces_on(const tape_machine &m, vec push, vec speed) {
-  mask free = push < m.level * (1 - doubt) - doubt * magnitude(push);
+  mask free = push < m.hold_level * (1 - doubt) - doubt * magnitude(push);
   vec out = push + m.friction, back = push - m.friction;
   vec height = 0.5 * m.mass * speed * speed / out;
   mask clear = (m.damping * speed + m.stiffness * height > least_change * back) &

@@ -11,11 +11,11 @@ module tape_preparation
   use motor_equations, only: body_held, both_move, motor_system_t
   use equation_sheet, only: node_of
   use operations, only: op_add, op_constant, op_cos, op_divide, op_exp, op_log, op_multiply, op_negative, op_parameter, &
-    op_sin, op_sqrt, op_square, op_subtract, op_variable
+    op_sin, op_sqrt, op_square, op_subtract, op_variable, operation_table
   use tape, only: node_t, tape_t
   use tape_bounds, only: bound_coefficients
   use tape_lane_types, only: lane_node_t, lane_tape_order, most_tape_nodes, most_tape_series, most_tape_variables, &
-    op_divide_steady, op_scale, op_slip, tape_levels, tape_machine_t
+    op_divide_steady, op_scale, op_slip, tape_levels, tape_machine_t, tape_speeds
   use tape_parts, only: needed
   use tape_series, only: prepare_series, series_t
   implicit none
@@ -23,8 +23,9 @@ module tape_preparation
 
   public :: prepare_motor_lanes, prepare_tape_lanes
 
-  !> Step from box to box; share of the state that a remainder may have, as in `series_flight`; last term of a step.
-  real(wp), parameter :: growth = 1.25_wp, margin = epsilon(1.0_wp)**0.6_wp, tolerance = 4*epsilon(1.0_wp)
+  !> From box to box: of the speed of the phase, of the other variables; share of the state that a remainder may have, as in `series_flight`; last term of a step.
+  real(wp), parameter :: speed_growth = 1.3_wp, level_growth = 1.5_wp, margin = epsilon(1.0_wp)**0.6_wp, &
+    tolerance = 4*epsilon(1.0_wp)
   !> Stops that are not there [m].
   real(wp), parameter :: far = 1e30_wp
 
@@ -110,7 +111,7 @@ contains
     machine%upper = body%upper
     machine%lower = body%lower
     machine%restitution = body%restitution
-    machine%level = body%level
+    machine%hold_level = body%level
     machine%friction = body%friction
     machine%damping = body%damping
     machine%stiffness = body%stiffness
@@ -128,14 +129,11 @@ contains
     logical, intent(out) :: fits
     integer :: number(0:body%tape%count), series(body%tape%count), slopes(body%tape%count), i, kept
     number = 0
-    machine%nodes = 0
     series = -1
     slopes = -1
     kept = size(body%rates)
+    call number_nodes(body, is_used, number(1:), machine)
     do i = 1, body%tape%count
-      if (.not. is_used(i)) cycle
-      number(i) = machine%nodes
-      machine%nodes = machine%nodes + 1
       if (body%tape%nodes(i)%operation == op_variable) series(i) = body%tape%nodes(i)%first - 1
     end do
     do i = 1, body%tape%count
@@ -153,6 +151,36 @@ contains
       if (is_used(i) .and. fits) call set_node(body, i, number, series, slopes, machine%node(number(i) + 1), fits)
     end do
   end subroutine set_nodes
+
+  !> Numbers come first, then what depends on the sign of slip alone, then what varies in time.
+  pure subroutine number_nodes(body, is_used, number, machine)
+    type(tape_body_t), intent(in) :: body
+    logical, intent(in) :: is_used(:)
+    integer, intent(inout) :: number(:)
+    type(tape_machine_t), intent(inout) :: machine
+    integer :: kind(body%tape%count), i, k, arguments
+    kind = 2
+    do i = 1, body%tape%count
+      associate (node => body%tape%nodes(i))
+        if (.not. node%is_steady) cycle
+        kind(i) = 0
+        if (node%operation == op_parameter .and. node%first == body%slip) kind(i) = 1
+        arguments = operation_table(node%operation)%arguments
+        if (arguments > 0) kind(i) = max(kind(i), kind(node%first))
+        if (arguments > 1) kind(i) = max(kind(i), kind(node%second))
+      end associate
+    end do
+    machine%nodes = 0
+    do k = 0, 2
+      if (k == 1) machine%by_slip = machine%nodes
+      if (k == 2) machine%varying = machine%nodes
+      do i = 1, body%tape%count
+        if (.not. is_used(i) .or. kind(i) /= k) cycle
+        number(i) = machine%nodes
+        machine%nodes = machine%nodes + 1
+      end do
+    end do
+  end subroutine number_nodes
 
   pure subroutine keep(series, kept)
     integer, intent(inout) :: series
@@ -205,7 +233,6 @@ contains
     node = body%tape%nodes(i)
     made%operation = node%operation
     made%value = node%value
-    made%steady = merge(1, 0, node%is_steady)
     made%series = series(i)
     made%slopes = slopes(i)
     select case (node%operation)
@@ -261,50 +288,37 @@ contains
     made%operation = op_scale
   end subroutine put_steady_first
 
-  !> Boxes that grow; in each the longest step with a proven remainder. Larger ones than can be bounded are left out; without the
-  !> smallest none `fits`.
+  !> Boxes of every speed of the phase at every level of the other variables, and the longest step with a proven remainder in
+  !> each; 0 where none is proven. Without the smallest none `fits`.
   pure subroutine set_boxes(body, machine, fits)
     type(tape_body_t), intent(in) :: body
     type(tape_machine_t), intent(inout) :: machine
     logical, intent(out) :: fits
     real(wp) :: half(size(body%rates)), rates(size(body%rates)), least
-    integer :: level, i, n
+    integer :: level, speed, i, n, box
     logical :: is_bounded
     n = size(body%rates)
-    fits = .false.
-    half = body%sizes
-    do level = 1, tape_levels
-      machine%box(:, level) = 0
-      machine%box(:n, level) = half
-      call bound_rates(body, half, machine%unit, rates, is_bounded)
-      if (.not. is_bounded) then
-        if (level == 1) return
-        call repeat_last(level, machine)
-        exit
-      end if
-      least = huge(least)
-      do i = 1, n
-        if (rates(i) > 0) least = min(least, margin*half(i)/rates(i))
+    machine%box(:n) = body%sizes
+    machine%speed = [(speed_growth**i, i=1, tape_speeds)]
+    machine%level_size = [(2*level_growth**i, i=0, tape_levels - 1)]
+    do speed = 1, tape_speeds
+      do level = 1, tape_levels
+        box = (speed - 1)*tape_levels + level
+        half = body%sizes*machine%level_size(level)
+        half(2) = body%sizes(2)*machine%speed(speed)
+        call bound_rates(body, half, machine%unit, rates, is_bounded)
+        machine%longest(box) = 0
+        if (.not. is_bounded) cycle
+        least = 1e30_wp
+        do i = 1, n
+          if (rates(i) > 0) least = min(least, margin*half(i)/rates(i))
+        end do
+        machine%longest(box) = exponential(logarithm(least)/(lane_tape_order + 1))
+        machine%remainder(:n, box) = rates*least
       end do
-      least = min(least, 1e30_wp)
-      machine%longest(level) = exponential(logarithm(least)/(lane_tape_order + 1))
-      machine%remainder(:n, level) = rates*least
-      half = growth*half
     end do
-    fits = .true.
+    fits = machine%longest(1) > 0
   end subroutine set_boxes
-
-  !> No box from `level` on.
-  pure subroutine repeat_last(level, machine)
-    integer, intent(in) :: level
-    type(tape_machine_t), intent(inout) :: machine
-    integer :: i
-    do i = level, tape_levels
-      machine%box(:, i) = machine%box(:, level - 1)
-      machine%longest(i) = machine%longest(level - 1)
-      machine%remainder(:, i) = machine%remainder(:, level - 1)
-    end do
-  end subroutine repeat_last
 
   !> Bounds of the first coefficients that the series leave out, in a unit of time, all over a box of half widths `half`.
   pure subroutine bound_rates(body, half, unit, rates, is_bounded)

@@ -18,7 +18,7 @@ struct tape_range {
   vec least, most_slope, most_curvature, last;
 };
 
-inline tape_range range_of(const vec *p) {
+[[gnu::noinline]] inline tape_range range_of(const vec *p) {
   const int n = tape_order;
   series b;
   double inverse = 1;
@@ -57,8 +57,9 @@ inline vec value_at(const vec *p, vec t) {
 
 // The zero of p - level that falls from a positive value at 0, or with `sign` -1 rises from a negative one,
 // before `end`: Newton's steps within halvings, of the lanes `where`; elsewhere `end`.
-inline vec zero_of(const vec *p, vec level, vec sign, mask where, vec end) {
-  const double rounding = 2.3e-16;
+[[gnu::noinline]] inline vec zero_of(const vec *p, vec level, vec sign, mask where, vec end) {
+  // The next step then is below rounding.
+  const double close = 3e-9;
   vec low = 0, high = end, from = sign * (p[0] - level), to = sign * (value_at(p, end) - level);
   vec t = end * (from / (from - to));
   t = pick((t >= low) & (t <= high), t, 0.5 * end);
@@ -75,8 +76,8 @@ inline vec zero_of(const vec *p, vec level, vec sign, mask where, vec end) {
     put(high, open & ~before, t);
     vec next = t - value / slope;
     next = pick((next >= low) & (next <= high), next, 0.5 * (low + high));
-    mask done = magnitude(next - t) <= rounding * t;
-    put(t, open & ~done, next);
+    mask done = magnitude(next - t) <= close * t;
+    put(t, open, next);
     open = open & ~done;
   }
   return pick(where, t, end);

@@ -15,9 +15,21 @@ enum { orders = tape_order + 1 };
 
 typedef vec series[orders];
 
+// 1/k.
+struct inverses {
+  double of[orders];
+  constexpr inverses() : of() {
+    for (int k = 1; k < orders; k++)
+      of[k] = 1.0 / k;
+  }
+  constexpr double operator[](int k) const { return of[k]; }
+};
+
+constexpr inverses inverse_of;
+
 // Values of the nodes in the present order; series of those that later orders need.
 struct tape_values {
-  vec now[most_tape_nodes], first[most_tape_nodes];
+  vec now[most_tape_nodes], first[most_tape_nodes], inverse[most_tape_nodes];
   series of[most_tape_series];
 };
 
@@ -44,9 +56,9 @@ inline vec square_term(const vec *a, int k) {
   return k % 2 == 0 ? total + a[k / 2] * a[k / 2] : total;
 }
 
-// Values at the state.
-inline void evaluate(const tape_machine &m, const vec *z, vec slip, tape_values &t) {
-  for (int i = 0; i < m.nodes; i++) {
+// Values at the state of the nodes from one number on.
+inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, tape_values &t) {
+  for (int i = from; i < m.nodes; i++) {
     const tape_node &n = m.node[i];
     const vec &a = t.first[n.first], &b = t.first[n.second];
     vec y, other;
@@ -69,6 +81,7 @@ inline void evaluate(const tape_machine &m, const vec *z, vec slip, tape_values 
       break;
     case tape_divide:
     case tape_divide_steady:
+      t.inverse[i] = vec(1.0) / b;
       y = a / b;
       break;
     case tape_negative:
@@ -79,12 +92,14 @@ inline void evaluate(const tape_machine &m, const vec *z, vec slip, tape_values 
       break;
     case tape_sqrt:
       y = square_root(a);
+      t.inverse[i] = 0.5 / y;
       break;
     case tape_exp:
       y = exponential(a);
       break;
     case tape_log:
       y = logarithm(a);
+      t.inverse[i] = vec(1.0) / a;
       break;
     case tape_sin:
       sine_cosine(a, y, other);
@@ -100,14 +115,18 @@ inline void evaluate(const tape_machine &m, const vec *z, vec slip, tape_values 
       t.of[n.series][0] = y;
     if (n.slopes >= 0)
       t.of[n.slopes][0] = 0;
-    for (int k = 1; n.steady && n.series >= 0 && k < orders; k++)
-      t.of[n.series][k] = 0;
-    t.now[i] = n.steady ? vec(0.0) : y;
+    if (i < m.varying) {
+      t.now[i] = 0;
+      for (int k = 1; n.series >= 0 && k < orders; k++)
+        t.of[n.series][k] = 0;
+    } else {
+      t.now[i] = y;
+    }
   }
 }
 
 // Coefficient k > 0 of a node from lower ones and those of its arguments.
-inline vec coefficient(const tape_node &n, int k, tape_values &t) {
+inline vec coefficient(const tape_node &n, int i, int k, tape_values &t) {
   const vec &a = t.now[n.first], &b = t.now[n.second];
   switch (n.operation) {
   case tape_add:
@@ -119,54 +138,48 @@ inline vec coefficient(const tape_node &n, int k, tape_values &t) {
   case tape_scale:
     return t.first[n.first] * b;
   case tape_divide:
-    return (a - products(t.of[n.series], t.of[n.second_series], k, 0, 1)) / t.first[n.second];
+    return (a - products(t.of[n.series], t.of[n.second_series], k, 0, 1)) * t.inverse[i];
   case tape_divide_steady:
-    return a / t.first[n.second];
+    return a * t.inverse[i];
   case tape_negative:
     return -a;
   case tape_square:
     return square_term(t.of[n.first_series], k);
   case tape_sqrt:
-    return (a - products(t.of[n.series], t.of[n.series], k, 1, 1)) / (2 * t.of[n.series][0]);
+    return (a - products(t.of[n.series], t.of[n.series], k, 1, 1)) * t.inverse[i];
   case tape_exp:
   case tape_sin:
-    return products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) / double(k);
+    return products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) * inverse_of[k];
   case tape_cos:
-    return -(products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) / double(k));
+    return products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) * -inverse_of[k];
   case tape_log:
-    return (a * double(k) - products(t.of[n.slopes], t.of[n.second_series], k, 1, 1)) /
-           (double(k) * t.first[n.first]);
+    return (a - products(t.of[n.slopes], t.of[n.second_series], k, 1, 1) * inverse_of[k]) * t.inverse[i];
   default:
     return 0;
   }
 }
 
-// Series of the variables, and of all nodes whose series are kept, the last but one order included.
-inline void expand(const tape_machine &m, const vec *z, vec slip, tape_values &t) {
-  evaluate(m, z, slip, t);
+// Series of the variables, and of all nodes whose series are kept, the last but one order included. `fresh`:
+// nothing is known of numbers.
+[[gnu::noinline]] inline void expand(const tape_machine &m, bool fresh, const vec *z, vec slip, tape_values &t) {
+  evaluate(m, fresh ? 0 : m.by_slip, z, slip, t);
   t.of[m.hold][tape_order] = 0;
   if (m.throws >= 0)
     t.of[m.throws][tape_order] = 0;
-  for (int k = 1; k < orders; k++) {
-    for (int i = 0; i < m.variables; i++)
-      t.of[i][k] = t.now[m.rate[i]] * (m.unit / k);
-    if (k == tape_order)
-      return;
-    if (k == 1)
-      for (int i = 0; i < m.variables; i++)
-        if (m.node[m.rate[i]].steady)
-          t.of[i][1] = t.first[m.rate[i]] * m.unit;
-    for (int i = 0; i < m.nodes; i++) {
+  for (int i = 0; i < m.variables; i++)
+    t.of[i][1] = t.first[m.rate[i]] * m.unit;
+  for (int k = 1; k < tape_order; k++) {
+    for (int i = m.varying; i < m.nodes; i++) {
       const tape_node &n = m.node[i];
-      if (n.steady)
-        continue;
-      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient(n, k, t);
+      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient(n, i, k, t);
       t.now[i] = y;
       if (n.series >= 0)
         t.of[n.series][k] = y;
       if (n.slopes >= 0)
         t.of[n.slopes][k] = y * double(k);
     }
+    for (int i = 0; i < m.variables; i++)
+      t.of[i][k + 1] = t.now[m.rate[i]] * (m.unit * inverse_of[k + 1]);
   }
 }
 

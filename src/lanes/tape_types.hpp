@@ -13,7 +13,9 @@ enum {
   most_tape_nodes = 192,
   most_tape_series = 64,
   most_tape_variables = 8,
-  tape_levels = 16,
+  tape_levels = 10,
+  tape_speeds = 4,
+  tape_boxes = tape_levels * tape_speeds,
   most_tape_section = 4,
   tape_metric_numbers = most_tape_section * (most_tape_section + 1) / 2,
   most_tape_regions = 64,
@@ -47,7 +49,7 @@ enum {
 // A node: numbers of its arguments, and where their series and its own are kept (-1: not). Of exp, sin and cos
 // the first is the series of derivatives of the argument, the second that of the partner.
 struct tape_node {
-  int operation, first, second, steady, first_series, second_series, series, slopes;
+  int operation, first, second, first_series, second_series, series, slopes, unused;
   double value;
 };
 
@@ -55,19 +57,21 @@ struct tape_region {
   double attractor, point[most_tape_section], scaling[most_tape_section], metric[tape_metric_numbers], reach;
 };
 
-// The variables are the phase [rad], its speed, position and velocity of a body, and further states.
+// The variables are the phase [rad], its speed, position and velocity of a body, and further states. Nodes
+// before `by_slip` are numbers, those from there to `varying` depend on the sign of slip alone.
 struct tape_machine {
-  int nodes, variables, hold, throws;
+  int nodes, by_slip, varying, variables, hold, throws;
   int rate[most_tape_variables];
   tape_node node[most_tape_nodes];
   // The time is counted in this unit [s]. Sizes of the variables for the length of a step.
   double unit, tolerance, sizes[most_tape_variables];
-  // Boxes of variables (the phase takes any value): half widths; longest step for which the remainder is
-  // proven, in units; bounds of the remainders over that step.
-  double box[tape_levels][most_tape_variables], longest[tape_levels],
-      remainder[tape_levels][most_tape_variables];
+  // Boxes of variables (the phase takes any value), of every speed of the phase at every level of the others:
+  // half widths as shares of those of the first; longest step for which the remainder is proven, in units;
+  // bounds of the remainders over that step.
+  double box[most_tape_variables], speed[tape_speeds], level_size[tape_levels], longest[tape_boxes],
+      remainder[tape_boxes][most_tape_variables];
   // Stops, what holds the body, kinetic friction, and what bounds the end of a chatter sequence.
-  double upper, lower, restitution, level, friction, damping, stiffness, mass, length;
+  double upper, lower, restitution, hold_level, friction, damping, stiffness, mass, length;
   // Change of the speed of the phase per change of velocity and per `throws`.
   double throw_factor;
 };
