@@ -7,7 +7,6 @@
 #define SEPARATRIX_TAPE_KERNEL_HPP
 
 #include "tape_motion.hpp"
-#include <cstdio>
 
 namespace {
 
@@ -32,9 +31,12 @@ inline vec attractors_reached(const tape_machine &m, const tape_batch &batch, co
   return found;
 }
 
-// Past the section, or up to it where a lane stops there.
-[[gnu::noinline]] inline void pass_section(const tape_machine &m, const tape_batch &batch, mask past, vec at, vec *end, tape_group &g) {
-  vec cross = zero_of(g.p[tape_phase], two_pi, -1, past, at);
+// Past the section, or up to it where a lane stops there; `cross` is its fraction of whole steps.
+[[gnu::noinline]] inline void pass_section(const tape_machine &m, const tape_batch &batch, mask past, vec at, vec cross,
+                                           vec *end, tape_group &g) {
+  mask again = past & (cross < 0.0);
+  if (any(again))
+    cross = zero_of(g.p[tape_phase], two_pi, -1, again, at, cross);
   vec there[most_tape_variables], when = g.s.time + cross * g.span;
   for (int i = 0; i < m.variables; i++)
     there[i] = value_at(g.p[i], cross);
@@ -59,7 +61,8 @@ inline vec attractors_reached(const tape_machine &m, const tape_batch &batch, co
 }
 
 // What the events of a step do; the lanes that are left to the event loop.
-[[gnu::noinline]] inline mask take_events(const tape_machine &m, tape_event &e, vec *end, vec &slip, tape_group &g) {
+[[gnu::noinline]] inline mask take_events(const tape_machine &m, tape_event &e, vec *end, vec &slip,
+                                          tape_group &g) {
   vec force = value_at(g.t.of[m.hold], e.at * (g.span / m.unit)), next;
   mask left = e.left;
   slip = g.s.slip;
@@ -91,14 +94,12 @@ inline vec attractors_reached(const tape_machine &m, const tape_batch &batch, co
 }
 
 // One step of the lanes that are flying.
-static double sumnat,sumlen;static long sumnn; static long rounds, lane_steps, unclears, lefts, evs, secs, nat; struct rep{~rep(){fprintf(stderr,"nat %g len %g rounds %ld lane_steps %ld unclear %ld left %ld events %ld sections %ld natural %ld\n",sumnat/sumnn,sumlen/sumnn,rounds,lane_steps,unclears,lefts,evs,secs,nat);}} report_;
 inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tape_group &g) {
   mask flying = g.c.status == lane_flying;
   expand(m, fresh, g.s.z, g.s.slip, g.t);
   vec natural = natural_length(m, g), left_time = (g.c.until - g.s.time) / m.unit;
-  for(int i=0;i<8;i++){if(flying.low[i]){sumnat+=natural.low[i];sumnn++;}}
   vec length = smaller(smaller(natural, left_time), g.s.limit);
-  mask left = prove_step(m, length, g);for(int i=0;i<8;i++){if(flying.low[i]){sumlen+=g.span.low[i]/m.unit;}}
+  mask left = prove_step(m, length, g);
   mask to_end = flying & (g.span >= g.c.until - g.s.time);
   tape_event e = find_event(m, g);
   mask unclear = flying & e.unclear & ~left;
@@ -119,12 +120,10 @@ inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tap
   moves = moves & ~left;
   put(g.c.status, flying & left, lane_left);
   put(g.s.limit, moves, 1e300);
-  rounds++; lane_steps+=count(flying); unclears+=count(unclear); lefts+=count(left&flying); evs+=count(moves&(e.turns|e.hits)); nat+=count(moves&~(e.turns|e.hits));
   mask past = moves & (end[tape_phase] >= two_pi);
   put(g.s.time, moves & ~past, g.s.time + e.at * g.span);
-  secs+=count(past);
   if (any(past))
-    pass_section(m, batch, past, e.at, end, g);
+    pass_section(m, batch, past, e.at, e.section, end, g);
   moves = moves & (g.c.status == lane_flying);
   mask ends = moves & to_end & ~(e.turns | e.hits);
   put(g.s.time, ends, g.c.until);

@@ -9,7 +9,7 @@ module tape_lane_types
   private
 
   integer, parameter, public :: tape_lane_count = 16
-  integer, parameter, public :: lane_tape_order = 20, most_tape_nodes = 192, most_tape_series = 64, most_tape_variables = 8, &
+  integer, parameter, public :: lane_tape_order = 18, most_tape_nodes = 192, most_tape_series = 64, most_tape_variables = 8, &
     tape_levels = 10, tape_speeds = 4, tape_boxes = tape_levels*tape_speeds, most_tape_section = 4, most_tape_regions = 64
   integer, parameter :: metric_numbers = (most_tape_section*(most_tape_section + 1))/2
   !> Operations beside those of `operations`: products and quotients with a factor that does not vary; the sign of slip.

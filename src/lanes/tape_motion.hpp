@@ -125,10 +125,11 @@ inline void set_variables(const tape_machine &m, vec length, vec *size, tape_gro
   return lost;
 }
 
-// The first turning point or impact of the step: its fraction, 1 without one. `unclear`: a shorter step may
+// The first turning point or impact of the step: its fraction, 1 without one; that of the section in a step
+// without one. `unclear`: a shorter step may
 // decide; `left`: the event loop is to.
 struct tape_event {
-  vec at;
+  vec at, section;
   mask turns, hits, unclear, left;
 };
 
@@ -153,17 +154,34 @@ struct tape_event {
   mask falls = ((r.most_slope + slope_bound < 0.0) | (r.most_curvature + curve_bound < 0.0)) & (q[0] > bound) &
                (r.last < -bound);
   e.unclear = e.unclear | ~(falls | (r.least > bound));
-  e.turns = falls & ~e.unclear & (g.c.status == lane_flying);
-  e.at = any(e.turns) ? zero_of(q, 0, 1, e.turns, 1) : vec(1.0);
-  // Up to there the position runs one way.
-  vec stop = pick(g.s.slip > 0.0, m.upper, m.lower);
-  vec end = any(e.turns) ? value_at(x, e.at) : value_at(x, 1);
-  vec gap = g.s.slip * (stop - end), doubtful = g.error[tape_x] + 1e-15 * magnitude(stop);
-  e.hits = (gap < -doubtful) & ~e.unclear & (g.c.status == lane_flying);
-  e.left = ~e.hits & (gap <= doubtful) & ~e.unclear;
-  if (any(e.hits))
-    e.at = zero_of(x, stop, -g.s.slip, e.hits, e.at);
-  e.turns = e.turns & ~e.hits;
+  mask sure = ~e.unclear & (g.c.status == lane_flying);
+  e.turns = falls & sure;
+  // Up to there the position runs one way. A search for whatever comes in a lane: a turning point, else an impact,
+  // else the section.
+  const vec *phase = g.p[tape_phase];
+  vec stop = pick(g.s.slip > 0.0, m.upper, m.lower), one = 1;
+  vec doubtful = g.error[tape_x] + 1e-15 * magnitude(stop), gap = g.s.slip * (stop - value_at(x, one));
+  e.hits = sure & ~e.turns & (gap < -doubtful);
+  mask section = sure & ~(e.turns | e.hits) & (value_at(phase, one) >= two_pi);
+  mask found = e.turns | e.hits | section;
+  vec at = one;
+  if (any(found)) {
+    for (int k = 0; k < orders; k++)
+      q[k] = pick(e.turns, q[k], pick(e.hits, x[k], phase[k]));
+    at = zero_of(q, pick(e.turns, 0, pick(e.hits, stop, two_pi)), pick(e.turns, 1, pick(e.hits, -g.s.slip, -1)),
+                 found, one, one);
+  }
+  e.section = pick(section, at, -1);
+  e.at = pick(section, one, at);
+  if (any(e.turns)) {
+    gap = pick(e.turns, g.s.slip * (stop - value_at(x, e.at)), gap);
+    mask before = e.turns & (gap < -doubtful);
+    if (any(before))
+      e.at = zero_of(x, stop, -g.s.slip, before, e.at, e.at);
+    e.hits = e.hits | before;
+    e.turns = e.turns & ~before;
+  }
+  e.left = sure & ~e.hits & (gap <= doubtful);
   return e;
 }
 

@@ -24,8 +24,8 @@ module tape_preparation
   public :: prepare_motor_lanes, prepare_tape_lanes
 
   !> From box to box: of the speed of the phase, of the other variables; share of the state that a remainder may have, as in `series_flight`; last term of a step.
-  real(wp), parameter :: speed_growth = 1.3_wp, level_growth = 1.5_wp, margin = epsilon(1.0_wp)**0.6_wp, &
-    tolerance = 4*epsilon(1.0_wp)
+  real(wp), parameter :: speed_growth = 1.3_wp, level_growth = 1.5_wp, margin = 1e-8_wp, &
+    tolerance = 1e-12_wp
   !> Stops that are not there [m].
   real(wp), parameter :: far = 1e30_wp
 

@@ -56,8 +56,8 @@ inline vec value_at(const vec *p, vec t) {
 }
 
 // The zero of p - level that falls from a positive value at 0, or with `sign` -1 rises from a negative one,
-// before `end`: Newton's steps within halvings, of the lanes `where`; elsewhere `end`.
-[[gnu::noinline]] inline vec zero_of(const vec *p, vec level, vec sign, mask where, vec end) {
+// before `end`: Newton's steps within halvings, of the lanes `where`; elsewhere `other`.
+[[gnu::noinline]] inline vec zero_of(const vec *p, vec level, vec sign, mask where, vec end, vec other) {
   // The next step then is below rounding.
   const double close = 3e-9;
   vec low = 0, high = end, from = sign * (p[0] - level), to = sign * (value_at(p, end) - level);
@@ -80,7 +80,7 @@ inline vec value_at(const vec *p, vec t) {
     put(t, open, next);
     open = open & ~done;
   }
-  return pick(where, t, end);
+  return pick(where, t, other);
 }
 
 } // namespace

@@ -34,22 +34,20 @@ struct tape_values {
 };
 
 // Sum of a(i) b(k - i), i = from ... k - until. In two parts, so that additions need not wait for each other.
-inline vec products(const vec *a, const vec *b, int k, int from, int until) {
-  vec even = {}, odd = {};
-  even = 0;
-  odd = 0;
-  int i = from;
-  for (; i < k - until; i += 2) {
+template <int k, int from, int until> LANE_LEAF vec products(const vec *a, const vec *b) {
+  vec even = 0, odd = 0;
+#pragma GCC unroll 32
+  for (int i = from; i <= k - until; i += 2) {
     even += a[i] * b[k - i];
-    odd += a[i + 1] * b[k - i - 1];
+    if (i < k - until)
+      odd += a[i + 1] * b[k - i - 1];
   }
-  if (i == k - until)
-    even += a[i] * b[k - i];
   return even + odd;
 }
 
-inline vec square_term(const vec *a, int k) {
+template <int k> LANE_LEAF vec square_term(const vec *a) {
   vec total = 0;
+#pragma GCC unroll 32
   for (int i = 0; i < (k + 1) / 2; i++)
     total += a[i] * a[k - i];
   total += total;
@@ -126,7 +124,7 @@ inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, ta
 }
 
 // Coefficient k > 0 of a node from lower ones and those of its arguments.
-inline vec coefficient(const tape_node &n, int i, int k, tape_values &t) {
+template <int k> LANE_LEAF vec coefficient(const tape_node &n, int i, tape_values &t) {
   const vec &a = t.now[n.first], &b = t.now[n.second];
   switch (n.operation) {
   case tape_add:
@@ -134,28 +132,46 @@ inline vec coefficient(const tape_node &n, int i, int k, tape_values &t) {
   case tape_subtract:
     return a - b;
   case tape_multiply:
-    return products(t.of[n.first_series], t.of[n.second_series], k, 0, 0);
+    return products<k, 0, 0>(t.of[n.first_series], t.of[n.second_series]);
   case tape_scale:
     return t.first[n.first] * b;
   case tape_divide:
-    return (a - products(t.of[n.series], t.of[n.second_series], k, 0, 1)) * t.inverse[i];
+    return (a - products<k, 0, 1>(t.of[n.series], t.of[n.second_series])) * t.inverse[i];
   case tape_divide_steady:
     return a * t.inverse[i];
   case tape_negative:
     return -a;
   case tape_square:
-    return square_term(t.of[n.first_series], k);
+    return square_term<k>(t.of[n.first_series]);
   case tape_sqrt:
-    return (a - products(t.of[n.series], t.of[n.series], k, 1, 1)) * t.inverse[i];
+    return (a - products<k, 1, 1>(t.of[n.series], t.of[n.series])) * t.inverse[i];
   case tape_exp:
   case tape_sin:
-    return products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) * inverse_of[k];
+    return products<k, 1, 0>(t.of[n.first_series], t.of[n.second_series]) * inverse_of[k];
   case tape_cos:
-    return products(t.of[n.first_series], t.of[n.second_series], k, 1, 0) * -inverse_of[k];
+    return products<k, 1, 0>(t.of[n.first_series], t.of[n.second_series]) * -inverse_of[k];
   case tape_log:
-    return (a - products(t.of[n.slopes], t.of[n.second_series], k, 1, 1) * inverse_of[k]) * t.inverse[i];
+    return (a - products<k, 1, 1>(t.of[n.slopes], t.of[n.second_series]) * inverse_of[k]) * t.inverse[i];
   default:
     return 0;
+  }
+}
+
+// Coefficients of the orders from k on. Loops whose length the compiler knows need no guesses of the processor.
+template <int k> inline void raise_orders(const tape_machine &m, tape_values &t) {
+  if constexpr (k < tape_order) {
+    for (int i = m.varying; i < m.nodes; i++) {
+      const tape_node &n = m.node[i];
+      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient<k>(n, i, t);
+      t.now[i] = y;
+      if (n.series >= 0)
+        t.of[n.series][k] = y;
+      if (n.slopes >= 0)
+        t.of[n.slopes][k] = y * double(k);
+    }
+    for (int i = 0; i < m.variables; i++)
+      t.of[i][k + 1] = t.now[m.rate[i]] * (m.unit * inverse_of[k + 1]);
+    raise_orders<k + 1>(m, t);
   }
 }
 
@@ -168,19 +184,7 @@ inline vec coefficient(const tape_node &n, int i, int k, tape_values &t) {
     t.of[m.throws][tape_order] = 0;
   for (int i = 0; i < m.variables; i++)
     t.of[i][1] = t.first[m.rate[i]] * m.unit;
-  for (int k = 1; k < tape_order; k++) {
-    for (int i = m.varying; i < m.nodes; i++) {
-      const tape_node &n = m.node[i];
-      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient(n, i, k, t);
-      t.now[i] = y;
-      if (n.series >= 0)
-        t.of[n.series][k] = y;
-      if (n.slopes >= 0)
-        t.of[n.slopes][k] = y * double(k);
-    }
-    for (int i = 0; i < m.variables; i++)
-      t.of[i][k + 1] = t.now[m.rate[i]] * (m.unit * inverse_of[k + 1]);
-  }
+  raise_orders<1>(m, t);
 }
 
 } // namespace

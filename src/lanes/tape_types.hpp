@@ -9,7 +9,7 @@
 #include "lane_types.hpp"
 
 enum {
-  tape_order = 20,
+  tape_order = 18,
   most_tape_nodes = 192,
   most_tape_series = 64,
   most_tape_variables = 8,
