@@ -3,6 +3,7 @@
 """An impacting body driven by a motor of limited power, by heyoka: one by one, or in batches."""
 
 import math
+from collections.abc import Callable
 
 import heyoka
 import numpy as np
@@ -16,8 +17,8 @@ DURATION = 50.0
 class Peer:
     """Taylor integration with terminal events, in batches of `batch` lanes, or one by one if that is 0.
 
-    The parameter of a lane is the direction of slip. Sticking is left out: a lane where friction would hold the
-    body goes on slipping, and is named in `stuck`.
+    The parameter of a lane is the direction of slip. Sticking is left out: where friction would hold the
+    body, it goes on slipping, and `stuck` is set.
     """
 
     def __init__(self, tolerance: float, batch: int) -> None:
@@ -47,7 +48,8 @@ class Peer:
         self.pars = memoryview(self.solver.pars.reshape(1, self.lanes))
 
     @staticmethod
-    def callback(rule, batch):  # noqa: ANN001, ANN205, D102
+    def callback(rule: Callable[[int], bool], batch: int) -> Callable[..., bool]:
+        """A rule for a lane as heyoka calls it."""
         if batch:
             return lambda _solver, _sign, lane: rule(lane)
         return lambda _solver, _sign: rule(0)
@@ -74,7 +76,6 @@ class Peer:
     def run(self, starts: np.ndarray) -> np.ndarray:
         """Ends (x, v, w) of starts (w, x, v); not numbers where the body would have stuck."""
         ends = np.empty((len(starts), 3))
-        shape = self.solver.time.shape if self.lanes > 1 else ()
         for first in range(0, len(starts), self.lanes):
             chosen = starts[np.minimum(first + np.arange(self.lanes), len(starts) - 1)]
             for lane, (w, x, v) in enumerate(chosen.tolist()):
@@ -83,11 +84,10 @@ class Peer:
                 self.pars[0, lane] = math.copysign(1.0, v)
             self.stuck[:] = False
             if self.lanes > 1:
-                self.solver.set_time(np.zeros(shape))
-                self.solver.reset_cooldowns()
+                self.solver.set_time(np.zeros(self.lanes))
             else:
                 self.solver.time = 0.0
-                self.solver.reset_cooldowns()
+            self.solver.reset_cooldowns()
             self.solver.propagate_until(DURATION)
             for lane in range(min(self.lanes, len(starts) - first)):
                 ends[first + lane] = self.state[2, lane], self.state[3, lane], self.state[1, lane]

@@ -161,7 +161,7 @@ contains
     call take_counts(batch, lane, tally)
   end subroutine take_from_lane
 
-  !> Tells a lane whose sections do not come at given times where its motion stopped last [s after the section], and when its phase
+  !> For a lane whose sections do not come at given times: where its motion stopped last [s after the section], and when its phase
   !> ends [s after the start].
   pure subroutine set_clock(bodies, lane, since, phase_end)
     type(lane_bodies_t), intent(inout) :: bodies

@@ -20,8 +20,7 @@ void separatrix_tape_sizes(size_t *machine, size_t *batch) {
   *batch = sizeof(tape_batch);
 }
 
-void separatrix_fly_tape(int width, const tape_machine *machine, lane_batch *control,
-                               tape_batch *batch) {
+void separatrix_fly_tape(int width, const tape_machine *machine, lane_batch *control, tape_batch *batch) {
   const untrapped around;
   CHOOSE(separatrix_fly_tape, machine, control, batch);
 }

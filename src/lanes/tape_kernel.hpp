@@ -32,8 +32,8 @@ inline vec attractors_reached(const tape_machine &m, const tape_batch &batch, co
 }
 
 // Past the section, or up to it where a lane stops there; `cross` is its fraction of whole steps.
-[[gnu::noinline]] inline void pass_section(const tape_machine &m, const tape_batch &batch, mask past, vec at, vec cross,
-                                           vec *end, tape_group &g) {
+[[gnu::noinline]] inline void pass_section(const tape_machine &m, const tape_batch &batch, mask past, vec at,
+                                           vec cross, vec *end, tape_group &g) {
   mask again = past & (cross < 0.0);
   if (any(again))
     cross = zero_of(g.p[tape_phase], two_pi, -1, again, at, cross);
@@ -104,7 +104,7 @@ inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tap
   tape_event e = find_event(m, g);
   mask unclear = flying & e.unclear & ~left;
   put(g.s.limit, unclear, 0.5 * (g.span / m.unit));
-  left = left | (unclear & (g.s.limit < shortest_share * natural)) | (g.c.flights >= g.c.budget);
+  left = left | (unclear & ~(g.s.limit >= shortest_share * natural)) | (g.c.flights >= g.c.budget);
   mask moves = flying & ~unclear & ~left;
   vec end[most_tape_variables], slip;
   for (int i = 0; i < m.variables; i++)

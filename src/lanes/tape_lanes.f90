@@ -84,8 +84,8 @@ contains
     batch%limit(lane) = huge(1.0_wp)
   end subroutine occupy_tape_lane
 
-  !> The motion in a lane: where it stopped, with `passed` on the section `lasted` [s] after the last one, or at the start of the step
-  !> that is left to the event loop.
+  !> The motion in a lane: where it stopped, with `passed` on the section `lasted` [s] after the last one, or at the start of the
+  !> step that is left to the event loop.
   pure subroutine tape_lane_state(batch, lane, state, crank, passed, lasted)
     type(tape_batch_t), intent(in) :: batch
     integer, intent(in) :: lane

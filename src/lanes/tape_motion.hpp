@@ -11,8 +11,8 @@
 namespace {
 
 const double two_pi = 6.283185307179586;
-// Remainders are bounded a little above; shares of forces and speeds within which the event loop decides.
-const double above = 1.01, inside = 1 + 1e-9, doubt = 1e-11;
+// Remainders are bounded a little above, and stay inside the box with it; shares of forces and speeds within which the event loop decides.
+const double above = 1.01, inside = 1 + 2e-8, doubt = 1e-11;
 // Shortest step, as a part of that by the last coefficients.
 const double shortest_share = 1e-3;
 // Least change of the push of a stop, as its share, over a bounce that chatter does not end with; ten times
@@ -21,7 +21,8 @@ const double least_change = 1e-5, least_height = 1e-12;
 
 // Of what controls lanes, the part that a tape's use.
 struct tape_control {
-  vec status, until, flights, impacts, speed_sum, last_speed, margin, budget, leaves, elapsed, reached, settled;
+  vec status, until, flights, impacts, speed_sum, last_speed, margin, budget, leaves, elapsed, reached,
+      settled;
 
   template <class each> void exchange(lane_fields<double[lanes]> &f, int first, each move) {
     move(&f.status[first], status);
@@ -110,7 +111,7 @@ inline void set_variables(const tape_machine &m, vec length, vec *size, tape_gro
     box[i] = box[i] * tape_levels + level[i];
   vec longest = by_box(m.longest, 1, box);
   mask lost =
-      ~((speed < m.speed[tape_speeds - 1]) & (need < m.level_size[tape_levels - 1]) & (longest > 0.0));
+      ~((size[tape_phase] < 2 * two_pi) & (speed < m.speed[tape_speeds - 1]) & (need < m.level_size[tape_levels - 1]) & (longest > 0.0));
   if (any(length > longest)) {
     length = smaller(length, longest);
     set_variables(m, length, size, g);
@@ -120,8 +121,7 @@ inline void set_variables(const tape_machine &m, vec length, vec *size, tape_gro
   for (int k = 0; k < orders; k++)
     shrink *= share;
   for (int i = 0; i < m.variables; i++)
-    g.error[i] =
-        by_box(&m.remainder[0][i], most_tape_variables, box) * shrink + (orders * 2.3e-16) * size[i];
+    g.error[i] = by_box(&m.remainder[0][i], most_tape_variables, box) * shrink + (orders * 2.3e-16) * size[i];
   return lost;
 }
 
@@ -151,13 +151,13 @@ struct tape_event {
     q[k] = g.s.slip * pick(from_rest, k < tape_order ? v[k + 1] : vec(0.0), v[k]);
   tape_range r = range_of(q);
   vec bound = g.error[tape_v], slope_bound = (n + 2) * bound, curve_bound = (n + 2) * (n + 1) * bound;
-  mask falls = ((r.most_slope + slope_bound < 0.0) | (r.most_curvature + curve_bound < 0.0)) & (q[0] > bound) &
-               (r.last < -bound);
+  mask falls = ((r.most_slope + slope_bound < 0.0) | (r.most_curvature + curve_bound < 0.0)) &
+               (q[0] > bound) & (r.last < -bound);
   e.unclear = e.unclear | ~(falls | (r.least > bound));
   mask sure = ~e.unclear & (g.c.status == lane_flying);
   e.turns = falls & sure;
-  // Up to there the position runs one way. A search for whatever comes in a lane: a turning point, else an impact,
-  // else the section.
+  // Up to there the position runs one way. A search for whatever comes in a lane: a turning point, else an
+  // impact, else the section.
   const vec *phase = g.p[tape_phase];
   vec stop = pick(g.s.slip > 0.0, m.upper, m.lower), one = 1;
   vec doubtful = g.error[tape_x] + 1e-15 * magnitude(stop), gap = g.s.slip * (stop - value_at(x, one));
@@ -168,8 +168,8 @@ struct tape_event {
   if (any(found)) {
     for (int k = 0; k < orders; k++)
       q[k] = pick(e.turns, q[k], pick(e.hits, x[k], phase[k]));
-    at = zero_of(q, pick(e.turns, 0, pick(e.hits, stop, two_pi)), pick(e.turns, 1, pick(e.hits, -g.s.slip, -1)),
-                 found, one, one);
+    at = zero_of(q, pick(e.turns, 0, pick(e.hits, stop, two_pi)),
+                 pick(e.turns, 1, pick(e.hits, -g.s.slip, -1)), found, one, one);
   }
   e.section = pick(section, at, -1);
   e.at = pick(section, one, at);
@@ -197,8 +197,8 @@ inline mask bounces_on(const tape_machine &m, vec push, vec speed) {
   mask free = push < m.hold_level * (1 - doubt) - doubt * magnitude(push);
   vec out = push + m.friction, back = push - m.friction;
   vec height = 0.5 * m.mass * speed * speed / out;
-  mask clear = (m.damping * speed + m.stiffness * height > least_change * back) &
-               (height > least_height * m.length);
+  mask clear =
+      (m.damping * speed + m.stiffness * height > least_change * back) & (height > least_height * m.length);
   return (speed > 0.0) & (free | clear);
 }
 

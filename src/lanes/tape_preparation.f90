@@ -23,7 +23,8 @@ module tape_preparation
 
   public :: prepare_motor_lanes, prepare_tape_lanes
 
-  !> From box to box: of the speed of the phase, of the other variables; share of the state that a remainder may have, as in `series_flight`; last term of a step.
+  !> From box to box: of the speed of the phase, of the other variables; share of a box that a remainder may have; last term of a
+  !> step, as a share of the state.
   real(wp), parameter :: speed_growth = 1.3_wp, level_growth = 1.5_wp, margin = 1e-8_wp, &
     tolerance = 1e-12_wp
   !> Stops that are not there [m].
@@ -34,8 +35,8 @@ module tape_preparation
   type, public :: tape_body_t
     type(tape_t) :: tape
     real(wp), allocatable :: parameters(:)
-    !> Nodes of the rates of the variables, of the force that acts on the body at rest, and of what an impact throws the speed of the
-    !> phase by per change of velocity (0: nothing).
+    !> Nodes of the rates of the variables, of the force that acts on the body at rest, and of what an impact throws the speed of
+    !> the phase by per change of velocity (0: nothing).
     integer, allocatable :: rates(:)
     integer :: hold = 0, throws = 0
     !> Number of the parameter that is the sign of slip.

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Separatrix developers
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Taylor series of all nodes of a tape, of many trajectories at once: an operation is looked up once per order
-// for all of them. What `tape_series.f90` does for one.
+// Taylor series of all nodes of a tape, of many trajectories at once: an operation is looked up once per
+// order for all of them. What `tape_series.f90` does for one.
 #ifndef SEPARATRIX_TAPE_SERIES_HPP
 #define SEPARATRIX_TAPE_SERIES_HPP
 
@@ -157,7 +157,8 @@ template <int k> LANE_LEAF vec coefficient(const tape_node &n, int i, tape_value
   }
 }
 
-// Coefficients of the orders from k on. Loops whose length the compiler knows need no guesses of the processor.
+// Coefficients of the orders from k on. Loops whose length the compiler knows need no guesses of the
+// processor.
 template <int k> inline void raise_orders(const tape_machine &m, tape_values &t) {
   if constexpr (k < tape_order) {
     for (int i = m.varying; i < m.nodes; i++) {
@@ -177,7 +178,8 @@ template <int k> inline void raise_orders(const tape_machine &m, tape_values &t)
 
 // Series of the variables, and of all nodes whose series are kept, the last but one order included. `fresh`:
 // nothing is known of numbers.
-[[gnu::noinline]] inline void expand(const tape_machine &m, bool fresh, const vec *z, vec slip, tape_values &t) {
+[[gnu::noinline]] inline void expand(const tape_machine &m, bool fresh, const vec *z, vec slip,
+                                     tape_values &t) {
   evaluate(m, fresh ? 0 : m.by_slip, z, slip, t);
   t.of[m.hold][tape_order] = 0;
   if (m.throws >= 0)

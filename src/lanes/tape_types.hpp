@@ -46,8 +46,8 @@ enum {
   tape_slip
 };
 
-// A node: numbers of its arguments, and where their series and its own are kept (-1: not). Of exp, sin and cos
-// the first is the series of derivatives of the argument, the second that of the partner.
+// A node: numbers of its arguments, and where their series and its own are kept (-1: not). Of exp, sin and
+// cos the first is the series of derivatives of the argument, the second that of the partner.
 struct tape_node {
   int operation, first, second, first_series, second_series, series, slopes, unused;
   double value;

@@ -404,11 +404,18 @@ contains
     real(wp), intent(in) :: start(:)
     type(slot_t), intent(inout) :: slot
     type(outcome_t), intent(inout) :: outcome
-    logical :: slipped
+    logical :: slipped, taken
     associate (trajectory => slot%trajectory)
+      slot%slips = trajectory%tally%slips
       do while (trajectory%phase /= phase_over .and. .not. flies(ensemble, trajectory))
-        call go_to_stop(ensemble%moving, trajectory, slipped)
-        call pass_stop(ensemble%moving, catalogue, ensemble%span, slipped, trajectory, outcome)
+        if (allocated(ensemble%flow%tape)) then
+          trajectory%passed = .false.
+          call go_past_events(ensemble, trajectory, taken)
+          if (taken) exit
+        end if
+        if (trajectory%reason == 0 .and. .not. trajectory%passed) call go_to_stop(ensemble%moving, trajectory, slipped)
+        call pass_stop(ensemble%moving, catalogue, ensemble%span, trajectory%tally%slips > slot%slips, trajectory, outcome)
+        slot%slips = trajectory%tally%slips
       end do
       slot%unseen = slot%unseen .or. trajectory%phase == phase_window
       slot%slips = trajectory%tally%slips
