@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times the motor-driven machine of examples/motor_impact.toml beside heyoka and writes a section of a page.
+"""Times the motor-driven machine of examples/motor_impact.toml beside heyoka and writes a page.
 
 All run in turn on one core, round by round; rates are trajectories per second of processor time.
 """
@@ -29,7 +29,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from motor_peers import DURATION, Peer  # noqa: E402
 
-BEGIN, END = "<!-- motor: begin -->", "<!-- motor: end -->"
 TOLERANCES = (1e-9, 1e-11)
 FEW = 16
 """Starts of the short run, whose time is taken off."""
@@ -149,16 +148,16 @@ def measure(
     return rates, text
 
 
-def section(rates: dict[str, list[float]], text: list[str], commit: str) -> str:
-    """The section of the page."""
+def page_of(rates: dict[str, list[float]], text: list[str], commit: str) -> str:
+    """The page."""
     best = {name: median(values) for name, values in rates.items()}
     single, batch = (best[f"heyoka, {kind}, {TOLERANCES[0]:g}"] for kind in ("one by one", "batches of 8"))
     full, loop, settled = (best[name] for name in list(best)[:3])
     lines = [
-        BEGIN,
-        "## A body driven by a motor",
+        "<!-- Written by scripts/bench/motor; do not edit. -->",
+        "# Speed: a body driven by a motor",
         "",
-        "The machine of `examples/motor_impact.toml` at 8 V over 50 s, measured by `scripts/bench/motor`.",
+        "The machine of `examples/motor_impact.toml` at 8 V, over 50 s.",
         "Its starts are drawn from crank speeds of 5 to 18 rad/s, positions of -0.11 to 0.119 m and",
         f"velocities of -1.5 to 1.5 m/s. Numbers after heyoka {heyoka.__version__} are its tolerance.",
         f"The medians are of {len(next(iter(rates.values())))} rounds in which all run in turn.",
@@ -166,7 +165,7 @@ def section(rates: dict[str, list[float]], text: list[str], commit: str) -> str:
         "",
         "| run | trajectories/s/core |",
         "| --- | --- |",
-        *(f"| {name} | {value:.3g} |" for name, value in best.items()),
+        *(f"| {name} | {three_digits(value)} |" for name, value in best.items()),
         "",
         "| ratio | reached | goal |",
         "| --- | --- | --- |",
@@ -181,9 +180,8 @@ def section(rates: dict[str, list[float]], text: list[str], commit: str) -> str:
         ),
         "",
         *text,
-        END,
     ]
-    return "\n".join(lines)
+    return "\n".join(lines) + "\n"
 
 
 def bold(value: float, goal: float) -> str:
@@ -191,30 +189,29 @@ def bold(value: float, goal: float) -> str:
     return f"{value:.2g}" if value >= goal else f"**{value:.2g}**"
 
 
-def put_into(page: Path, made: str) -> None:
-    """Replace the section of a page, or add it."""
-    text = page.read_text(encoding="utf-8")
-    before, begin, rest = text.partition(BEGIN)
-    after = rest.partition(END)[2] if begin else ""
-    page.write_text(before.rstrip("\n") + "\n\n" + made + (after or "\n"), encoding="utf-8")
+def three_digits(value: float) -> str:
+    """A rate to three digits, thousands apart."""
+    return (
+        f"{float(f'{value:.3g}'):,.4g}" if value < 1000 else f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
+    )
 
 
 def main() -> None:
-    """Measure, and write the section."""
+    """Measure, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer starts; prints only")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--program", type=Path, default=SOURCE / "build/bin/separatrix")
-    parser.add_argument("--page", type=Path, default=SOURCE / "docs/performance_machines.md")
+    parser.add_argument("--page", type=Path, default=SOURCE / "docs/performance_motor.md")
     given = parser.parse_args()
     words = ["git", "-C", str(SOURCE), "describe", "--always", "--dirty"]
     commit = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
     with tempfile.TemporaryDirectory() as folder:
         rates, text = measure(given.program, Path(folder), given.rounds, given.quick)
-    made = section(rates, text, commit)
-    print(made)
+    made = page_of(rates, text, commit)
+    print(made, end="")
     if not given.quick:
-        put_into(given.page, made)
+        given.page.write_text(made, encoding="utf-8")
 
 
 if __name__ == "__main__":
