@@ -3,7 +3,7 @@
 #
 # One kernel, compiled once per vector width; which one runs is chosen at run time. SEPARATRIX_LANES=native leaves out the
 # widths that this processor would not choose; on another processor the narrowest serves.
-set(choices lanes/lane_choice.cpp lanes/structure_choice.cpp)
+set(choices lanes/lane_choice.cpp lanes/structure_choice.cpp lanes/tape_choice.cpp)
 set(widths avx2 avx512)
 set(flags_avx2 -march=x86-64-v3)
 set(flags_avx512 -march=x86-64-v4 -mprefer-vector-width=512)
@@ -24,7 +24,7 @@ elseif(NOT SEPARATRIX_LANES STREQUAL "all")
   message(FATAL_ERROR "SEPARATRIX_LANES: found ${SEPARATRIX_LANES}, allowed all, native")
 endif()
 foreach(width IN ITEMS avx2 avx512)
-  set(kernels lanes/lane_${width}.cpp lanes/structure_${width}.cpp)
+  set(kernels lanes/lane_${width}.cpp lanes/structure_${width}.cpp lanes/tape_${width}.cpp)
   # GCC 12 contracts complex products that its straight-line vectoriser finds, in spite of -ffp-contract=off.
   set_source_files_properties(${kernels} PROPERTIES COMPILE_OPTIONS "${flags_${width}};-fno-tree-slp-vectorize")
   if(width IN_LIST widths)
@@ -35,6 +35,6 @@ foreach(width IN ITEMS avx2 avx512)
   endif()
 endforeach()
 # For processors of before 2013, and for tests.
-set_source_files_properties(lanes/lane_sse2.cpp lanes/structure_sse2.cpp PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O2>")
+set_source_files_properties(lanes/lane_sse2.cpp lanes/structure_sse2.cpp lanes/tape_sse2.cpp PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O2>")
 set_source_files_properties(lanes/lane_gpu_host.cpp PROPERTIES COMPILE_OPTIONS
   "-fno-tree-slp-vectorize;$<$<CONFIG:Release>:-O1>")

@@ -15,7 +15,7 @@ module single_trajectory
   private
 
   public :: run_trajectory, run_from_section, begin_trajectory, begin_record, end_record, go_on, is_recorded, go_past_event, &
-    go_to_stop, pass_stop, sections_ahead, ends_converged, conclude, fit_window
+    go_to_stop, pass_stop, sections_ahead, end_of_phase, ends_converged, conclude, fit_window
 
   type, public :: span_t
     !> Length of a trajectory and of the window at its end over which it is described [s].

@@ -42,21 +42,21 @@ contains
   !> shrank evenly.
   pure real(wp) function reach_of(terms) result(reach)
     real(wp), intent(in) :: terms(0:)
-    real(wp) :: size_of(0:ubound(terms, 1)), longest
+    real(wp) :: size_of(0:ubound(terms, 1)), longest, of_rounding
     integer :: k, j, order
     real(wp), parameter :: none = -huge(1.0_wp)
     order = ubound(terms, 1)
+    of_rounding = rough_logarithm(epsilon(1.0_wp))
+    size_of = none
     do k = 0, order
-      size_of(k) = none
-      if (abs(terms(k)) > 0) size_of(k) = rough_logarithm(abs(terms(k)))
+      if ((k <= order/2 .or. k >= order - 4) .and. abs(terms(k)) > 0) size_of(k) = rough_logarithm(abs(terms(k)))
     end do
     reach = huge(1.0_wp)
     do k = order - 4, order
       if (size_of(k) <= none) cycle
       longest = none
       do j = 0, order/2
-        if (size_of(j) > none) longest = max(longest, rough_logarithm(epsilon(1.0_wp))/(order - j) &
-                                             + (size_of(j) - size_of(k))/(k - j))
+        if (size_of(j) > none) longest = max(longest, of_rounding/(order - j) + (size_of(j) - size_of(k))/(k - j))
       end do
       if (longest > none) reach = min(reach, longest)
     end do

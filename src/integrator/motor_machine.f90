@@ -180,21 +180,29 @@ contains
     type(log_t), intent(inout), optional :: log
     section%passed = .true.
     call advance_motor(self%motor, section%state, section%motor, time_end, section%passed, tally, reason, log)
-    if (.not. section%passed) return
-    section%lasted = section%state%time
-    section%state%time = 0
-    if (present(log)) log%origin = log%origin + section%lasted
+    call take_section(section)
+    if (section%passed .and. present(log)) log%origin = log%origin + section%lasted
   end subroutine advance_both
 
-  !> The same: a step from event to event serves motions in lanes, which these are not.
+  !> Past one event, be it the section, with `passed`.
   pure subroutine advance_past_event(self, section, speed, time_end, tally, reason)
     class(motor_machine_t), intent(in) :: self
     class(section_state_t), intent(inout) :: section
     real(wp), intent(in) :: speed, time_end
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
-    call self%advance(section, time_end, tally, reason)
+    section%passed = .true.
+    call advance_motor(self%motor, section%state, section%motor, time_end, section%passed, tally, reason, one_event=.true.)
+    call take_section(section)
   end subroutine advance_past_event
+
+  !> The clock begins anew on the section.
+  pure subroutine take_section(section)
+    class(section_state_t), intent(inout) :: section
+    if (.not. section%passed) return
+    section%lasted = section%state%time
+    section%state%time = 0
+  end subroutine take_section
 
   pure subroutine advance_to_section(self, section, tally, reason, log)
     class(motor_machine_t), intent(in) :: self
@@ -366,7 +374,6 @@ contains
     class(motor_machine_t), intent(inout) :: self
     type(options_t), intent(in) :: options
     self%motor%options = options
-    self%motor%options%lane_width = 0
   end subroutine set_options
 
 end module motor_machine

@@ -8,6 +8,7 @@ module lane_types
   use kinds, only: wp
   use lane_curve, only: restitution_curve_t
   use structure_types, only: structure_machine_t
+  use tape_lane_types, only: tape_machine_t
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_size_t, c_sizeof
   implicit none
   private
@@ -121,6 +122,8 @@ module lane_types
     logical :: resumes = .false.
     !> A multibody structure.
     type(structure_machine_t), allocatable :: structure
+    !> A body whose equations are a tape.
+    type(tape_machine_t), allocatable :: tape
   end type lane_flow_t
 
   interface

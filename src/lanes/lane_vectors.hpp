@@ -92,7 +92,7 @@ inline reg_mask bits_of(reg a) { return (reg_mask)a; }
 inline reg real_of(reg_mask bits) { return (reg)bits; }
 
 inline reg square_root(reg a) {
-  reg root;
+  reg root = a;
   for (int i = 0; i < width; i++)
     root[i] = __builtin_sqrt(a[i]);
   return root;

@@ -6,15 +6,16 @@
 module trajectories
   use attractors, only: attractor_t
   use errors, only: error_t
-  use lane_slots, only: add_capture, lane_slots_t, flies_in_lane, advance_lanes, open_lanes, put_into_lane, take_from_lane
+  use lane_slots, only: add_capture, lane_bodies_t, lane_slots_t, flies_in_lane, advance_lanes, open_lanes, put_into_lane, &
+    set_clock, take_clock, take_from_lane
   use kinds, only: wp
   use lane_gpu, only: await_half, gpu_half_t, gpu_threads, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count, lane_flow_t, lane_flying, lane_idle, lane_left, lane_stopped
   use machine_type, only: machine_t
   use motion_state, only: options_t
   use status, only: reason_left_domain
-  use structure_types, only: structure_batch_t
-  use single_trajectory, only: begin_trajectory, conclude, trajectory_state_t, ends_converged, go_past_event, go_to_stop, &
+  use single_trajectory, only: begin_trajectory, conclude, end_of_phase, &
+    trajectory_state_t, ends_converged, go_past_event, go_to_stop, &
     outcome_t, pass_stop, phase_extension, phase_over, phase_window, run_trajectory, sections_ahead, span_t
   use work_watch, only: watch_t
   use, intrinsic :: iso_fortran_env, only: int64
@@ -99,10 +100,10 @@ contains
     call open_lanes(ensemble%moving, lanes)
     call set_regions(ensemble%moving, catalogue, lanes)
     next = 1
-    call load_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%structures, outcomes)
+    call load_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%bodies, outcomes)
     do while (any(slots%start > 0))
       call advance_lanes(ensemble%flow, lanes)
-      call service_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%structures, outcomes)
+      call service_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%bodies, outcomes)
     end do
   end subroutine run_trajectories
 
@@ -199,7 +200,7 @@ contains
     type(outcome_t), intent(inout) :: outcomes(:)
     logical, intent(inout) :: stop_now
     class(watch_t), intent(inout), optional :: watch
-    type(structure_batch_t), allocatable :: none
+    type(lane_bodies_t) :: none
     logical :: enough
     integer :: k
     part%away = .false.
@@ -227,38 +228,38 @@ contains
   end subroutine service_part
 
   !> The first starts of a batch.
-  pure subroutine load_all(ensemble, catalogue, starts, next, slots, batch, structures, outcomes)
+  pure subroutine load_all(ensemble, catalogue, starts, next, slots, batch, bodies, outcomes)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(inout) :: next
     type(slot_t), intent(inout) :: slots(:)
     type(lane_batch_t), intent(inout) :: batch
-    type(structure_batch_t), allocatable, intent(inout) :: structures
+    type(lane_bodies_t), intent(inout) :: bodies
     type(outcome_t), intent(inout) :: outcomes(:)
     integer :: lane
     do lane = 1, lane_count
-      call load_slot(ensemble, catalogue, starts, lane, next, slots(lane), batch, structures, outcomes)
+      call load_slot(ensemble, catalogue, starts, lane, next, slots(lane), batch, bodies, outcomes)
     end do
   end subroutine load_all
 
   !> The lanes of a batch that has been flown: those that have stopped or are left, and the next starts.
-  pure subroutine service_all(ensemble, catalogue, starts, next, slots, batch, structures, outcomes)
+  pure subroutine service_all(ensemble, catalogue, starts, next, slots, batch, bodies, outcomes)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     integer, intent(inout) :: next
     type(slot_t), intent(inout) :: slots(:)
     type(lane_batch_t), intent(inout) :: batch
-    type(structure_batch_t), allocatable, intent(inout) :: structures
+    type(lane_bodies_t), intent(inout) :: bodies
     type(outcome_t), intent(inout) :: outcomes(:)
     integer :: lane
     do lane = 1, lane_count
       if (slots(lane)%start == 0 .or. batch%status(lane) < 0.5_wp*(lane_flying + lane_stopped)) cycle
-      call service(ensemble, catalogue, starts(:, slots(lane)%start), lane, slots(lane), batch, structures, &
+      call service(ensemble, catalogue, starts(:, slots(lane)%start), lane, slots(lane), batch, bodies, &
                   outcomes(slots(lane)%start))
       if (slots(lane)%trajectory%phase == phase_over) call load_slot(ensemble, catalogue, starts, lane, next, slots(lane), &
-                                                                  batch, structures, outcomes)
+                                                                  batch, bodies, outcomes)
     end do
   end subroutine service_all
 
@@ -270,7 +271,7 @@ contains
   end function block_size
 
   !> Puts the next start into a lane; a start that comes to its end in the event loop is done at once.
-  pure subroutine load_slot(ensemble, catalogue, starts, lane, next, slot, batch, structures, outcomes)
+  pure subroutine load_slot(ensemble, catalogue, starts, lane, next, slot, batch, bodies, outcomes)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
@@ -278,7 +279,7 @@ contains
     integer, intent(inout) :: next
     type(slot_t), intent(inout) :: slot
     type(lane_batch_t), intent(inout) :: batch
-    type(structure_batch_t), allocatable, intent(inout) :: structures
+    type(lane_bodies_t), intent(inout) :: bodies
     type(outcome_t), intent(inout) :: outcomes(:)
     do while (next <= size(starts, 2))
       slot%start = next
@@ -289,8 +290,8 @@ contains
         call go_on(ensemble, catalogue, start, slot, outcome)
       end associate
       if (slot%trajectory%phase /= phase_over) then
-        call put_into_lane(ensemble%moving, ensemble%flow, lane, slot%trajectory, .true., batch, structures)
-        call send_on(ensemble, catalogue, slot%trajectory, outcomes(slot%start), lane, batch)
+        call put_into_lane(ensemble%moving, ensemble%flow, lane, slot%trajectory, .true., batch, bodies)
+        call send_on(ensemble, catalogue, slot%trajectory, outcomes(slot%start), lane, batch, bodies)
         return
       end if
     end do
@@ -316,15 +317,17 @@ contains
   end subroutine set_regions
 
   !> Sets where a lane stops: at every section where a motion may have settled in a family of which lanes do not know.
-  pure subroutine send_on(ensemble, catalogue, trajectory, outcome, lane, batch)
+  pure subroutine send_on(ensemble, catalogue, trajectory, outcome, lane, batch, bodies)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     type(trajectory_state_t), intent(in) :: trajectory
     type(outcome_t), intent(in) :: outcome
     integer, intent(in) :: lane
     type(lane_batch_t), intent(inout) :: batch
+    type(lane_bodies_t), intent(inout) :: bodies
     type(options_t) :: options
     batch%until(lane) = trajectory%until
+    call set_clock(bodies, lane, trajectory%since, end_of_phase(ensemble%span, trajectory%phase))
     batch%sections(lane) = sections_ahead(ensemble%moving, ensemble%span, trajectory)
     if (trajectory%phase == phase_extension .and. any(catalogue%any_position)) batch%sections(lane) = 0
     options = ensemble%moving%options()
@@ -336,14 +339,14 @@ contains
   end subroutine send_on
 
   !> A lane that has stopped, or is left to the event loop up to where a lane can take the trajectory again.
-  pure subroutine service(ensemble, catalogue, start, lane, slot, batch, structures, outcome)
+  pure subroutine service(ensemble, catalogue, start, lane, slot, batch, bodies, outcome)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: start(:)
     integer, intent(in) :: lane
     type(slot_t), intent(inout) :: slot
     type(lane_batch_t), intent(inout) :: batch
-    type(structure_batch_t), allocatable, intent(inout) :: structures
+    type(lane_bodies_t), intent(inout) :: bodies
     type(outcome_t), intent(inout) :: outcome
     type(options_t) :: options
     logical :: slipped, left, taken
@@ -353,12 +356,15 @@ contains
       trajectory%elapsed = batch%elapsed(lane)
       trajectory%converged = nint(batch%reached(lane))
       outcome%settle_time = batch%settled(lane)
-      call take_from_lane(ensemble%moving, lane, batch, structures, trajectory%section_state_t, trajectory%tally)
+      call take_from_lane(ensemble%moving, lane, batch, bodies, trajectory%section_state_t, trajectory%tally)
+      call take_clock(bodies, batch, lane, trajectory%since, trajectory%until)
       if (.not. (left .or. abs(trajectory%state%x) <= options%domain)) trajectory%reason = reason_left_domain
       taken = .false.
       if (left .and. trajectory%reason == 0) then
         if (ensemble%flow%resumes) call go_past_events(ensemble, trajectory, taken)
-        if (trajectory%reason == 0 .and. .not. taken) call go_to_stop(ensemble%moving, trajectory, slipped)
+        if (trajectory%reason == 0 .and. .not. (taken .or. trajectory%passed)) then
+          call go_to_stop(ensemble%moving, trajectory, slipped)
+        end if
       end if
       if (.not. taken) call pass_stop(ensemble%moving, catalogue, ensemble%span, trajectory%tally%slips > slot%slips, &
                                       trajectory, outcome)
@@ -370,8 +376,8 @@ contains
       end if
       slot%unseen = slot%unseen .or. trajectory%phase == phase_window
       batch%status(lane) = lane_flying
-      if (taken) call put_into_lane(ensemble%moving, ensemble%flow, lane, trajectory, .false., batch, structures)
-      call send_on(ensemble, catalogue, trajectory, outcome, lane, batch)
+      if (taken) call put_into_lane(ensemble%moving, ensemble%flow, lane, trajectory, .false., batch, bodies)
+      call send_on(ensemble, catalogue, trajectory, outcome, lane, batch, bodies)
     end associate
   end subroutine service
 
@@ -385,8 +391,9 @@ contains
     do while (.not. taken .and. trajectory%state%time < trajectory%until)
       call go_past_event(ensemble%moving, ensemble%flow%slowest, trajectory)
       if (trajectory%reason /= 0) return
+      if (trajectory%passed) exit
       taken = trajectory%state%time < trajectory%until .and. flies(ensemble, trajectory)
-      if (.not. allocated(ensemble%flow%structure)) exit
+      if (.not. (allocated(ensemble%flow%structure) .or. allocated(ensemble%flow%tape))) exit
     end do
   end subroutine go_past_events
 
@@ -397,11 +404,18 @@ contains
     real(wp), intent(in) :: start(:)
     type(slot_t), intent(inout) :: slot
     type(outcome_t), intent(inout) :: outcome
-    logical :: slipped
+    logical :: slipped, taken
     associate (trajectory => slot%trajectory)
+      slot%slips = trajectory%tally%slips
       do while (trajectory%phase /= phase_over .and. .not. flies(ensemble, trajectory))
-        call go_to_stop(ensemble%moving, trajectory, slipped)
-        call pass_stop(ensemble%moving, catalogue, ensemble%span, slipped, trajectory, outcome)
+        if (allocated(ensemble%flow%tape)) then
+          trajectory%passed = .false.
+          call go_past_events(ensemble, trajectory, taken)
+          if (taken) exit
+        end if
+        if (trajectory%reason == 0 .and. .not. trajectory%passed) call go_to_stop(ensemble%moving, trajectory, slipped)
+        call pass_stop(ensemble%moving, catalogue, ensemble%span, trajectory%tally%slips > slot%slips, trajectory, outcome)
+        slot%slips = trajectory%tally%slips
       end do
       slot%unseen = slot%unseen .or. trajectory%phase == phase_window
       slot%slips = trajectory%tally%slips

@@ -22,6 +22,7 @@ module motor_equations
   use restoring_law, only: restoring_of, restoring_t
   use series_flight, only: flight_t, guard_t, set_branches, start_flight
   use status, only: exit_bad_case, exit_internal
+  use tape_series, only: prepare_series, series_t
   use tape_value, only: evaluate
   use text, only: to_text
   implicit none
@@ -41,6 +42,8 @@ module motor_equations
   integer, parameter, public :: both_move = 1, body_held = 2, crank_held = 3, both_held = 4
   character(len=*), parameter :: suffix(4) = [character(len=12) :: '', '_body_held', '_crank_held', '_both_held']
 
+  !> Terms that decide which way a motion from rest goes.
+  integer, parameter :: low_order = 8
   !> Stops that are not there [m]: bounds of their guards stay finite.
   real(wp), parameter :: far = 1e30_wp
 
@@ -50,6 +53,8 @@ module motor_equations
     integer :: variables = 4
     !> A motion per mode, without and with work, dry and viscous losses [J] as three further states.
     type(flight_t) :: flights(4, 0:1)
+    !> Room for the first Taylor coefficients of everything in a mode.
+    type(series_t) :: low(4)
     real(wp) :: mass = 1, stiffness = 0, free_length = 0
     type(friction_t) :: friction
     type(contact_t) :: contact
@@ -336,6 +341,8 @@ contains
         rates(v_at) = zero
         if (.not. is_held(mode)) rates(v_at) = node_of(sheet, 'v_rate'//trim(suffix(mode)))
         if (system%variables == y_at) rates(y_at) = node_of(sheet, 'y_rate')
+        call prepare_series(sheet%tape, low_order, rates, [guards%node, system%torque, system%load, system%foot, system%inertia], &
+                            [integer ::], system%low(mode))
         do kept = 0, 1
           call start_flight(system%flights(mode, kept), sheet%tape, [rates, powers(:3*kept)], guards, sheet%parameters)
           call set_branches(system%flights(mode, kept), [integer ::])

@@ -47,7 +47,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call build_motor_equations(choices, moving%system, error)
     moving%options = options
-    moving%options%lane_width = 0
   end subroutine prepare_motor
 
   !> A body at `x` [m], `v` [m/s], the crank at `angle` [rad] with `speed` [rad/s], current [A] or integral `y`.
@@ -70,8 +69,8 @@ contains
   end subroutine start_motor
 
   !> Moves to `time_end` [s], or only to the next section, the crank passing through zero upwards, `at_section` then being true.
-  !> `reason` stays 0 unless the motion had to be given up.
-  pure subroutine advance_motor(moving, state, crank, time_end, at_section, tally, reason, log)
+  !> `reason` stays 0 unless the motion had to be given up. With `one_event` it ends after the next event.
+  pure subroutine advance_motor(moving, state, crank, time_end, at_section, tally, reason, log, one_event)
     type(motor_motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
     type(motor_state_t), intent(inout) :: crank
@@ -80,6 +79,7 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
+    logical, intent(in), optional :: one_event
     type(flight_t) :: flight
     real(wp) :: before
     integer :: idle
@@ -106,6 +106,7 @@ contains
       if (reason /= 0) return
       at_section = passed .and. stops
       if (at_section) return
+      if (present(one_event)) return
     end do
   end subroutine advance_motor
 

@@ -8,14 +8,12 @@ module motor_rest
   use motor_equations, only: body_held, both_held, both_move, crank_held, motor_system_t
   use motor_state, only: motor_state_t
   use series_flight, only: flight_t
-  use tape_series, only: expand, prepare_series, series_t
+  use tape_series, only: expand, series_t
   implicit none
   private
 
   public :: choose_body, choose_crank, equation_mode, slips, state_vector, chatter_dies_out, low_series, zero_order
 
-  !> Terms that decide which way a motion from rest goes.
-  integer, parameter, public :: low_order = 8
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
   real(wp), parameter :: chatter_uniformity = 1e-6_wp, unflown_uniformity = 0.5_wp
@@ -56,11 +54,8 @@ contains
     parameters = system%sheet%parameters
     parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
     parameters(system%turning) = crank%turning
-    associate (flight => system%flights(mode, 0))
-      call prepare_series(flight%tape, low_order, flight%rates, &
-                          [flight%guards%node, system%torque, system%load, system%foot, system%inertia], [integer ::], series)
-      call expand(flight%tape, state_vector(system, state, crank), parameters, series, fault)
-    end associate
+    series = system%low(mode)
+    call expand(system%flights(mode, 0)%tape, state_vector(system, state, crank), parameters, series, fault)
   end subroutine low_series
 
   !> Order of the zero of a rate's integral that is zero now: `c` are coefficients of the rate, `rounding` that of the first.

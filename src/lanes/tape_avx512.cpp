@@ -1,0 +1,7 @@
+// SPDX-FileCopyrightText: The Separatrix developers
+// SPDX-License-Identifier: GPL-3.0-or-later
+
+// The kernel for tapes on processors with AVX-512.
+#include "tape_kernel.hpp"
+
+SEPARATRIX_TAPE_KERNEL(separatrix_fly_tape_avx512)
