@@ -17,10 +17,11 @@ module series_flight
   use tape, only: tape_t
   use tape_bounds, only: bound_coefficients
   use tape_series, only: expand, prepare_series, series_t
+  use tape_value, only: starting_branches
   implicit none
   private
 
-  public :: start_flight, set_branches, advance_flight
+  public :: start_flight, set_branches, change_branches, advance_flight
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
   !> proven; at the budget of steps; at its start, whose branches are not those of the state.
@@ -115,6 +116,26 @@ contains
       end if
     end do
   end subroutine set_branches
+
+  !> Goes on with the other branch of the switching functions that crossed at the end, and with those that their sign there gives
+  !> of functions that were in no branch before.
+  pure subroutine change_branches(flight)
+    type(flight_t), intent(inout) :: flight
+    integer :: branches(size(flight%series%branches)), k, own
+    logical :: watched(size(flight%guards) - size(flight%series%branches))
+    own = size(watched)
+    watched = flight%is_active(:own)
+    call starting_branches(flight%tape, flight%state, flight%parameters, branches)
+    do k = 1, size(branches)
+      if (flight%crossed(own + k)) then
+        branches(k) = -flight%series%branches(k)
+      else if (flight%is_active(own + k) .or. branches(k) == 0) then
+        branches(k) = flight%series%branches(k)
+      end if
+    end do
+    call set_branches(flight, branches)
+    flight%is_active(:own) = watched
+  end subroutine change_branches
 
   !> Moves on to the time `until`, or to the first crossing of a guard. `status` states how it ended.
   pure subroutine advance_flight(flight, until, status)
