@@ -13,8 +13,8 @@ module own_machine
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: append_word, log_t, options_t, tally_t, word_period
   use motor_machine, only: motor_machine_t
-  use motor_motion, only: advance_motor, prepare_motor, start_own
-  use motor_system, only: phi_at
+  use motor_motion, only: advance_motor, check_hold, prepare_motor, start_own
+  use motor_system, only: w_at
   use section_size, only: most_coordinates
   use status, only: reason_time_over
   use tape_value, only: evaluate
@@ -127,7 +127,7 @@ contains
       allocate (value(system%sheet%tape%count), fault(system%sheet%tape%count))
       do i = 1, angles
         z = 0
-        z(phi_at) = i*system%period/angles
+        z(:w_at) = [system%period, two_pi]*i/angles
         call evaluate(system%sheet%tape, z, system%sheet%parameters, value, fault)
         force = max(force, abs(value(system%rest_friction)) + sum(abs(value(system%forces))))
         stiffness = max(stiffness, -value(system%force_slope))
@@ -272,6 +272,7 @@ contains
     call self%advance(section, self%period, tally, reason, log)
     if (reason /= 0) return
     section%state%time = 0
+    call check_hold(self%motor%system, section%state, section%motor, log)
     if (self%motor%system%aperiodic) section%motor%phi = section%motor%phi + self%period
     call append_word(tally, word_period)
     if (present(log)) then

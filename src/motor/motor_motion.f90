@@ -29,7 +29,7 @@ module motor_motion
   implicit none
   private
 
-  public :: prepare_motor, start_motor, start_own, advance_motor
+  public :: prepare_motor, start_motor, start_own, advance_motor, check_hold
 
   !> Events without progress in time after which a motion is given up.
   integer, parameter :: most_idle_events = 32
@@ -164,9 +164,11 @@ contains
       call advance_flight(flight, until, status)
       call take_state(moving%system, flight, state, crank, log)
       if (status == flight_crossed) then
-        if (flight%crossed(guard_fastest)) tally%v_max = max(tally%v_max, state%v)
+        tally%v_max = max(tally%v_max, state%v)
         if (any(flight%crossed(:guard_fastest - 1))) exit
         call pass_switches(flight, at_switch, idle, status)
+        ! A jump of the forces may release what was held.
+        if (any(flight%crossed(guard_count + 1:)) .and. .not. slips(state%mode)) exit
       end if
       if (flight%steps > moving%options%step_budget) status = flight_step_budget
       if (status == flight_reached .and. until >= time_end) exit
@@ -211,7 +213,7 @@ contains
     n = system%variables
     state%time = flight%time
     if (.not. system%clock) crank%phi = flight%state(1)
-    crank%w = flight%state(2)
+    if (.not. system%clock) crank%w = flight%state(2)
     state%x = flight%state(3)
     state%v = flight%state(4)
     crank%own(:n - 4) = flight%state(5:n)
@@ -255,6 +257,7 @@ contains
         call release(merge(mode_slip_plus, mode_slip_minus, crossed(guard_body_up)), state, crank, log)
       end if
       if (any(crossed) .and. system%moment > 0) call check_holds(system, state, crank, log)
+      if (any(crossed(guard_count + 1:))) call check_hold(system, state, crank, log)
     end associate
   end subroutine do_events
 
@@ -264,13 +267,22 @@ contains
     type(state_t), intent(inout) :: state
     type(motor_state_t), intent(inout) :: crank
     type(log_t), intent(inout), optional :: log
-    type(state_t) :: free
     if (crank%turning == 0) call choose_crank(system, state, crank)
+    call check_hold(system, state, crank, log)
+  end subroutine check_holds
+
+  !> What holds the body may not do so where a force has jumped.
+  pure subroutine check_hold(system, state, crank, log)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: free
     if (slips(state%mode)) return
     free = state
     call choose_body(system, free, crank)
     if (slips(free%mode)) call release(free%mode, state, crank, log)
-  end subroutine check_holds
+  end subroutine check_hold
 
   !> Friction or a stop no longer holds the body.
   pure subroutine release(mode, state, crank, log)

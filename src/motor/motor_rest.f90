@@ -3,6 +3,7 @@
 
 !> Body and crank at zero velocity: which way each goes on, and how a sequence of ever smaller impacts ends.
 module motor_rest
+  use constants, only: two_pi
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, state_t
   use motor_system, only: body_held, both_held, both_move, crank_held, guard_body_down, guard_body_up, motor_system_t, &
@@ -44,7 +45,8 @@ contains
     real(wp) :: z(system%variables)
     real(wp) :: all(4 + most_own)
     all = [crank%phi, crank%w, state%x, state%v, crank%own]
-    if (system%clock) all(1) = crank%phi + state%time
+    if (system%clock) all(:2) = [crank%phi + state%time, 0.0_wp]
+    if (system%clock .and. system%period > 0) all(2) = state%time*two_pi/system%period
     z = all(:system%variables)
   end function state_vector
 

@@ -48,7 +48,7 @@ module motor_system
     integer :: torque = 0, load = 0, foot = 0, foot_slope = 0, kinetic = 0, energy = 0, inertia = 0, inertia_slope = 0, current = 0
     !> Nodes, by mode: what holds the body [N] and the crank [N m] or would if they were at rest.
     integer :: body_hold(4) = 0, crank_hold(4) = 0
-    !> The first variable is the time, the second one has no meaning: nothing is driven by a motor.
+    !> Nothing is driven by a motor: the first variable is the time [s], the second one the phase [rad].
     logical :: clock = .false.
     !> Without a motor: time from section to section [s], none if it is 0; whether forces depend on the time without any period.
     real(wp) :: period = 0

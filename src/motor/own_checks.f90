@@ -3,11 +3,12 @@
 
 !> What must hold of equations by expressions before they move, and the size of their forces.
 module own_checks
+  use constants, only: two_pi
   use equation_sheet, only: node_of, parameter_number
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: force_family, law_choice_t, own_law, path_of, state_family
-  use motor_system, only: motor_system_t, phi_at, x_at
+  use motor_system, only: motor_system_t, phi_at, w_at, x_at
   use own_names, only: depends_on
   use status, only: exit_bad_case
   use tape_value, only: evaluate
@@ -32,7 +33,7 @@ contains
     largest = 0
     do i = 0, points - 1
       z = 0
-      z(phi_at) = merge(system%period, 1.0_wp, system%period > 0)*i/points
+      z(:w_at) = [merge(system%period, 1.0_wp, system%period > 0), two_pi]*i/points
       call evaluate(system%sheet%tape, z, system%sheet%parameters, value, fault)
       largest = max(largest, sum(abs(value(system%forces))) + abs(value(system%rest_friction)))
     end do
@@ -110,7 +111,7 @@ contains
     do i = 0, points - 1
       z = 0
       z(x_at:) = modulo(i*0.618_wp, 1.0_wp) - 0.5_wp
-      z(phi_at) = system%period*(i + 0.318_wp)/points
+      z(:w_at) = [system%period, two_pi]*(i + 0.318_wp)/points
       call evaluate(system%sheet%tape, z, system%sheet%parameters, now, fault)
       z(phi_at) = z(phi_at) + system%period
       call evaluate(system%sheet%tape, z, system%sheet%parameters, later, fault_later)

@@ -4,7 +4,7 @@
 !> One body whose forces, states, friction, restitution or drive are expressions of the case, as equations on one tape:
 !>   m x'' = c (l0 + x_A(t) - x) + forces(x, x', t, states) - F(|x'|) sgn x',   states' = rates(x, x', t, states).
 !> Laws of the catalogue stand beside expressions. The time is a variable: it is counted from the section where a drive has a
-!> period, else from the start.
+!> period, else from the start. So is the phase, from 0 to 2 pi over a period.
 module own_equations
   use constants, only: two_pi
   use contact_law, only: contact_of
@@ -12,7 +12,6 @@ module own_equations
   use equation_sheet, only: add_node, add_optional, add_parameter, add_variable, define, define_slope, new_sheet, node_of, &
     parameter_number
   use errors, only: error_t, fail
-  use friction_law, only: friction_of
   use kinds, only: wp
   use law_table, only: effect_family, force_family, law_choice_t, own_law, path_of, state_family, text_of, value_of
   use motor_choices, only: number_of_family
@@ -20,11 +19,10 @@ module own_equations
   use motor_system, only: far, motor_system_t
   use own_checks, only: check_period, check_values, set_scales
   use own_flights, only: add_own_flights
+  use own_friction, only: add_friction, add_restitution
   use own_names, only: add_known, add_parameters, depends_on, names_t, new_names, read_own
   use restoring_law, only: restoring_of, restoring_t
   use status, only: exit_bad_case, exit_internal
-  use tape, only: constant
-  use tape_algebra, only: choice
   use tape_value, only: evaluate
   use text, only: to_text
   implicit none
@@ -118,7 +116,7 @@ contains
     associate (sheet => system%sheet)
       call new_sheet(sheet)
       call add_variable(sheet, 't')
-      call add_variable(sheet, 'w')
+      call add_variable(sheet, 'phase')
       call add_variable(sheet, 'x')
       call add_variable(sheet, 'v')
       do i = 1, 3
@@ -167,7 +165,6 @@ contains
     associate (sheet => system%sheet)
       if (system%period > 0) then
         call add_parameter(sheet, 'clock_speed', two_pi/system%period)
-        call define(sheet, 'phase', 't*clock_speed')
         call add_known(names, 'phase', node_of(sheet, 'phase'))
       end if
       if (text_of(choices(at), 'position') /= '') then
@@ -186,7 +183,7 @@ contains
       else
         call define(sheet, 'foot', '0')
       end if
-      if (.not. allocated(error)) call define_slope(sheet, 'foot_rate', 'foot', 't')
+      if (.not. system%period > 0) call define(sheet, 'clock_speed', '0')
     end associate
   end subroutine add_drive
 
@@ -307,74 +304,6 @@ contains
     end associate
   end subroutine add_forces
 
-  !> Friction of a slipping body, and what holds it at rest.
-  pure subroutine add_friction(choices, at, system, names, error)
-    type(law_choice_t), intent(in) :: choices(:)
-    integer, intent(in) :: at
-    type(motor_system_t), intent(inout) :: system
-    type(names_t), intent(in) :: names
-    type(error_t), allocatable, intent(out) :: error
-    type(names_t) :: over_speed
-    integer :: node, zero, held
-    associate (sheet => system%sheet)
-      call define(sheet, 'speed', 'slip*v')
-      call constant(sheet%tape, 0.0_wp, zero)
-      if (choices(at)%name == own_law) then
-        over_speed = names
-        call add_known(over_speed, 'speed', node_of(sheet, 'speed'))
-        call read_own(over_speed, choices, at, 'force', sheet, node, error)
-        if (allocated(error)) return
-        call add_node(sheet, 'resistance', node)
-        over_speed%nodes(size(over_speed%nodes)) = zero
-        call read_own(over_speed, choices, at, 'force', sheet, node, error)
-        if (allocated(error)) return
-        held = node
-        ! A friction that pushes holds nothing.
-        if (.not. sheet%tape%nodes(node)%is_steady) call choice(sheet%tape, node, 1, node, zero, held)
-        call add_node(sheet, 'rest', held)
-        call define(sheet, 'viscous', '0')
-      else
-        system%friction = friction_of(choices(at), system%mass*value_of(choices(number_of_family(choices, 'body')), 'gravity'))
-        call add_catalogue_friction(system)
-      end if
-      call define(sheet, 'dry', 'slip*resistance')
-      call define(sheet, 'friction', 'dry + viscous*v')
-      call define(sheet, 'static', 'rest + least')
-      system%rest_friction = node_of(sheet, 'rest')
-    end associate
-  end subroutine add_friction
-
-  pure subroutine add_catalogue_friction(system)
-    type(motor_system_t), intent(inout) :: system
-    associate (sheet => system%sheet, law => system%friction)
-      call add_optional(sheet, 'kinetic', law%kinetic)
-      call add_parameter(sheet, 'excess', law%excess)
-      call add_parameter(sheet, 'stribeck_velocity', law%stribeck_velocity)
-      call add_optional(sheet, 'viscous', law%damping)
-      call add_optional(sheet, 'rest', law%break_away)
-      if (law%excess > 0) then
-        call define(sheet, 'resistance', 'kinetic + excess*exp(-(speed/stribeck_velocity)^'// &
-                    to_text(nint(law%stribeck_exponent))//')')
-      else
-        call define(sheet, 'resistance', 'kinetic')
-      end if
-    end associate
-  end subroutine add_catalogue_friction
-
-  !> Restitution over the impact speed.
-  pure subroutine add_restitution(choices, at, system, names, error)
-    type(law_choice_t), intent(in) :: choices(:)
-    integer, intent(in) :: at
-    type(motor_system_t), intent(inout) :: system
-    type(names_t), intent(in) :: names
-    type(error_t), allocatable, intent(out) :: error
-    type(names_t) :: over_speed
-    if (choices(at)%name /= own_law) return
-    over_speed = names
-    call add_known(over_speed, 'speed', node_of(system%sheet, 'speed'))
-    call read_own(over_speed, choices, at, 'restitution', system%sheet, system%restitution, error)
-  end subroutine add_restitution
-
   !> Accelerations, powers and energies, and what they depend on.
   pure subroutine add_motion(system)
     type(motor_system_t), intent(inout) :: system
@@ -386,7 +315,8 @@ contains
       call define(sheet, 'kinetic_energy', 'mass*v^2/2')
       call define(sheet, 'work', 'forces*v')
       call define_slope(sheet, 'stored_slope', 'stored', 't')
-      call define(sheet, 'power', 'work + stored_slope')
+      call define_slope(sheet, 'stored_over_phase', 'stored', 'phase')
+      call define(sheet, 'power', 'work + stored_slope + stored_over_phase*clock_speed')
       call define(sheet, 'dry_loss', 'dry*v')
       call define(sheet, 'viscous_loss', 'viscous*v^2')
       call define(sheet, 'energy', 'kinetic_energy + stored')

@@ -5,7 +5,7 @@
 module own_flights
   use equation_sheet, only: define, node_of
   use motor_system, only: body_held, both_move, guard_body_down, guard_body_up, guard_count, guard_fastest, guard_lower, &
-    guard_turning, guard_upper, motor_system_t, phi_at, v_at, x_at
+    guard_turning, guard_upper, motor_system_t, phi_at, v_at, w_at, x_at
   use series_flight, only: guard_t, start_flight
   use text, only: to_text
   implicit none
@@ -26,6 +26,7 @@ contains
       do mode = both_move, body_held
         rates = node_of(sheet, 'zero')
         rates(phi_at) = node_of(sheet, 'one')
+        rates(w_at) = node_of(sheet, 'clock_speed')
         if (mode == both_move) then
           rates(x_at) = node_of(sheet, 'v')
           rates(v_at) = node_of(sheet, 'v_rate')

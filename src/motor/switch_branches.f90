@@ -34,10 +34,13 @@ contains
     if (size(branches) == 0) return
     nodes = flight%tape%switches%argument
     call evaluate(flight%tape, z, parameters, value, faults)
+    branches = merge(1, -1, value(nodes) >= 0)
+    call prepare_series(flight%tape, low_order, flight%rates, nodes, branches, series)
+    call expand(flight%tape, z, parameters, series, fault)
     do k = 1, size(branches)
-      least = 16*epsilon(1.0_wp)*size_of(flight%tape, value, nodes(k))
-      zeros(k) = merge(1, 0, abs(value(nodes(k))) <= least)
-      branches(k) = merge(1, -1, value(nodes(k)) >= 0)
+      ! Rounding of its terms, and of the time at which it crossed zero.
+      least = size_of(flight%tape, value, nodes(k)) + abs(series%c(1, nodes(k))*z(1))
+      zeros(k) = merge(1, 0, abs(value(nodes(k))) <= 16*epsilon(1.0_wp)*least)
     end do
     if (all(zeros == 0)) return
     do try = 1, 2*size(branches) + 2
