@@ -23,7 +23,7 @@ module own_reader
   character(len=*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ', &
     name_letters = letters//'0123456789_'
   !> Names that mean something else in an expression.
-  character(len=*), parameter :: taken(7) = [character(len=5) :: 'x', 'v', 't', 'phase', 'speed', 'pi', 'w']
+  character(len=*), parameter :: taken(6) = [character(len=5) :: 'x', 'v', 't', 'phase', 'speed', 'pi']
 
 contains
 

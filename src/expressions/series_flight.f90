@@ -31,6 +31,8 @@ module series_flight
   !> The last term of a step is then some epsilon of the first.
   integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
   integer, parameter :: most_tries = 200
+  !> Steps in which the time does not change, after which a motion into a pole is given up.
+  integer, parameter :: most_idle_steps = 100
   !> Shortest step, as a part of the time.
   real(wp), parameter :: shortest = 0.01_wp*epsilon(1.0_wp)
 
@@ -142,9 +144,10 @@ contains
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: until
     integer, intent(out) :: status
-    real(wp) :: step, fraction, longest
-    integer :: i
+    real(wp) :: step, fraction, longest, before
+    integer :: i, idle
     flight%crossed = .false.
+    idle = 0
     do i = 1, flight%step_budget
       status = flight_reached
       if (flight%time >= until) return
@@ -157,10 +160,16 @@ contains
       call take_step(flight, longest, step, fraction, status)
       if (status == flight_no_progress .or. status == flight_left_domain) return
       flight%steps = flight%steps + 1
+      before = flight%time
       call move(flight, step*min(fraction, 1.0_wp))
+      idle = merge(0, idle + 1, flight%time > before)
       if (fraction > 1 .and. step >= longest) flight%time = until
       flight%zeros = merge(1, 0, flight%crossed)
       if (status == flight_crossed) return
+      if (idle >= most_idle_steps) then
+        status = flight_no_progress
+        return
+      end if
     end do
     status = flight_step_budget
   end subroutine advance_flight
