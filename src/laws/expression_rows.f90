@@ -8,12 +8,12 @@ module expression_rows
   private
 
   type(law_row_t), parameter, public :: expression_laws(*) = [ &
-    law_row_t('restoring', 'expression', 'force = "..." of x, v, t, phase, states', ''), &
-    law_row_t('friction', 'expression', 'force = "..." over speed = |v|, against v; its value at rest holds the body', ''), &
-    law_row_t('contact', 'expression', 'rigid barrier: restitution = "..." over the impact speed', ''), &
-    law_row_t('drive', 'expression', 'x_A = position = "..." over t, phase; period = time or "..."', ''), &
-    law_row_t('force', 'expression', 'force = "..." of x, v, t, phase, states; any number [force.NAME]', ''), &
-    law_row_t('state', 'expression', 'rate = "..." of x, v, t, phase, states; start = value; at most 8 [state.NAME]', '')]
+    law_row_t('restoring', 'expression', 'any force [N], an expression `force` of x, v, t, phase, states', ''), &
+    law_row_t('friction', 'expression', 'against v, an expression `force` of speed = |v|; its value at rest holds the body', ''), &
+    law_row_t('contact', 'expression', 'rigid barrier, an expression `restitution` of the impact speed', ''), &
+    law_row_t('drive', 'expression', 'x_A, an expression `position` of t, phase; `period`: a time or an expression', ''), &
+    law_row_t('force', 'expression', 'any force [N], an expression `force` of x, v, t, phase, states', ''), &
+    law_row_t('state', 'expression', 'at most 8, with an expression `rate` of x, v, t, phase, states, and a `start`', '')]
 
   type(parameter_row_t), parameter, public :: expression_parameters(*) = [ &
     parameter_row_t('contact', 'expression', 'upper', 'm', any_value, 'upper barrier', optional=.true., default=none_above), &

@@ -21,9 +21,9 @@ module reference_library
 
 contains
 
-  !> Runs `points` trajectories. Laws and effects: row in the law table of each, their texts (`pack_texts`), lengths and values of
-  !> their parameters one after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at convergence;
-  !> `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
+  !> Runs `points` trajectories. Laws and effects: row in the law table of each, their texts (`pack_texts`), lengths and values
+  !> of their parameters one after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at
+  !> convergence; `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
   !> Returns 0, or 1 if the machine cannot be built.
   integer(c_int) function separatrix_reference_run(law_count, law_rows, texts, lengths, values, flight, event_budget, numbers, &
       attractor_count, packed, points, starts, results) bind(c)
