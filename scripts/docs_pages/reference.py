@@ -14,7 +14,8 @@ MADE = "<!-- made by scripts/docs -->\n\n"
 
 FAMILIES = {
     "body": "Bodies", "restoring": "Restoring forces", "friction": "Friction", "contact": "Contacts",
-    "drive": "Drives", "part": "Parts of a machine of several bodies",
+    "drive": "Drives", "motor": "Motors", "force": "Forces by expressions", "state": "States by expressions",
+    "part": "Parts of a machine of several bodies",
 }  # fmt: skip
 TOOLS = (
     "separatrix-figures",
@@ -87,6 +88,8 @@ def _effects(laws: list[dict]) -> str:
 
 
 def _heading(law: dict) -> str:
+    if law["family"] in ("force", "state"):
+        return f"`[{law['family']}.NAME]`"
     if law["family"] != "part":
         return f'`{law["family"]}.law = "{law["law"]}"`'
     part, _, variant = law["law"].partition(":")

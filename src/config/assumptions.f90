@@ -6,7 +6,7 @@ module assumptions
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, find
   use kinds, only: wp
-  use law_table, only: law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_kind, &
+  use law_table, only: law_choice_t, list_of, parameter_row_t, rows_of, part_family, part_kind, &
     path_of, value_of
   use text, only: to_text
   implicit none
@@ -31,7 +31,7 @@ contains
     integer :: i, k
     text = ''
     do i = 1, size(laws)
-      rows = parameters_of(laws(i)%family, laws(i)%name)
+      rows = rows_of(laws(i))
       do k = 1, size(rows)
         if (.not. rows(k)%optional .or. .not. any(choices_of_physics == rows(k)%name)) cycle
         path = path_of(laws(i))//'.'//trim(rows(k)%name)

@@ -8,7 +8,7 @@ module case_echo
   use case_type, only: case_t, sample_t, sweep_t
   use grid, only: sample_axis
   use kinds, only: wp
-  use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, &
+  use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, rows_of, part_family, &
     part_kind, part_law, path_of, value_of
   use refinement, only: refine_t
   use motor_choices, only: has_motor
@@ -112,7 +112,7 @@ contains
     type(law_choice_t), intent(in) :: law, laws(:)
     character(len=:), allocatable :: text
     type(parameter_row_t), allocatable :: rows(:)
-    integer :: i
+    integer :: i, own
     text = ''
     if (law%name == 'point:row') return
     if (law%name /= 'point:watched') text = newline//'['//path_of(law)//']'//newline
@@ -124,13 +124,22 @@ contains
     else if (law%family /= effect_family .and. law%name /= 'structure') then
       text = text//line('law', quoted(trim(law%name)))
     end if
-    rows = parameters_of(law%family, law%name)
+    rows = rows_of(law)
+    own = size(rows)
+    if (allocated(law%own)) own = own - size(law%own)
+    if (allocated(law%texts)) then
+      do i = 1, size(law%texts)
+        text = text//line(trim(law%texts(i)%key), quoted(law%texts(i)%text))
+      end do
+    end if
     do i = 1, size(rows)
       if (law%family == part_family .and. is_hidden(rows(i))) cycle
       if (rows(i)%name == 'ratio' .and. has_motor(laws)) cycle
       associate (values => law%parameters(i)%values)
         if (rows(i)%list) then
           if (size(values) > 0 .or. law%family /= part_family) text = text//line(trim(rows(i)%name), reals(values))
+        else if (i > own .and. rows(i)%unit /= '1') then
+          text = text//line(trim(rows(i)%name), quoted(to_text(values(1))//' '//trim(rows(i)%unit)))
         else if (abs(values(1)) < huge(1.0_wp)) then
           text = text//line(trim(rows(i)%name), to_text(values(1)))
         end if

@@ -8,7 +8,7 @@ module case_parameters
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use kinds, only: wp
-  use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, parameters_of, &
+  use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, rows_of, &
     part_family, path_of, split_element
   use motor_choices, only: has_motor
   use part_angles, only: is_of_angle
@@ -52,7 +52,7 @@ contains
     call split_element(canonical_name(path), name, number)
     if (present(element)) element = max(number, 0)
     do i = 1, size(laws)
-      rows = parameters_of(laws(i)%family, laws(i)%name)
+      rows = rows_of(laws(i))
       do j = 1, size(rows)
         if (path_of(laws(i))//'.'//trim(rows(j)%name) /= name .or. is_hidden(rows(j))) cycle
         ! A motor sets the speed of the crank.
@@ -99,7 +99,7 @@ contains
       call find_parameter(laws, path, law, row)
       found = law > 0
       if (.not. found) return
-      rows = parameters_of(laws(law)%family, laws(law)%name)
+      rows = rows_of(laws(law))
       if (laws(law)%family == part_family) then
         bounds = row_bounds(rows(row), is_of_angle(laws, law))
       else
@@ -116,7 +116,7 @@ contains
     integer :: i, j
     names = ''
     do i = 1, size(laws)
-      rows = parameters_of(laws(i)%family, laws(i)%name)
+      rows = rows_of(laws(i))
       do j = 1, size(rows)
         if (is_hidden(rows(j)) .or. size(laws(i)%parameters(j)%values) == 0) cycle
         if (rows(j)%name == 'ratio' .and. has_motor(laws)) cycle

@@ -63,7 +63,8 @@ module case_type
     integer :: count = 1000, seed = 1
     !> The starts that are drawn: names, units, 'uniform' between `first` and `second` or 'normal' with mean and deviation.
     character(len=name_length), allocatable :: names(:)
-    character(len=8), allocatable :: units(:), kinds(:)
+    character(len=20), allocatable :: units(:)
+    character(len=8), allocatable :: kinds(:)
     real(wp), allocatable :: first(:), second(:)
     !> A row for each of them, a column for each point.
     real(wp), allocatable :: drawn(:, :)

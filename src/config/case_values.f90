@@ -20,7 +20,7 @@ module case_values
   type, public :: bounds_t
     real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
     logical :: lower_open = .false.
-    character(len=10) :: unit = '1'
+    character(len=20) :: unit = '1'
   end type bounds_t
 
 contains

@@ -12,12 +12,15 @@ module law_check
   use effect_check, only: refuse_effects
   use errors, only: error_t
   use motor_choices, only: has_motor
-  use motor_equations, only: build_motor_equations, motor_system_t
+  use motor_equations, only: build_motor_equations
+  use motor_system, only: motor_system_t
   use multibody, only: multibody_t
   use kinds, only: wp
-  use law_table, only: law_choice_t, list_of, value_of
+  use law_table, only: force_family, law_choice_t, list_of, state_family, value_of
   use lever_reach, only: check_assembly
   use oscillator, only: refuse_pair
+  use own_equations, only: build_own_equations
+  use own_names, only: has_own
   use pair, only: build_pair, is_pair, pair_t
   use restoring_law, only: position_is_angle
   use text, only: to_text
@@ -46,7 +49,8 @@ contains
     character(len=*), intent(in) :: at
     logical :: good(3), whole
     good = [is_good(source, ['friction']), is_good(source, ['contact']), is_good(source, ['drive'])]
-    whole = all(good) .and. is_good(source, ['body     ', 'restoring', 'effect   ', 'motor    '])
+    whole = all(good) .and. is_good(source, [character(len=9) :: 'body', 'restoring', 'effect', 'motor', &
+                                                                       force_family, state_family])
     if (good(1)) call check_friction(source, laws, at)
     if (good(2)) call check_barriers(source, laws, at)
     if (whole) call check_bodies(source, laws, at)
@@ -129,6 +133,8 @@ contains
     type(motor_system_t) :: system
     if (has_motor(laws)) then
       call build_motor_equations(laws, system, error)
+    else if (has_own(laws)) then
+      call build_own_equations(laws, system, error)
     else if (is_multibody(laws)) then
       if (.not. is_good(source, ['spring   ', 'structure'])) return
       call multibody_of(laws, multibody, error)

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables [body], [restoring], [friction], [contact], [drive] and [effect.NAME], read by the law table.
+!> The tables [body], [restoring], [friction], [contact], [drive], [motor] and [effect.NAME], read by the law table.
 module law_reader
   use case_parameters, only: find_parameter
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
@@ -9,10 +9,11 @@ module law_reader
   use drive_law, only: ends_with_its_first
   use force_record, only: read_force
   use kinds, only: wp
+  use own_reader, only: read_own_law, read_own_tables
   use part_names, only: is_table
   use part_reader, only: has_parts, read_parts
   use law_row, only: law_length
-  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, motor_family, &
+  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, motor_family, own_law, &
     parameter_row_t, parameters_of, set_value, table_of
   use pair_rows, only: pair_laws
   use restoring_law, only: position_is_angle
@@ -53,6 +54,7 @@ contains
     end do
     call resolve_static_friction(choices)
     call read_motor(source, choices)
+    call read_own_tables(source, choices)
     call read_effects(source, choices)
   end subroutine read_laws
 
@@ -129,6 +131,7 @@ contains
     else
       choice = law_choice(family, name)
       call read_parameters(source, is_angle, choice)
+      if (name == own_law) call read_own_law(source, choice)
     end if
   end subroutine read_law
 
@@ -138,6 +141,10 @@ contains
     logical :: of_two
     goes_with = .true.
     if (law == 'none' .or. len_trim(body) == 0) return
+    if (law == own_law) then
+      goes_with = body == 'point_mass'
+      return
+    end if
     of_two = any(pair_laws%family == family .and. pair_laws%name == law)
     if (body == 'point_mass') then
       goes_with = .not. of_two

@@ -6,7 +6,7 @@
 module sketch
   use case_type, only: case_t
   use kinds, only: wp
-  use law_table, only: effect_family, is_hidden, law_choice_t, parameter_row_t, parameters_of, part_family, part_kind, &
+  use law_table, only: effect_family, is_hidden, law_choice_t, parameter_row_t, rows_of, part_family, part_kind, &
     part_law, value_of
   use text, only: replace_all, to_text
   implicit none
@@ -154,7 +154,7 @@ contains
     character(len=:), allocatable :: words
     type(parameter_row_t), allocatable :: rows(:)
     integer :: i
-    rows = parameters_of(law%family, law%name)
+    rows = rows_of(law)
     words = ''
     do i = 1, size(rows)
       if (is_hidden(rows(i)) .or. rows(i)%name == 'x0' .or. rows(i)%name == 'v0') cycle

@@ -5,7 +5,7 @@
 !> 'drive.cosine[2]', 'effect.dahl.stiffness'.
 module parameter_list
   use kinds, only: wp
-  use law_table, only: change_parameter, law_choice_t, parameter_row_t, parameters_of, path_of, is_hidden
+  use law_table, only: change_parameter, law_choice_t, parameter_row_t, rows_of, path_of, is_hidden
   use text, only: to_text
   implicit none
   private
@@ -35,7 +35,7 @@ contains
     integer :: i, j, k
     allocate (list(0))
     do i = 1, size(laws)
-      rows = parameters_of(laws(i)%family, laws(i)%name)
+      rows = rows_of(laws(i))
       if (laws(i)%name == 'measured_force') cycle
       do j = 1, size(rows)
         if (is_hidden(rows(j))) cycle

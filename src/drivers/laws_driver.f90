@@ -6,9 +6,9 @@ module laws_driver
   use journal, only: json_text
   use kinds, only: wp
   use law_row, only: law_row_t
-  use law_table, only: effect_family, families, is_hidden, laws, motor_family, &
+  use law_table, only: effect_family, families, force_family, is_hidden, laws, motor_family, &
     parameter_row_t, parameters_of, part_family, part_kind, &
-    part_law, table_of
+    part_law, state_family, table_of
   use text, only: to_text
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none
@@ -22,7 +22,7 @@ contains
   subroutine run_laws(json)
     logical, intent(in) :: json
     character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: motor_family, &
-      part_family, effect_family]]
+      force_family, state_family, part_family, effect_family]]
     integer :: i, k
     logical :: first
     if (json) write (output_unit, '(a)') '['

@@ -17,10 +17,11 @@ module series_flight
   use tape, only: tape_t
   use tape_bounds, only: bound_coefficients
   use tape_series, only: expand, prepare_series, series_t
+  use tape_value, only: starting_branches
   implicit none
   private
 
-  public :: start_flight, set_branches, advance_flight
+  public :: start_flight, set_branches, change_branches, advance_flight
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
   !> proven; at the budget of steps; at its start, whose branches are not those of the state.
@@ -30,6 +31,8 @@ module series_flight
   !> The last term of a step is then some epsilon of the first.
   integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
   integer, parameter :: most_tries = 200
+  !> Steps in which the time does not change, after which a motion into a pole is given up.
+  integer, parameter :: most_idle_steps = 100
   !> Shortest step, as a part of the time.
   real(wp), parameter :: shortest = 0.01_wp*epsilon(1.0_wp)
 
@@ -116,14 +119,35 @@ contains
     end do
   end subroutine set_branches
 
+  !> Goes on with the other branch of the switching functions that crossed at the end, and with those that their sign there gives
+  !> of functions that were in no branch before.
+  pure subroutine change_branches(flight)
+    type(flight_t), intent(inout) :: flight
+    integer :: branches(size(flight%series%branches)), k, own
+    logical :: watched(size(flight%guards) - size(flight%series%branches))
+    own = size(watched)
+    watched = flight%is_active(:own)
+    call starting_branches(flight%tape, flight%state, flight%parameters, branches)
+    do k = 1, size(branches)
+      if (flight%crossed(own + k)) then
+        branches(k) = -flight%series%branches(k)
+      else if (flight%is_active(own + k) .or. branches(k) == 0) then
+        branches(k) = flight%series%branches(k)
+      end if
+    end do
+    call set_branches(flight, branches)
+    flight%is_active(:own) = watched
+  end subroutine change_branches
+
   !> Moves on to the time `until`, or to the first crossing of a guard. `status` states how it ended.
   pure subroutine advance_flight(flight, until, status)
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: until
     integer, intent(out) :: status
-    real(wp) :: step, fraction, longest
-    integer :: i
+    real(wp) :: step, fraction, longest, before
+    integer :: i, idle
     flight%crossed = .false.
+    idle = 0
     do i = 1, flight%step_budget
       status = flight_reached
       if (flight%time >= until) return
@@ -136,10 +160,16 @@ contains
       call take_step(flight, longest, step, fraction, status)
       if (status == flight_no_progress .or. status == flight_left_domain) return
       flight%steps = flight%steps + 1
+      before = flight%time
       call move(flight, step*min(fraction, 1.0_wp))
+      idle = merge(0, idle + 1, flight%time > before)
       if (fraction > 1 .and. step >= longest) flight%time = until
       flight%zeros = merge(1, 0, flight%crossed)
       if (status == flight_crossed) return
+      if (idle >= most_idle_steps) then
+        status = flight_no_progress
+        return
+      end if
     end do
     status = flight_step_budget
   end subroutine advance_flight

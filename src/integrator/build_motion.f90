@@ -14,6 +14,8 @@ module build_motion
   use motion_state, only: options_t
   use motor_choices, only: has_motor
   use motor_machine, only: motor_machine_t, prepare_motor_machine
+  use own_machine, only: own_machine_t, prepare_own_machine
+  use own_names, only: has_own
   use oscillator, only: build_oscillator, oscillator_t
   use pair, only: build_pair, is_pair, pair_t
   use pair_as_structure, only: structure_of_pair
@@ -33,9 +35,13 @@ contains
     type(body_machine_t) :: body
     type(multibody_machine_t) :: bodies
     type(motor_machine_t) :: driven
+    type(own_machine_t) :: own
     if (has_motor(laws)) then
       call prepare_motor_machine(laws, options, driven, error)
       if (.not. allocated(error)) allocate (machine, source=driven)
+    else if (has_own(laws)) then
+      call prepare_own_machine(laws, options, own, error)
+      if (.not. allocated(error)) allocate (machine, source=own)
     else if (has_several(laws)) then
       call bodies_of(laws, options, bodies, error)
       if (.not. allocated(error)) allocate (machine, source=bodies)
@@ -96,10 +102,14 @@ contains
     type(pair_t) :: pair
     type(multibody_t) :: multibody
     type(motor_machine_t) :: driven
+    type(own_machine_t) :: own
     period = 0
     if (has_motor(laws)) then
       call prepare_motor_machine(laws, options_t(), driven, error)
       if (.not. allocated(error)) period = driven%period
+    else if (has_own(laws)) then
+      call prepare_own_machine(laws, options_t(), own, error)
+      if (.not. allocated(error)) period = own%period
     else if (is_multibody(laws)) then
       call multibody_of(laws, multibody, error)
       if (.not. allocated(error)) period = multibody%period

@@ -13,9 +13,10 @@ module motor_machine
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: log_t, options_t, tally_t
   use motor_choices, only: start_of_motor
-  use motor_equations, only: foot_half_range, y_at
+  use motor_equations, only: foot_half_range
   use motor_log, only: add_sample, motor_energy
   use motor_motion, only: advance_motor, motor_motion_t, prepare_motor, start_motor
+  use motor_system, only: y_at
   use section_size, only: most_coordinates
   use status, only: reason_time_over
   implicit none
@@ -137,7 +138,7 @@ contains
     type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(section_state_t) :: section
-    section = self%start([before%state%x, before%state%v, angle, before%motor%w, before%motor%y])
+    section = self%start([before%state%x, before%state%v, angle, before%motor%w, before%motor%own(1)])
     ! What sticks stays so where both machines would hold it; the rest of the state has no memory.
     section%motor%turns = before%motor%turns
   end function resume
@@ -158,7 +159,7 @@ contains
     real(wp) :: point(most_coordinates)
     point = 0
     point(:3) = [section%state%x, section%state%v, section%motor%w]
-    if (self%coordinates() > 3) point(4) = section%motor%y
+    if (self%coordinates() > 3) point(4) = section%motor%own(1)
   end function point_of
 
   pure function scales(self, half_range)

@@ -8,7 +8,7 @@ module tape_preparation
   use intervals, only: interval_t
   use kinds, only: wp
   use lane_types, only: lane_flow_t
-  use motor_equations, only: body_held, both_move, motor_system_t
+  use motor_system, only: body_held, both_move, motor_system_t
   use equation_sheet, only: node_of
   use operations, only: op_add, op_constant, op_cos, op_divide, op_exp, op_log, op_multiply, op_negative, op_parameter, &
     op_sin, op_sqrt, op_square, op_subtract, op_variable, operation_table

@@ -61,6 +61,9 @@ contains
       return
     case ('newton')
       law%restitution = value_of(choice, 'restitution')
+    case ('expression')
+      ! Its restitution is an expression of the case.
+      law%restitution = 0
     case ('newton_linear')
       law%kind = contact_linear
       law%coefficients(1) = value_of(choice, 'slope')

@@ -9,6 +9,7 @@ module law_row
 
   !> Lengths of the names of families and laws.
   integer, parameter, public :: family_length = 9, law_length = 32
+  integer, parameter, public :: unit_length = 20
 
   real(wp), parameter, public :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
 
@@ -51,7 +52,7 @@ module law_row
     character(len=family_length) :: family
     character(len=law_length) :: law
     character(len=20) :: name
-    character(len=10) :: unit
+    character(len=unit_length) :: unit
     type(range_t) :: range
     character(len=88) :: meaning
     !> An optional parameter takes its default.

@@ -7,6 +7,7 @@
 module law_table
   use contact_rows, only: contact_laws, contact_parameters
   use effect_rows, only: effect_laws, effect_parameters
+  use expression_rows, only: expression_laws, expression_parameters
   use kinds, only: wp
   use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive, range_t, &
     zero_to_one
@@ -18,7 +19,8 @@ module law_table
   private
 
   public :: law_row_t, parameter_row_t
-  public :: find_law, law_names, parameters_of, table_of, path_of, part_kind, part_law, is_hidden, law_choice, value_of, list_of, &
+  public :: find_law, law_names, parameters_of, rows_of, text_of, table_of, path_of, part_kind, part_law, is_hidden, &
+    law_choice, value_of, list_of, &
     set_value, change_parameter, split_element, is_start_parameter
 
   !> The parts that a machine is composed of, one law each.
@@ -30,6 +32,10 @@ module law_table
 
   !> The motor of a drive whose power is limited: one law, or none.
   character(len=*), parameter, public :: motor_family = 'motor'
+
+  !> Forces on one body and its further states, given by expressions: any number of each, each with a name of its own. The law
+  !> by expressions of any family.
+  character(len=*), parameter, public :: force_family = 'force', state_family = 'state', own_law = 'expression'
 
   !> The parts of a machine of several bodies: any number of laws, each with a name of its own. Their laws are named
   !> 'table:law'.
@@ -44,13 +50,22 @@ module law_table
     real(wp), allocatable :: values(:)
   end type parameter_value_t
 
-  !> A law with values for its parameters, in the order of `parameters_of`.
+  !> An expression of a law, by its key.
+  type, public :: law_text_t
+    character(len=law_length) :: key = ''
+    character(len=:), allocatable :: text
+  end type law_text_t
+
+  !> A law with values for its parameters, in the order of `rows_of`.
   type, public :: law_choice_t
     character(len=family_length) :: family = ''
     character(len=law_length) :: name = ''
-    !> Name of a part.
+    !> Name of a part, force or state.
     character(len=label_length) :: label = ''
     type(parameter_value_t), allocatable :: parameters(:)
+    !> Expressions of a law by expressions, and the parameters that they name, after those of the table; else not allocated.
+    type(law_text_t), allocatable :: texts(:)
+    type(parameter_row_t), allocatable :: own(:)
   end type law_choice_t
 
   character(len=*), parameter :: lemes = 'Lemes et al., vibro-impact system with ideal excitation'
@@ -142,11 +157,13 @@ module law_table
 
   type(law_row_t), parameter, public :: laws( &
     size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws) + &
-    size(motor_laws)) = [other_laws, contact_laws, pair_laws, part_laws, effect_laws, motor_laws]
+    size(motor_laws) + size(expression_laws)) = [other_laws, contact_laws, pair_laws, part_laws, effect_laws, motor_laws, &
+                                                 expression_laws]
   type(parameter_row_t), parameter, public :: parameters( &
     size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(part_parameters) + &
-    size(effect_parameters) + size(motor_parameters)) = [other_parameters, contact_parameters, pair_parameters, &
-                                                         part_parameters, effect_parameters, motor_parameters]
+    size(effect_parameters) + size(motor_parameters) + size(expression_parameters)) = &
+    [other_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters, motor_parameters, &
+     expression_parameters]
 
 contains
 
@@ -186,6 +203,27 @@ contains
     end do
   end function parameters_of
 
+  !> The rows of a choice: those of its law, then of the parameters that its expressions name.
+  pure function rows_of(choice) result(rows)
+    type(law_choice_t), intent(in) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    rows = parameters_of(choice%family, choice%name)
+    if (allocated(choice%own)) rows = [rows, choice%own]
+  end function rows_of
+
+  !> The expression of a key; '' if there is none.
+  pure function text_of(choice, key) result(text)
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable :: text
+    integer :: i
+    text = ''
+    if (.not. allocated(choice%texts)) return
+    do i = 1, size(choice%texts)
+      if (choice%texts(i)%key == key) text = choice%texts(i)%text
+    end do
+  end function text_of
+
   !> Whether a row is a parameter of a law. First letters are compared first: fits build thousands of machines, and rows are many.
   pure logical function is_of(row, family, law)
     type(parameter_row_t), intent(in) :: row
@@ -214,6 +252,8 @@ contains
       path = part_kind(choice%name)//'.'//trim(choice%label)
       mark = index(choice%label, '.')
       if (mark > 0) path = 'structure.'//choice%label(:mark)//'point'//trim(choice%label(mark:))
+    else if (choice%family == force_family .or. choice%family == state_family) then
+      path = trim(choice%family)//'.'//trim(choice%label)
     else
       path = table_of(choice%family, choice%name)
     end if
@@ -240,8 +280,8 @@ contains
                                                  any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body']))
   end function is_hidden
 
-  !> Whether a path names how a motor, a body of several, or a coordinate of a structure starts: 'motor.crank_speed',
-  !> 'body.NAME.x0', 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
+  !> Whether a path names how a motor, a state, a body of several, or a coordinate of a structure starts: 'motor.crank_speed',
+  !> 'state.NAME.start', 'body.NAME.x0', 'structure.NAME.v0[2]'. Such a parameter does not change the machine.
   pure logical function is_start_parameter(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: name
@@ -249,6 +289,7 @@ contains
     call split_element(path, name, element)
     mark = index(name, '.', back=.true.)
     is_start_parameter = path == 'motor.crank_speed' .or. path == 'motor.start_current' .or. path == 'motor.start_integral'
+    if (index(name, 'state.') == 1) is_start_parameter = name(mark + 1:) == 'start' .and. mark > 6
     if (is_start_parameter) return
     is_start_parameter = (name(mark + 1:) == 'x0' .or. name(mark + 1:) == 'v0') .and. &
       ((index(name, 'body.') == 1 .and. mark > 5 .and. element == 0) .or. (index(name, 'structure.') == 1 .and. element > 0))
@@ -333,7 +374,7 @@ contains
     name = trim(list(mark + 1:))
     do i = 1, size(choices)
       if (path_of(choices(i)) /= list(:mark - 1)) cycle
-      rows = parameters_of(choices(i)%family, choices(i)%name)
+      rows = rows_of(choices(i))
       k = findloc(rows%name == name .and. (rows%list .eqv. element > 0), .true., dim=1)
       if (k == 0) cycle
       if (element > size(choices(i)%parameters(k)%values)) cycle

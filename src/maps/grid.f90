@@ -14,6 +14,8 @@ module grid
   use kinds, only: int64, wp
   use law_table, only: change_parameter, is_start_parameter, law_choice_t
   use motor_choices, only: has_motor, start_of_motor
+  use own_machine, only: start_of_states
+  use own_names, only: has_own
   use motion_state, only: options_t
   use text, only: number_in
   implicit none
@@ -113,7 +115,7 @@ contains
     extra = size(grid%start_axis) - 3
     allocate (grid%others(0), grid%direction(0, extra))
     if (extra == 0) return
-    if (.not. (is_multibody(grid%laws) .or. has_motor(grid%laws))) return
+    if (.not. (is_multibody(grid%laws) .or. has_motor(grid%laws) .or. has_own(grid%laws))) return
     laws = grid%laws
     do k = 4, 3 + extra
       call change_parameter(laws, grid%start_names(k), 0.0_wp, known)
@@ -148,6 +150,9 @@ contains
     type(error_t), allocatable :: error
     if (has_motor(laws)) then
       starts = start_of_motor(laws)
+      return
+    else if (has_own(laws)) then
+      starts = start_of_states(laws)
       return
     end if
     call multibody_of(laws, machine, error)

@@ -13,7 +13,7 @@ module equation_sheet
   implicit none
   private
 
-  public :: new_sheet, add_variable, add_parameter, add_optional, define, define_slope, node_of, parameter_number
+  public :: new_sheet, add_variable, add_parameter, add_optional, add_node, define, define_slope, node_of, parameter_number
 
   integer, parameter, public :: name_length = 24
 
@@ -95,6 +95,14 @@ contains
     call differentiate(sheet%tape, [node_of(sheet, of)], node_of(sheet, by), slope)
     call add_name(sheet, name, slope(1), 0)
   end subroutine define_slope
+
+  !> Gives a node of the tape a name.
+  pure subroutine add_node(sheet, name, node)
+    type(sheet_t), intent(inout) :: sheet
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: node
+    call add_name(sheet, name, node, 0)
+  end subroutine add_node
 
   !> Node of a name; 0 if there is none.
   pure elemental integer function node_of(sheet, name) result(node)

@@ -6,7 +6,7 @@ module motor_choices
   use constants, only: two_pi
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, motor_family, value_of
+  use law_table, only: effect_family, law_choice_t, motor_family, own_law, path_of, value_of
   use status, only: exit_bad_case
   implicit none
   private
@@ -55,6 +55,9 @@ contains
     do i = 1, size(choices)
       if (choices(i)%family == effect_family) then
         call fail(error, exit_bad_case, 'effect.'//trim(choices(i)%name)//': not allowed with a motor')
+        return
+      else if (choices(i)%name == own_law) then
+        call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "expression", allowed without a table [motor]')
         return
       end if
     end do

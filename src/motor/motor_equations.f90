@@ -11,18 +11,20 @@
 !> The signs of slip and of the turning, `slip` and `turning`, are parameters. Either of body and crank may be held.
 module motor_equations
   use constants, only: two_pi
-  use contact_law, only: contact_constant, contact_of, contact_t
+  use contact_law, only: contact_constant, contact_of
   use crank_mechanism, only: add_mechanism
-  use equation_sheet, only: add_optional, add_parameter, add_variable, define, new_sheet, node_of, parameter_number, sheet_t
+  use equation_sheet, only: add_optional, add_parameter, add_variable, define, new_sheet, node_of, parameter_number
   use errors, only: error_t, fail
-  use friction_law, only: friction_of, friction_t
+  use friction_law, only: friction_of
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
   use motor_choices, only: number_of_family, refuse_laws, speed_of
+  use motor_system, only: both_held, body_held, both_move, crank_held, far, guard_count, low_order, motor_system_t, phi_at, &
+    v_at, w_at, x_at, y_at
   use restoring_law, only: restoring_of, restoring_t
-  use series_flight, only: flight_t, guard_t, set_branches, start_flight
+  use series_flight, only: guard_t, set_branches, start_flight
   use status, only: exit_bad_case, exit_internal
-  use tape_series, only: prepare_series, series_t
+  use tape_series, only: prepare_series
   use tape_value, only: evaluate
   use text, only: to_text
   implicit none
@@ -30,50 +32,7 @@ module motor_equations
 
   public :: build_motor_equations, foot_half_range
 
-  !> Variables.
-  integer, parameter, public :: phi_at = 1, w_at = 2, x_at = 3, v_at = 4, y_at = 5
-
-  !> Guards: the stops; v and w zero; a turn forwards or back; what holds the body and the crank at its limits; the largest
-  !> velocity.
-  integer, parameter, public :: guard_upper = 1, guard_lower = 2, guard_turning = 3, guard_standstill = 4, guard_section = 5, &
-    guard_back = 6, guard_body_up = 7, guard_body_down = 8, guard_crank_up = 9, guard_crank_down = 10, guard_fastest = 11, &
-    guard_count = 11
-  !> A mode of the equations: which of body and crank move.
-  integer, parameter, public :: both_move = 1, body_held = 2, crank_held = 3, both_held = 4
   character(len=*), parameter :: suffix(4) = [character(len=12) :: '', '_body_held', '_crank_held', '_both_held']
-
-  !> Terms that decide which way a motion from rest goes.
-  integer, parameter :: low_order = 8
-  !> Stops that are not there [m]: bounds of their guards stay finite.
-  real(wp), parameter :: far = 1e30_wp
-
-  type, public :: motor_system_t
-    type(sheet_t) :: sheet
-    !> Number of variables: 4, or 5 with that of the motor.
-    integer :: variables = 4
-    !> A motion per mode, without and with work, dry and viscous losses [J] as three further states.
-    type(flight_t) :: flights(4, 0:1)
-    !> Room for the first Taylor coefficients of everything in a mode.
-    type(series_t) :: low(4)
-    real(wp) :: mass = 1, stiffness = 0, free_length = 0
-    type(friction_t) :: friction
-    type(contact_t) :: contact
-    !> The body carries an unbalance of this moment [kg m]; 0: a mechanism moves the foot of the spring.
-    real(wp) :: moment = 0
-    !> Largest torque by which the bearing holds the crank [N m], force by which friction holds the body [N]; at least rounding, so
-    !> that a machine without dry friction comes to rest.
-    real(wp) :: crank_level = 0, body_level = 0
-    !> Speed without torque [rad/s]; size of the motor's own state, current [A] or integral [rad].
-    real(wp) :: no_load_speed = 0, own_size = 1
-    !> Numbers of the parameters of signs.
-    integer :: slip = 0, turning = 0
-    !> Inertia of the crank alone [kg m^2].
-    real(wp) :: rotor_inertia = 1
-    !> Nodes: torque of the motor, of the spring or body on the crank, foot, its slope, energies, inertia, its slope, current.
-    integer :: torque = 0, load = 0, foot = 0, foot_slope = 0, kinetic = 0, energy = 0, inertia = 0, inertia_slope = 0, current = 0
-    !> Nodes, by mode: what holds the body [N] and the crank [N m] or would if they were at rest.
-    integer :: body_hold(4) = 0, crank_hold(4) = 0
-  end type motor_system_t
 
 contains
 

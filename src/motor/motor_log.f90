@@ -5,10 +5,10 @@
 module motor_log
   use constants, only: two_pi
   use kinds, only: wp
-  use motion_state, only: energy_balance_t, log_t, mode_slip_minus, put_column, record_event, record_sample, state_t
-  use motor_equations, only: motor_system_t
+  use motion_state, only: energy_balance_t, log_t, put_column, record_event, record_sample, state_t
+  use motor_system, only: motor_system_t
+  use motor_rest, only: node_values
   use motor_state, only: motor_state_t
-  use tape_value, only: evaluate
   implicit none
   private
 
@@ -16,21 +16,17 @@ module motor_log
 
 contains
 
-  !> Torque of the motor, torque against it [N m], power of the motor [W], current or integral, kinetic energy, energy [J].
+  !> Torque of the motor, torque against it [N m], power of the motor [W], current or integral, kinetic energy, energy [J], position
+  !> of the foot [m].
   pure function motor_values(system, state, crank) result(values)
     type(motor_system_t), intent(in) :: system
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
-    real(wp) :: values(6)
-    real(wp) :: node(system%sheet%tape%count), parameters(size(system%sheet%parameters)), z(5)
-    integer :: fault(system%sheet%tape%count)
-    z = [crank%phi, crank%w, state%x, state%v, crank%y]
-    parameters = system%sheet%parameters
-    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
-    parameters(system%turning) = crank%turning
-    call evaluate(system%sheet%tape, z(:system%variables), parameters, node, fault)
-    values = [node(system%torque), node(system%load), node(system%torque)*crank%w, crank%y, node(system%kinetic), &
-              node(system%energy)]
+    real(wp) :: values(7)
+    real(wp) :: node(system%sheet%tape%count)
+    node = node_values(system, state, crank)
+    values = [node(system%torque), node(system%load), node(system%torque)*crank%w, crank%own(1), node(system%kinetic), &
+              node(system%energy), node(system%foot)]
     if (system%current > 0) values(4) = node(system%current)
   end function motor_values
 
@@ -39,7 +35,7 @@ contains
     type(motor_system_t), intent(in) :: system
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
-    real(wp) :: values(6)
+    real(wp) :: values(7)
     values = motor_values(system, state, crank)
     energy = values(6)
   end function motor_energy
@@ -58,11 +54,11 @@ contains
     type(motor_state_t), intent(in) :: crank
     type(log_t), intent(inout) :: log
     type(energy_balance_t) :: balance
-    real(wp) :: values(6)
+    real(wp) :: values(7)
     values = motor_values(system, state, crank)
     balance = log%balance
     balance%at_end = values(6)
-    call put_column(log%sample_coordinates, log%samples + 1, values(:5))
+    call put_column(log%sample_coordinates, log%samples + 1, [values(:5), values(7), crank%own(:system%variables - 4)])
     call record_sample(log, state, driver=crank_of(crank), balance=balance)
   end subroutine add_sample
 

@@ -6,11 +6,12 @@ module motor_modes
   use constants, only: two_pi
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_upper_barrier, state_t
-  use motor_equations, only: guard_back, guard_body_down, guard_body_up, guard_crank_down, guard_crank_up, guard_fastest, &
+  use motor_system, only: guard_back, guard_body_down, guard_body_up, guard_crank_down, guard_crank_up, guard_fastest, &
     guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
-  use motor_rest, only: equation_mode, low_series, slips, state_vector, zero_order
+  use motor_rest, only: equation_mode, low_series, size_of_forces, slips, state_vector, zero_order
   use motor_state, only: motor_state_t
-  use series_flight, only: flight_t
+  use series_flight, only: flight_t, set_branches
+  use switch_branches, only: choose_branches
   use tape_series, only: series_t
   implicit none
   private
@@ -29,10 +30,10 @@ contains
     type(flight_t), intent(out) :: flight
     integer, intent(out) :: fault
     type(series_t) :: series
-    integer :: mode, slip
+    integer :: mode, slip, own
     mode = equation_mode(slips(state%mode), crank%turning /= 0)
     slip = merge(-1, 1, state%mode == mode_slip_minus)
-    call keep_angle(crank)
+    if (.not. system%clock) call keep_angle(crank)
     flight = system%flights(mode, kept)
     flight%state(:system%variables) = state_vector(system, state, crank)
     flight%state(system%variables + 1:) = 0
@@ -40,18 +41,22 @@ contains
     flight%parameters(system%slip) = slip
     flight%parameters(system%turning) = crank%turning
     call low_series(system, mode, state, crank, series, fault)
-    flight%is_active = .false.
+    own = size(flight%guards) - size(flight%tape%switches)
+    if (own < size(flight%guards)) call begin_branches(flight, own)
+    flight%is_active(:own) = .false.
     if (slips(state%mode)) then
       call watch(flight, guard_turning, -slip)
       if (slip > 0 .and. system%contact%upper < huge(1.0_wp)) call watch(flight, guard_upper, 1)
       if (slip < 0 .and. system%contact%lower > -huge(1.0_wp)) call watch(flight, guard_lower, -1)
       if (slip > 0 .and. needs_v_max) call watch(flight, guard_fastest, -1)
-      if (.not. abs(state%v) > 0) flight%zeros(guard_turning) = zero_order(series%c(:, flight%rates(4)), least(system, state))
+      if (.not. abs(state%v) > 0) flight%zeros(guard_turning) = zero_order(series%c(:, flight%rates(4)), &
+                                                                                least(system, state, series))
     else
       if (state%mode /= mode_upper_barrier) call watch(flight, guard_body_up, 1)
       if (state%mode /= mode_lower_barrier) call watch(flight, guard_body_down, -1)
-      call mark_zeros(flight, series, [guard_body_up, guard_body_down], system%mass*least(system, state))
+      call mark_zeros(flight, series, [guard_body_up, guard_body_down], system%mass*least(system, state, series))
     end if
+    if (system%clock) return
     if (crank%turning /= 0) then
       call watch(flight, guard_standstill, -crank%turning)
       call watch(flight, merge(guard_section, guard_back, crank%turning > 0), crank%turning)
@@ -63,10 +68,27 @@ contains
     end if
   end subroutine begin_mode
 
+  !> The branches of the switching functions, whose guards follow the `own` ones.
+  pure subroutine begin_branches(flight, own)
+    type(flight_t), intent(inout) :: flight
+    integer, intent(in) :: own
+    integer :: branches(size(flight%guards) - own), zeros(size(flight%guards) - own)
+    logical :: fits
+    call choose_branches(flight, flight%state, flight%parameters, branches, zeros, fits)
+    call set_branches(flight, branches)
+    flight%zeros(own + 1:) = max(zeros, 0)
+    flight%is_active(own + 1:) = flight%is_active(own + 1:) .and. zeros >= 0
+  end subroutine begin_branches
+
   !> What rounding does to the acceleration of the body [m/s^2].
-  pure real(wp) function least(system, state)
+  pure real(wp) function least(system, state, series)
     type(motor_system_t), intent(in) :: system
     type(state_t), intent(in) :: state
+    type(series_t), intent(in) :: series
+    if (system%clock) then
+      least = 64*epsilon(1.0_wp)*size_of_forces(system, state, series%c(0, :))/system%mass
+      return
+    end if
     least = 64*epsilon(1.0_wp)*(system%stiffness*(abs(state%x) + abs(system%free_length)) + system%friction%break_away)/system%mass
   end function least
 

@@ -13,20 +13,23 @@ module motor_motion
     event_impact_lower, event_impact_upper, event_release, event_stick, event_turning_point, log_t, mode_lower_barrier, &
     mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, note_position, options_t, sample_due, sample_time, &
     state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, word_stick, word_upper
-  use motor_equations, only: build_motor_equations, guard_back, guard_body_down, guard_body_up, guard_crank_down, &
-    guard_crank_up, guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
+  use motor_choices, only: has_motor
+  use motor_equations, only: build_motor_equations
   use motor_log, only: add_sample, motor_energy, record_motor_event
   use motor_modes, only: begin_mode, keep_angle
-  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, slips
+  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, restitution_of, slips
   use motor_state, only: motor_state_t
-  use series_flight, only: advance_flight, flight_crossed, flight_left_domain, flight_no_progress, flight_reached, &
-    flight_step_budget, flight_t
+  use motor_system, only: far, guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
+    guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
+  use own_equations, only: build_own_equations
+  use series_flight, only: advance_flight, change_branches, flight_crossed, flight_left_domain, flight_no_progress, &
+    flight_reached, flight_step_budget, flight_t, flight_wrong_branch
   use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
     reason_step_failed
   implicit none
   private
 
-  public :: prepare_motor, start_motor, advance_motor
+  public :: prepare_motor, start_motor, start_own, advance_motor, check_hold
 
   !> Events without progress in time after which a motion is given up.
   integer, parameter :: most_idle_events = 32
@@ -45,7 +48,11 @@ contains
     type(options_t), intent(in) :: options
     type(motor_motion_t), intent(out) :: moving
     type(error_t), allocatable, intent(out) :: error
-    call build_motor_equations(choices, moving%system, error)
+    if (has_motor(choices)) then
+      call build_motor_equations(choices, moving%system, error)
+    else
+      call build_own_equations(choices, moving%system, error)
+    end if
     moving%options = options
   end subroutine prepare_motor
 
@@ -59,7 +66,7 @@ contains
     state = state_t(x=values(1), v=values(2), mode=merge(mode_slip_minus, mode_slip_plus, values(2) < 0))
     crank%phi = modulo(values(3), two_pi)
     crank%w = values(4)
-    crank%y = values(5)
+    crank%own(1) = values(5)
     crank%turning = merge(-1, 1, crank%w < 0)
     ! Of an unbalance, what holds the one depends on whether the other moves.
     do i = 1, 2
@@ -68,8 +75,21 @@ contains
     end do
   end subroutine start_motor
 
-  !> Moves to `time_end` [s], or only to the next section, the crank passing through zero upwards, `at_section` then being true.
-  !> `reason` stays 0 unless the motion had to be given up. With `one_event` it ends after the next event.
+  !> A body of equations by expressions at `x` [m], `v` [m/s], `time` [s after the section], with its own states.
+  pure subroutine start_own(moving, values, time, state, crank)
+    type(motor_motion_t), intent(in) :: moving
+    real(wp), intent(in) :: values(:), time
+    type(state_t), intent(out) :: state
+    type(motor_state_t), intent(out) :: crank
+    state = state_t(x=values(1), v=values(2), time=time, mode=merge(mode_slip_minus, mode_slip_plus, values(2) < 0))
+    crank%own(:size(values) - 2) = values(3:)
+    if (.not. abs(state%v) > 0) call choose_body(moving%system, state, crank)
+  end subroutine start_own
+
+  !> Moves to `time_end` [s], or only to the next section, `at_section` then being true: the crank passes through zero upwards;
+  !> without a motor the body turns round at a maximum, at a minimum where a stop cuts off the maxima alone.
+  !> `reason` stays 0 unless the motion had to be given up. With `one_event` it ends after the next
+  !> event.
   pure subroutine advance_motor(moving, state, crank, time_end, at_section, tally, reason, log, one_event)
     type(motor_motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
@@ -82,7 +102,7 @@ contains
     logical, intent(in), optional :: one_event
     type(flight_t) :: flight
     real(wp) :: before
-    integer :: idle
+    integer :: idle, mode
     logical :: stops, passed
     stops = at_section
     at_section = .false.
@@ -93,11 +113,17 @@ contains
       if (tally%events > moving%options%event_budget) reason = reason_event_budget
       if (reason /= 0) return
       before = state%time
+      mode = state%mode
       call fly(moving, state, crank, time_end, flight, tally, reason, log)
       if (reason /= 0) return
       if (slips(state%mode)) tally%slips = tally%slips + 1
       call note_position(tally, state)
+      if (any(flight%crossed([guard_upper, guard_lower]))) then
+        if (abs(restitution_of(moving%system, state, crank) - 0.5_wp) > 0.5_wp) reason = reason_step_failed
+        if (reason /= 0) return
+      end if
       call do_events(moving, flight%crossed, state, crank, passed, tally, log)
+      if (moving%system%clock) passed = flight%crossed(guard_turning) .and. turns_at_section(moving%system, mode, state%mode)
       idle = merge(0, idle + 1, state%time > before)
       if (idle >= most_idle_events) reason = reason_mode_cycle
       if (.not. abs(state%x) <= moving%options%domain) reason = reason_left_domain
@@ -120,10 +146,13 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp) :: until
-    integer :: status, fault
+    real(wp) :: until, at_switch
+    integer :: status, fault, idle
     call begin_mode(moving%system, state, crank, tally%needs_v_max, merge(1, 0, present(log)), flight, fault)
     status = merge(flight_left_domain, flight_reached, fault > 0)
+    if (fault < 0) status = flight_wrong_branch
+    at_switch = flight%time
+    idle = 0
     do while (status == flight_reached .or. status == flight_crossed)
       until = time_end
       if (present(log)) then
@@ -137,17 +166,43 @@ contains
       call advance_flight(flight, until, status)
       call take_state(moving%system, flight, state, crank, log)
       if (status == flight_crossed) then
-        if (.not. flight%crossed(guard_fastest)) exit
         tally%v_max = max(tally%v_max, state%v)
-        if (count(flight%crossed) > 1) exit
+        if (any(flight%crossed(:guard_fastest - 1))) exit
+        call pass_switches(flight, at_switch, idle, status)
+        ! A jump of the forces may release what was held.
+        if (any(flight%crossed(guard_count + 1:)) .and. .not. slips(state%mode)) exit
       end if
+      if (flight%steps > moving%options%step_budget) status = flight_step_budget
       if (status == flight_reached .and. until >= time_end) exit
     end do
     tally%steps = tally%steps + flight%steps
     tally%v_max = max(tally%v_max, state%v)
     if (status == flight_step_budget) reason = reason_step_budget
     if (status == flight_left_domain .or. status == flight_no_progress) reason = reason_step_failed
+    if (status == flight_wrong_branch) reason = reason_mode_cycle
   end subroutine fly
+
+  !> Goes on with the other branches of forces where their switching functions crossed zero; no branch fits where that happens
+  !> again and again at one time.
+  pure subroutine pass_switches(flight, last, idle, status)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(inout) :: last
+    integer, intent(inout) :: idle, status
+    if (.not. any(flight%crossed(guard_count + 1:))) return
+    idle = merge(0, idle + 1, flight%time > last)
+    last = flight%time
+    call change_branches(flight)
+    if (idle >= most_idle_events) status = flight_wrong_branch
+  end subroutine pass_switches
+
+  !> Whether a change of modes where the velocity is zero is a section: a maximum, or a minimum where only maxima are cut off.
+  pure logical function turns_at_section(system, before, after) result(turns)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: before, after
+    integer :: arriving
+    arriving = merge(mode_slip_minus, mode_slip_plus, system%contact%upper < far .and. system%contact%lower <= -far)
+    turns = before == arriving .and. after /= arriving
+  end function turns_at_section
 
   !> State and losses after a part of a flight.
   pure subroutine take_state(system, flight, state, crank, log)
@@ -159,11 +214,11 @@ contains
     integer :: n
     n = system%variables
     state%time = flight%time
-    crank%phi = flight%state(1)
-    crank%w = flight%state(2)
+    if (.not. system%clock) crank%phi = flight%state(1)
+    if (.not. system%clock) crank%w = flight%state(2)
     state%x = flight%state(3)
     state%v = flight%state(4)
-    if (n > 4) crank%y = flight%state(5)
+    crank%own(:n - 4) = flight%state(5:n)
     if (.not. present(log)) return
     log%balance%work = log%balance%work + flight%state(n + 1)
     log%balance%friction = log%balance%friction + flight%state(n + 2)
@@ -204,6 +259,7 @@ contains
         call release(merge(mode_slip_plus, mode_slip_minus, crossed(guard_body_up)), state, crank, log)
       end if
       if (any(crossed) .and. system%moment > 0) call check_holds(system, state, crank, log)
+      if (any(crossed(guard_count + 1:))) call check_hold(system, state, crank, log)
     end associate
   end subroutine do_events
 
@@ -213,13 +269,22 @@ contains
     type(state_t), intent(inout) :: state
     type(motor_state_t), intent(inout) :: crank
     type(log_t), intent(inout), optional :: log
-    type(state_t) :: free
     if (crank%turning == 0) call choose_crank(system, state, crank)
+    call check_hold(system, state, crank, log)
+  end subroutine check_holds
+
+  !> What holds the body may not do so where a force has jumped.
+  pure subroutine check_hold(system, state, crank, log)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(inout) :: state
+    type(motor_state_t), intent(in) :: crank
+    type(log_t), intent(inout), optional :: log
+    type(state_t) :: free
     if (slips(state%mode)) return
     free = state
     call choose_body(system, free, crank)
     if (slips(free%mode)) call release(free%mode, state, crank, log)
-  end subroutine check_holds
+  end subroutine check_hold
 
   !> Friction or a stop no longer holds the body.
   pure subroutine release(mode, state, crank, log)
@@ -266,7 +331,7 @@ contains
     real(wp) :: after, left, energy
     logical :: over
     state%x = merge(system%contact%upper, system%contact%lower, direction > 0)
-    after = -system%contact%restitution*state%v
+    after = -restitution_of(system, state, crank)*state%v
     tally%impacts = tally%impacts + 1
     tally%last_impact_speed = abs(state%v)
     tally%impact_speed_sum = tally%impact_speed_sum + abs(state%v)

@@ -3,16 +3,20 @@
 
 !> Body and crank at zero velocity: which way each goes on, and how a sequence of ever smaller impacts ends.
 module motor_rest
+  use constants, only: two_pi
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, state_t
-  use motor_equations, only: body_held, both_held, both_move, crank_held, motor_system_t
-  use motor_state, only: motor_state_t
-  use series_flight, only: flight_t
-  use tape_series, only: expand, series_t
+  use motor_system, only: body_held, both_held, both_move, crank_held, guard_body_down, guard_body_up, low_order, &
+    motor_system_t, v_at
+  use motor_state, only: most_own, motor_state_t
+  use switch_branches, only: choose_branches
+  use tape_series, only: expand, prepare_series, series_t
+  use tape_value, only: evaluate
   implicit none
   private
 
-  public :: choose_body, choose_crank, equation_mode, slips, state_vector, chatter_dies_out, low_series, zero_order
+  public :: choose_body, choose_crank, equation_mode, node_values, restitution_of, size_of_forces, slips, &
+    state_vector, chatter_dies_out, low_series, zero_order
 
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
@@ -37,12 +41,50 @@ contains
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
     real(wp) :: z(system%variables)
-    real(wp) :: all(5)
-    all = [crank%phi, crank%w, state%x, state%v, crank%y]
+    real(wp) :: all(4 + most_own)
+    all = [crank%phi, crank%w, state%x, state%v, crank%own]
+    if (system%clock) all(:2) = [crank%phi + state%time, 0.0_wp]
+    if (system%clock .and. system%period > 0) all(2) = state%time*two_pi/system%period
     z = all(:system%variables)
   end function state_vector
 
-  !> First Taylor coefficients of everything in a mode. The sign of slip is that of the mode of the body.
+  !> Parameters of the equations with the signs of slip and turning.
+  pure function signed_parameters(system, state, crank) result(parameters)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: parameters(size(system%sheet%parameters))
+    parameters = system%sheet%parameters
+    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
+    parameters(system%turning) = crank%turning
+  end function signed_parameters
+
+  !> Values of the nodes, those that are not defined being zero.
+  pure function node_values(system, state, crank) result(values)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: values(system%sheet%tape%count)
+    integer :: fault(system%sheet%tape%count)
+    call evaluate(system%sheet%tape, state_vector(system, state, crank), signed_parameters(system, state, crank), values, fault)
+  end function node_values
+
+  !> Ratio of the speeds after and before an impact, the body arriving; -1 where it is not defined.
+  pure real(wp) function restitution_of(system, state, crank) result(restitution)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: values(system%sheet%tape%count)
+    integer :: fault(system%sheet%tape%count)
+    restitution = system%contact%restitution
+    if (system%restitution == 0) return
+    call evaluate(system%sheet%tape, state_vector(system, state, crank), signed_parameters(system, state, crank), values, fault)
+    restitution = values(system%restitution)
+    if (fault(system%restitution) > 0) restitution = -1
+  end function restitution_of
+
+  !> First Taylor coefficients of everything in a mode. The sign of slip is that of the mode of the body. `fault` is -1 if no
+  !> branches of the switching functions fit the state.
   pure subroutine low_series(system, mode, state, crank, series, fault)
     type(motor_system_t), intent(in) :: system
     integer, intent(in) :: mode
@@ -50,12 +92,23 @@ contains
     type(motor_state_t), intent(in) :: crank
     type(series_t), intent(out) :: series
     integer, intent(out) :: fault
-    real(wp) :: parameters(size(system%sheet%parameters))
-    parameters = system%sheet%parameters
-    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
-    parameters(system%turning) = crank%turning
-    series = system%low(mode)
-    call expand(system%flights(mode, 0)%tape, state_vector(system, state, crank), parameters, series, fault)
+    real(wp) :: parameters(size(system%sheet%parameters)), z(system%variables)
+    integer :: branches(size(system%sheet%tape%switches)), zeros(size(system%sheet%tape%switches))
+    logical :: fits
+    parameters = signed_parameters(system, state, crank)
+    z = state_vector(system, state, crank)
+    fits = .true.
+    associate (flight => system%flights(mode, 0))
+      if (system%clock) then
+        call choose_branches(flight, z, parameters, branches, zeros, fits)
+        call prepare_series(flight%tape, low_order, flight%rates, &
+                            [flight%guards%node, system%torque, system%load, system%foot, system%inertia], branches, series)
+      else
+        series = system%low(mode)
+      end if
+      call expand(flight%tape, z, parameters, series, fault)
+    end associate
+    if (fault == 0 .and. .not. fits) fault = -1
   end subroutine low_series
 
   !> Order of the zero of a rate's integral that is zero now: `c` are coefficients of the rate, `rounding` that of the first.
@@ -77,9 +130,9 @@ contains
     logical :: up, down
     mode = equation_mode(.false., crank%turning /= 0)
     call low_series(system, mode, state, crank, series, fault)
-    associate (c => series%c(:, system%body_hold(mode)), level => system%body_level)
-      up = is_over(c, level, force_rounding(system, state, crank, series))
-      down = is_over(-c, level, force_rounding(system, state, crank, series))
+    associate (guards => system%flights(mode, 0)%guards%node, rounding => force_rounding(system, state, crank, series))
+      up = is_over(series%c(:, guards(guard_body_up)), 0.0_wp, rounding)
+      down = is_over(-series%c(:, guards(guard_body_down)), 0.0_wp, rounding)
     end associate
     if (up .and. state%x < system%contact%upper) then
       state%mode = mode_slip_plus
@@ -133,9 +186,48 @@ contains
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
     type(series_t), intent(in) :: series
+    if (system%clock) then
+      rounding = 64*epsilon(1.0_wp)*size_of_forces(system, state, series%c(0, :))
+      return
+    end if
     rounding = system%stiffness*(abs(system%free_length) + abs(state%x) + abs(series%c(0, system%foot)))
     rounding = 32*epsilon(1.0_wp)*(rounding + system%body_level + system%moment*crank%w**2)
   end function force_rounding
+
+  !> Size of the forces by expressions [N], from the values of the nodes: rounding is that of each, and that of the position.
+  pure real(wp) function size_of_forces(system, state, values) result(total)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    real(wp), intent(in) :: values(:)
+    total = sum(abs(values(system%forces))) + abs(values(system%force_slope)*state%x) + abs(values(system%rest_friction))
+  end function size_of_forces
+
+  !> Friction [N] on a body that comes to rest, and by how much speed and position of a bounce change it and the spring force.
+  pure subroutine forces_of_bounce(system, state, crank, height, friction, change)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(in) :: crank
+    real(wp), intent(in) :: height
+    real(wp), intent(out) :: friction, change
+    type(state_t) :: resting
+    real(wp), allocatable :: moving(:), still(:)
+    integer :: rate
+    if (system%clock) then
+      resting = state
+      resting%v = 0
+      moving = node_values(system, state, crank)
+      still = node_values(system, resting, crank)
+      friction = still(system%rest_friction)
+      rate = system%flights(both_move, 0)%rates(v_at)
+      change = system%mass*abs(moving(rate) - still(rate)) + abs(still(system%force_slope))*height
+    else
+      associate (law => system%friction, speed => abs(state%v))
+        friction = law%kinetic + law%excess
+        change = law%damping*speed + system%stiffness*height
+        if (law%excess > 0) change = change + law%excess*min(1.0_wp, speed/law%stribeck_velocity)
+      end associate
+    end if
+  end subroutine forces_of_bounce
 
   !> Whether impacts on the stop in `direction` 1 or -1 are over within `left` [s], the body having just left it. One bounce with
   !> constant friction: out at (R + F)/m, back at (R - F)/m, the speed shrinks by k sqrt(back/out), so that times form a
@@ -157,21 +249,20 @@ contains
     left = 0
     over = .false.
     call low_series(system, mode, resting, crank, series, fault)
-    if (fault > 0) return
+    if (fault /= 0) return
     speed = abs(state%v)
-    associate (law => system%friction, force => series%c(:, system%body_hold(mode)))
+    associate (force => series%c(:, system%body_hold(mode)))
       push = direction*force(1)
       if (push <= system%body_level) return
-      friction = law%kinetic + law%excess
+      call forces_of_bounce(system, state, crank, speed**2/(2*push/system%mass), friction, change)
       out = (push + friction)/system%mass
       back = (push - friction)/system%mass
       if (back <= 0) return
-      shrink = sqrt(back/out)*system%contact%restitution
+      shrink = sqrt(back/out)*restitution_of(system, resting, crank)
       if (shrink >= 1) return
       left = (speed/out + speed/sqrt(back*out))/(1 - shrink)
       height = speed**2/(2*out)
-      change = abs(force(2))*left + abs(force(3))*left**2 + law%damping*speed + system%stiffness*height
-      if (law%excess > 0) change = change + law%excess*min(1.0_wp, speed/law%stribeck_velocity)
+      change = change + abs(force(2))*left + abs(force(3))*left**2
       change = change/(system%mass*back)
       over = change <= chatter_uniformity
       if (height < 8*epsilon(1.0_wp)*(abs(state%x) + abs(series%c(0, system%foot)) + system%free_length)) then

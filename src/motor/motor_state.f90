@@ -1,17 +1,20 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> State of a motor beside that of the body that it drives.
+!> State of a motor, or of equations by expressions, beside that of the body.
 module motor_state
   use kinds, only: wp
   implicit none
   private
 
+  !> Most states beside those of body and crank.
+  integer, parameter, public :: most_own = 8
+
   type, public :: motor_state_t
-    !> Crank angle, from 0 to 2 pi [rad], and its speed [rad/s].
+    !> Crank angle, from 0 to 2 pi [rad], and its speed [rad/s]. Without a motor: what the time of the body is counted from [s].
     real(wp) :: phi = 0, w = 0
-    !> Current [A], or integral of the speed control [rad].
-    real(wp) :: y = 0
+    !> Current [A], or integral of the speed control [rad]; states by expressions.
+    real(wp) :: own(most_own) = 0
     !> 1 or -1: the crank turns this way; 0: its bearing holds it.
     integer :: turning = 1
     !> Turns taken off the angle.

@@ -13,7 +13,7 @@ module oscillator
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, motor_family, value_of
+  use law_table, only: effect_family, law_choice_t, motor_family, own_law, path_of, value_of
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
   implicit none
@@ -201,6 +201,9 @@ contains
         return
       end if
       select case (choices(i)%name)
+      case (own_law)
+        call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "expression", allowed in the commands trajectory, '// &
+                  'basin and sweep')
       case ('friction_pair', 'backlash_pair')
         call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
       case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')

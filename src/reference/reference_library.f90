@@ -4,12 +4,13 @@
 !> The one entry of the reference library: trajectories of a machine, run and labelled by the same code
 !> as the maps but in quadruple precision. Doubles go in and out; nothing else is visible outside.
 module reference_library
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_null_char
   use attractors, only: attractor_t, unpack_attractor
   use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: wp
   use law_table, only: law_choice, law_choice_t, laws
+  use law_texts, only: unpack_texts
   use machine_type, only: machine_t
   use motion_state, only: options_t
   use single_trajectory, only: outcome_t, run_trajectory, span_t
@@ -20,14 +21,15 @@ module reference_library
 
 contains
 
-  !> Runs `points` trajectories. Laws and effects: row in the law table of each, lengths and values of their parameters one
-  !> after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at convergence;
-  !> `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
+  !> Runs `points` trajectories. Laws and effects: row in the law table of each, their texts (`pack_texts`), lengths and values
+  !> of their parameters one after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at
+  !> convergence; `starts` = x0, v0, crank angle per point. Result per point: reason, attractor, regime, x, v, impacts.
   !> Returns 0, or 1 if the machine cannot be built.
-  integer(c_int) function separatrix_reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
+  integer(c_int) function separatrix_reference_run(law_count, law_rows, texts, lengths, values, flight, event_budget, numbers, &
       attractor_count, packed, points, starts, results) bind(c)
     integer(c_int), value :: law_count
     integer(c_int), intent(in) :: law_rows(law_count), lengths(*)
+    character(kind=c_char), intent(in) :: texts(*)
     real(c_double), intent(in) :: values(*)
     integer(c_int), value :: flight
     integer(c_int64_t), value :: event_budget
@@ -48,6 +50,9 @@ contains
     parameter = 0
     do i = 1, law_count
       choices(i) = law_choice(trim(laws(law_rows(i))%family), trim(laws(law_rows(i))%name))
+    end do
+    call unpack_texts(text_at(texts), choices)
+    do i = 1, law_count
       do k = 1, size(choices(i)%parameters)
         parameter = parameter + 1
         choices(i)%parameters(k)%values = real(values(position + 1:position + lengths(parameter)), wp)
@@ -77,5 +82,20 @@ contains
     end do
     separatrix_reference_run = 0
   end function separatrix_reference_run
+
+  !> A text that ends with a null.
+  pure function text_at(characters) result(text)
+    character(kind=c_char), intent(in) :: characters(*)
+    character(len=:), allocatable :: text
+    integer :: length, i
+    length = 0
+    do while (characters(length + 1) /= c_null_char)
+      length = length + 1
+    end do
+    allocate (character(len=length) :: text)
+    do i = 1, length
+      text(i:i) = characters(i)
+    end do
+  end function text_at
 
 end module reference_library

@@ -10,6 +10,7 @@ module reference
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_table, only: find_law, law_choice_t
+  use law_texts, only: pack_texts
   use motion_state, only: options_t
   use status, only: exit_internal, exit_no_input
   use single_trajectory, only: span_t
@@ -40,11 +41,12 @@ module reference
   end interface
 
   abstract interface
-    function reference_run(law_count, law_rows, lengths, values, flight, event_budget, numbers, &
+    function reference_run(law_count, law_rows, texts, lengths, values, flight, event_budget, numbers, &
         attractor_count, packed, points, starts, results) bind(c) result(status)
-      import :: c_double, c_int, c_int64_t
+      import :: c_char, c_double, c_int, c_int64_t
       integer(c_int), value :: law_count
       integer(c_int), intent(in) :: law_rows(*), lengths(*)
+      character(kind=c_char), intent(in) :: texts(*)
       real(c_double), intent(in) :: values(*)
       integer(c_int), value :: flight
       integer(c_int64_t), value :: event_budget
@@ -87,7 +89,7 @@ contains
     do i = 1, size(catalogue)
       packed = [packed, pack_attractor(catalogue(i))]
     end do
-    status = separatrix_reference_run(size(rows), rows, lengths, values, options%flight, &
+    status = separatrix_reference_run(size(rows), rows, pack_texts(laws)//c_null_char, lengths, values, options%flight, &
       int(options%event_budget, int64), [reference_tolerance, options%domain, span%duration, span%window, &
       span%extension, merge(1.0_wp, 0.0_wp, span%stop_when_converged)], size(catalogue), packed, &
       size(starts, 2), starts, out)

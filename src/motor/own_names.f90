@@ -1,0 +1,113 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The names that expressions of a case may use, and their nodes: x, v, t, phase, speed; states and their rates; parameters of the
+!> same table by their name, and of every table by 'table.name'.
+module own_names
+  use equation_sheet, only: sheet_t
+  use errors, only: error_t
+  use expression_text, only: read_expression
+  use kinds, only: wp
+  use law_table, only: law_choice_t, own_law, parameter_row_t, path_of, rows_of, text_of
+  use motor_system, only: far
+  use operations, only: op_select, op_variable, operation_table
+  use tape, only: parameter_node, tape_t
+  implicit none
+  private
+
+  public :: has_own, new_names, add_known, add_parameters, read_own, depends_on
+
+  integer, parameter, public :: known_length = 64
+
+  type, public :: names_t
+    character(len=known_length), allocatable :: names(:)
+    integer, allocatable :: nodes(:)
+    !> The choice whose table a parameter stands in, 0 for other names.
+    integer, allocatable :: tables(:)
+  end type names_t
+
+contains
+
+  !> Whether any law is one by expressions.
+  pure logical function has_own(choices)
+    type(law_choice_t), intent(in) :: choices(:)
+    has_own = any(choices%name == own_law)
+  end function has_own
+
+  !> No names.
+  pure subroutine new_names(names)
+    type(names_t), intent(out) :: names
+    allocate (names%names(0), names%nodes(0), names%tables(0))
+  end subroutine new_names
+
+  !> Makes a name known.
+  pure subroutine add_known(names, name, node, table)
+    type(names_t), intent(inout) :: names
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: node
+    integer, intent(in), optional :: table
+    character(len=known_length) :: padded
+    padded = name
+    names%names = [names%names, padded]
+    names%nodes = [names%nodes, node]
+    names%tables = [names%tables, 0]
+    if (present(table)) names%tables(size(names%tables)) = table
+  end subroutine add_known
+
+  !> Makes the numbers of all choices known.
+  pure subroutine add_parameters(names, choices, sheet)
+    type(names_t), intent(inout) :: names
+    type(law_choice_t), intent(in) :: choices(:)
+    type(sheet_t), intent(inout) :: sheet
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: i, k, node
+    do i = 1, size(choices)
+      rows = rows_of(choices(i))
+      do k = 1, size(rows)
+        if (rows(k)%list) cycle
+        if (abs(choices(i)%parameters(k)%values(1)) >= far) cycle
+        sheet%parameters = [sheet%parameters, choices(i)%parameters(k)%values(1)]
+        call parameter_node(sheet%tape, size(sheet%parameters), node)
+        call add_known(names, path_of(choices(i))//'.'//trim(rows(k)%name), node)
+        if (choices(i)%name == own_law) call add_known(names, trim(rows(k)%name), node, i)
+      end do
+    end do
+  end subroutine add_parameters
+
+  !> Node of the expression `key` of choice number `i`; an error begins with the key in the case.
+  pure subroutine read_own(names, choices, i, key, sheet, node, error)
+    type(names_t), intent(in) :: names
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    character(len=*), intent(in) :: key
+    type(sheet_t), intent(inout) :: sheet
+    integer, intent(out) :: node
+    type(error_t), allocatable, intent(out) :: error
+    logical :: seen(size(names%names))
+    seen = names%tables == 0 .or. names%tables == i
+    call read_expression(text_of(choices(i), key), pack(names%names, seen), pack(names%nodes, seen), sheet%tape, node, error)
+    if (allocated(error)) error%message = path_of(choices(i))//'.'//key//': '//error%message
+  end subroutine read_own
+
+  !> Whether nodes depend on a variable, in any branch.
+  pure function depends_on(tape, number) result(depends)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: number
+    logical :: depends(tape%count)
+    integer :: i
+    do i = 1, tape%count
+      associate (node => tape%nodes(i))
+        depends(i) = .false.
+        if (node%operation == op_variable) then
+          depends(i) = node%first == number
+        else if (node%operation == op_select) then
+          depends(i) = depends(node%second) .or. depends(node%third) .or. depends(tape%switches(node%first)%argument)
+        else if (operation_table(node%operation)%arguments > 0) then
+          depends(i) = depends(node%first)
+          if (operation_table(node%operation)%arguments > 1) depends(i) = depends(i) .or. depends(node%second)
+        end if
+      end associate
+    end do
+  end function depends_on
+
+end module own_names
