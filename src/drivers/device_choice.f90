@@ -172,7 +172,7 @@ contains
     call slice_motion(grid_of(the_case, the_case%axes(:0)), 0_int64, moving, error)
     if (allocated(error)) return
     call prepare_flow(moving, flow)
-    has_lanes = flow%available .and. .not. (on_gpu .and. allocated(flow%structure))
+    has_lanes = flow%available .and. .not. (on_gpu .and. (allocated(flow%structure) .or. allocated(flow%tape)))
   end function has_lanes
 
   pure function device_of(number) result(words)

@@ -11,7 +11,8 @@
 namespace {
 
 const double two_pi = 6.283185307179586;
-// Remainders are bounded a little above, and stay inside the box with it; shares of forces and speeds within which the event loop decides.
+// Remainders are bounded a little above, and stay inside the box with it; shares of forces and speeds within
+// which the event loop decides.
 const double above = 1.01, inside = 1 + 2e-8, doubt = 1e-11;
 // Shortest step, as a part of that by the last coefficients.
 const double shortest_share = 1e-3;
@@ -110,8 +111,8 @@ inline void set_variables(const tape_machine &m, vec length, vec *size, tape_gro
   for (int i = 0; i < vec_size; i++)
     box[i] = box[i] * tape_levels + level[i];
   vec longest = by_box(m.longest, 1, box);
-  mask lost =
-      ~((size[tape_phase] < 2 * two_pi) & (speed < m.speed[tape_speeds - 1]) & (need < m.level_size[tape_levels - 1]) & (longest > 0.0));
+  mask lost = ~((size[tape_phase] < 2 * two_pi) & (speed < m.speed[tape_speeds - 1]) &
+                (need < m.level_size[tape_levels - 1]) & (longest > 0.0));
   if (any(length > longest)) {
     length = smaller(length, longest);
     set_variables(m, length, size, g);
