@@ -78,7 +78,7 @@ contains
     type(lane_batch_t), intent(inout) :: control
     type(tape_batch_t), intent(inout) :: batch
     control%status(lane) = lane_fresh
-    batch%z(lane, :5) = [merge(crank%phi, 0.0_wp, crank%phi < two_pi), crank%w, state%x, state%v, crank%y]
+    batch%z(lane, :5) = [merge(crank%phi, 0.0_wp, crank%phi < two_pi), crank%w, state%x, state%v, crank%own(1)]
     batch%time(lane) = state%time
     batch%slip(lane) = merge(-1, 1, state%mode == mode_slip_minus)
     batch%limit(lane) = huge(1.0_wp)
@@ -99,7 +99,7 @@ contains
     state%mode = merge(mode_slip_minus, mode_slip_plus, batch%slip(lane) < 0)
     crank%phi = batch%z(lane, 1)
     crank%w = batch%z(lane, 2)
-    crank%y = batch%z(lane, 5)
+    crank%own(1) = batch%z(lane, 5)
     crank%turning = 1
     passed = batch%passed(lane) > 0.5_wp
     if (passed) lasted = batch%lasted(lane)

@@ -57,6 +57,8 @@ contains
     real(wp), intent(in) :: length
     type(lane_flow_t), intent(inout) :: flow
     type(tape_body_t) :: body
+    flow%available = .false.
+    if (system%clock) return
     associate (flight => system%flights(both_move, 0))
       body%tape = flight%tape
       body%parameters = system%sheet%parameters
