@@ -228,8 +228,9 @@ contains
     call turning%advance_to_section(later, unused, reason)
     ok = reason == 0
     if (ok) call recognise(turning, later, max_period, found, ok)
-    ! What turns round by rounding alone is on no cycle.
-    if (ok) ok = found%features%amplitude > 1e-9_wp*max(abs(found%features%x_max), abs(found%features%x_min))
+    ! What turns round by rounding alone is on no cycle, nor is what creeps into rest where forces jump.
+    if (ok) ok = found%features%amplitude > max(1e-9_wp*max(abs(found%features%x_max), abs(found%features%x_min)), &
+                                                1e-4_wp*moving%smallest_motion)
   end subroutine recognise_by_event
 
   !> Whether a catalogue has an attractor already, found again from a start that did not converge in time.

@@ -18,10 +18,8 @@ module law_table
   implicit none
   private
 
-  public :: law_row_t, parameter_row_t
-  public :: find_law, law_names, parameters_of, rows_of, text_of, table_of, path_of, part_kind, part_law, is_hidden, &
-    law_choice, value_of, list_of, &
-    set_value, change_parameter, split_element, is_start_parameter
+  public :: law_row_t, parameter_row_t, find_law, law_names, parameters_of, rows_of, text_of, table_of, path_of, part_kind, &
+    part_law, is_hidden, law_choice, value_of, list_of, set_value, change_parameter, split_element, is_start_parameter
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
@@ -33,8 +31,7 @@ module law_table
   !> The motor of a drive whose power is limited: one law, or none.
   character(len=*), parameter, public :: motor_family = 'motor'
 
-  !> Forces on one body and its further states, given by expressions: any number of each, each with a name of its own. The law
-  !> by expressions of any family.
+  !> Forces on one body and its further states, each with a name of its own; the law by expressions of any family.
   character(len=*), parameter, public :: force_family = 'force', state_family = 'state', own_law = 'expression'
 
   !> The parts of a machine of several bodies: any number of laws, each with a name of its own. Their laws are named

@@ -20,8 +20,9 @@ module own_equations
   use own_checks, only: check_period, check_values, set_scales
   use own_flights, only: add_own_flights
   use own_friction, only: add_friction, add_restitution
-  use own_names, only: add_known, add_parameters, depends_on, names_t, new_names, read_own
-  use restoring_law, only: restoring_of, restoring_t
+  use own_names, only: add_known, add_parameters, depends_on, names_t, new_names, read_own, set_unit
+  use own_units, only: parameter_unit, quantity_t
+  use restoring_law, only: position_is_angle, restoring_of, restoring_t
   use status, only: exit_bad_case, exit_internal
   use tape_value, only: evaluate
   use text, only: to_text
@@ -122,6 +123,9 @@ contains
       do i = 1, 3
         call add_known(names, seen(i), node_of(sheet, seen(i)))
       end do
+      names%is_angle = position_is_angle(choices)
+      names%of_variables = [variable_unit('s'), quantity_t(), variable_unit('m'), variable_unit('m/s')]
+      if (names%is_angle) names%of_variables(3:4) = quantity_t()
       do i = 1, size(choices)
         if (choices(i)%family /= state_family) cycle
         if (any(names%names == choices(i)%label)) then
@@ -130,6 +134,9 @@ contains
         end if
         call add_variable(sheet, 'state '//to_text(i))
         call add_known(names, trim(choices(i)%label), node_of(sheet, 'state '//to_text(i)))
+        associate (row => choices(i)%own(findloc(choices(i)%own%name == 'start', .true., dim=1)))
+          names%of_variables = [names%of_variables, variable_unit(trim(row%unit))]
+        end associate
       end do
       system%variables = sheet%variables
       call add_parameter(sheet, 'slip', 1.0_wp)
@@ -140,9 +147,17 @@ contains
       call add_parameter(sheet, 'least', 0.0_wp)
       system%slip = parameter_number(sheet, 'slip')
       system%turning = parameter_number(sheet, 'turning')
+      call set_unit(names, system%slip, quantity_t(is_known=.true.))
       call add_parameters(names, choices, sheet)
     end associate
   end subroutine add_variables
+
+  !> Unit of a variable, which every equation has.
+  pure type(quantity_t) function variable_unit(text) result(quantity)
+    character(len=*), intent(in) :: text
+    quantity = parameter_unit(text)
+    quantity%is_stated = .false.
+  end function variable_unit
 
   !> Period of the drive, and the foot of the spring.
   pure subroutine add_drive(choices, at, system, names, error)

@@ -5,17 +5,19 @@
 !> same table by their name, and of every table by 'table.name'.
 module own_names
   use equation_sheet, only: sheet_t
-  use errors, only: error_t
+  use errors, only: error_t, fail
   use expression_text, only: read_expression
   use kinds, only: wp
   use law_table, only: law_choice_t, own_law, parameter_row_t, path_of, rows_of, text_of
   use motor_system, only: far
   use operations, only: op_select, op_variable, operation_table
+  use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
+  use status, only: exit_bad_case
   use tape, only: parameter_node, tape_t
   implicit none
   private
 
-  public :: has_own, new_names, add_known, add_parameters, read_own, depends_on
+  public :: has_own, new_names, add_known, add_parameters, set_unit, read_own, depends_on
 
   integer, parameter, public :: known_length = 64
 
@@ -24,6 +26,10 @@ module own_names
     integer, allocatable :: nodes(:)
     !> The choice whose table a parameter stands in, 0 for other names.
     integer, allocatable :: tables(:)
+    !> Units of the variables and parameters of the tape, by their numbers, as far as they are known.
+    type(quantity_t), allocatable :: of_variables(:), of_parameters(:)
+    !> The position is an angle: forces are moments.
+    logical :: is_angle = .false.
   end type names_t
 
 contains
@@ -37,7 +43,7 @@ contains
   !> No names.
   pure subroutine new_names(names)
     type(names_t), intent(out) :: names
-    allocate (names%names(0), names%nodes(0), names%tables(0))
+    allocate (names%names(0), names%nodes(0), names%tables(0), names%of_variables(0), names%of_parameters(0))
   end subroutine new_names
 
   !> Makes a name known.
@@ -70,9 +76,22 @@ contains
         call parameter_node(sheet%tape, size(sheet%parameters), node)
         call add_known(names, path_of(choices(i))//'.'//trim(rows(k)%name), node)
         if (choices(i)%name == own_law) call add_known(names, trim(rows(k)%name), node, i)
+        call set_unit(names, size(sheet%parameters), parameter_unit(trim(rows(k)%unit)))
       end do
     end do
   end subroutine add_parameters
+
+  !> Sets the unit of a parameter of the tape.
+  pure subroutine set_unit(names, number, unit)
+    type(names_t), intent(inout) :: names
+    integer, intent(in) :: number
+    type(quantity_t), intent(in) :: unit
+    type(quantity_t) :: unknown
+    do while (size(names%of_parameters) < number)
+      names%of_parameters = [names%of_parameters, unknown]
+    end do
+    names%of_parameters(number) = unit
+  end subroutine set_unit
 
   !> Node of the expression `key` of choice number `i`; an error begins with the key in the case.
   pure subroutine read_own(names, choices, i, key, sheet, node, error)
@@ -86,8 +105,48 @@ contains
     logical :: seen(size(names%names))
     seen = names%tables == 0 .or. names%tables == i
     call read_expression(text_of(choices(i), key), pack(names%names, seen), pack(names%nodes, seen), sheet%tape, node, error)
+    if (.not. allocated(error)) call check_units(names, sheet, node, unit_of_key(names, choices(i), key), error)
     if (allocated(error)) error%message = path_of(choices(i))//'.'//key//': '//error%message
   end subroutine read_own
+
+  !> What the units of parameters make of an expression fits together, and is in `wanted`.
+  pure subroutine check_units(names, sheet, node, wanted, error)
+    type(names_t), intent(in) :: names
+    type(sheet_t), intent(in) :: sheet
+    integer, intent(in) :: node
+    character(len=*), intent(in) :: wanted
+    type(error_t), allocatable, intent(inout) :: error
+    type(quantity_t) :: quantity(sheet%tape%count), of_parameters(size(sheet%parameters))
+    integer :: fault(sheet%tape%count)
+    character(len=:), allocatable :: problem
+    of_parameters(:size(names%of_parameters)) = names%of_parameters
+    call quantities_of(sheet%tape, names%of_variables, of_parameters, quantity, fault)
+    problem = unit_problem(sheet%tape, node, quantity, fault, wanted)
+    if (len(problem) > 0) call fail(error, exit_bad_case, problem)
+  end subroutine check_units
+
+  !> The unit of the expression of a key; '' if it may have any.
+  pure function unit_of_key(names, choice, key) result(unit)
+    type(names_t), intent(in) :: names
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable :: unit
+    integer :: i
+    unit = ''
+    select case (key)
+    case ('restitution')
+      unit = '1'
+    case ('period')
+      unit = 's'
+    case ('force')
+      if (.not. names%is_angle) unit = 'N'
+    case ('position')
+      if (.not. names%is_angle) unit = 'm'
+    case ('rate')
+      i = findloc(choice%own%name == 'start', .true., dim=1)
+      if (choice%own(i)%unit /= '1') unit = trim(choice%own(i)%unit)//'/s'
+    end select
+  end function unit_of_key
 
   !> Whether nodes depend on a variable, in any branch.
   pure function depends_on(tape, number) result(depends)
