@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.locks import lock_options
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED, RENAMED_EVENTS
 from separatrix.version import __version__
@@ -47,7 +48,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     parts: list[xr.Dataset] = []
     with reading(path):
         try:
-            parts.append(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
+            parts.append(_open_group(path, None))
             parts += [_open_table(path, name) for name in groups]
             result = xr.merge(parts, join="exact", compat="no_conflicts")
             result = result.rename({old: new for old, new in RENAMED.items() if old in result.variables})
@@ -145,8 +146,13 @@ def _close(parts: list[xr.Dataset]) -> None:
         part.close()
 
 
+def _open_group(path: str | Path, name: str | None) -> xr.Dataset:
+    options = lock_options(path)
+    return xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False, driver_kwds=options)
+
+
 def _open_table(path: str | Path, name: str) -> xr.Dataset:
-    group = xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False)
+    group = _open_group(path, name)
     for key, variable in list(group.variables.items()):
         # in files of version 1 they are strings
         if variable.dtype.kind in "SO":
@@ -165,7 +171,7 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
     if not path.is_file():
         raise SeparatrixError(f"{path}: no such file", NO_INPUT)
     try:
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r", **lock_options(path)) as file:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
             _check_header(path, attributes)
             _compare_checksums(path, file)

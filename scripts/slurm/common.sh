@@ -14,6 +14,11 @@ export OMPI_MCA_oob_tcp_keepalive_time=${OMPI_MCA_oob_tcp_keepalive_time:-30}
 export OMPI_MCA_oob_tcp_keepalive_intvl=${OMPI_MCA_oob_tcp_keepalive_intvl:-10}
 export OMPI_MCA_oob_tcp_keepalive_probes=${OMPI_MCA_oob_tcp_keepalive_probes:-3}
 
+# start_ranks ARGUMENTS: the program on all tasks of the job. When a rank is killed, the others would wait for it.
+start_ranks() {
+  srun --mpi="${SEPARATRIX_SRUN_MPI:-pmix}" --kill-on-bad-exit=1 "$separatrix" "$@"
+}
+
 # Tiles done in a working file; 0 if there is none.
 tiles_done() {
   if [[ -e $1 ]]; then

@@ -18,5 +18,5 @@ case_file=$1 output=$2
 shift 2
 
 # The signal goes to the ranks, which stop cleanly.
-srun --mpi="${SEPARATRIX_SRUN_MPI:-pmix}" "$separatrix" basin "$case_file" -o "$output" --resume --log "$output.log.jsonl" "$@"
+start_ranks basin "$case_file" -o "$output" --resume --log "$output.log.jsonl" "$@"
 end_job $? "$output.part"

@@ -5,6 +5,7 @@
 import fcntl
 import os
 import subprocess
+import sys
 
 import life
 import pytest
@@ -28,6 +29,17 @@ def test_the_locks_of_hdf5_can_be_asked_for(separatrix, faulty_calls, tmp_path) 
     variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": life.NAME, "FAULT_DO": "unlockable"}
     process = life.launch(separatrix, tmp_path, 0, variables=variables | {"HDF5_USE_FILE_LOCKING": "TRUE"})
     assert process.wait(120) == 73, (tmp_path / "log").read_text()
+
+
+def test_a_result_is_read_without_locks(faulty_calls, reference) -> None:
+    variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": life.NAME, "FAULT_DO": "unlockable"}
+    script = (
+        "import sys, separatrix as sx; from separatrix.view.files import ResultFile\n"
+        "print(sx.open_result(sys.argv[1]).sizes['x0'], ResultFile(sys.argv[1]).kind)"
+    )
+    command = [sys.executable, "-c", script, reference]
+    ended = subprocess.run(command, env=os.environ | variables, capture_output=True, text=True)
+    assert ended.stdout == "44 basin\n", ended.stderr
 
 
 @pytest.mark.parametrize("option", ["", "--resume", "--force"])

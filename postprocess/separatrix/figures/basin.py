@@ -29,6 +29,7 @@ from separatrix.figures.caption import caption_pieces, describe_case, start_piec
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.figures.page import Figures, Page, label
 from separatrix.labels import axis_label, count_text, plain, share_texts, value_label
+from separatrix.locks import lock_options
 from separatrix.open import table
 from separatrix.reduce import Plane, Strip, majority_plane, scalar_plane
 
@@ -224,7 +225,7 @@ def _source(path: str | Path | None, result: xr.Dataset, field: str) -> Iterator
     if path is None:
         yield result[field].values
     else:
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r", **lock_options(path)) as file:
             yield file[field]
 
 

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.locks import lock_options
 from separatrix.palette import of_attractors
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED
@@ -32,9 +33,10 @@ class ResultFile:
         self.path, self.number = Path(path), number
         if not self.path.is_file():
             raise SeparatrixError(f"{path}: no such file", NO_INPUT)
-        try_first(path, lambda: self._try(h5py.File(path)))
+        options = lock_options(path)
+        try_first(path, lambda: self._try(h5py.File(path, **options)))
         try:
-            self.file = h5py.File(path)
+            self.file = h5py.File(path, **options)
             self._read_header(self.file)
         except SeparatrixError:
             raise

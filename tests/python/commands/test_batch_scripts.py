@@ -40,7 +40,7 @@ echo "$job"
 """
 SRUN = """\
 #!/usr/bin/env bash
-shift
+while [[ $1 == -* ]]; do shift; done
 exec "$@"
 """
 SCONTROL = """\
