@@ -40,7 +40,9 @@ def lagging_force(state: SearchState) -> SearchState:
     slope, error = _slope(line, fastest)
     gained = gain_over(named, base)[0]
     curved = gain_over(named, line)[0] > SEARCH.lag_curved * gained
-    if curved or slope > -SEARCH.lag_sure * error:
+    # of a large gap a line may close most and still leave far more than the name does
+    most = state.context.options.missed_chi2 * max(1.0, named.fit.reduced_chi2)
+    if curved or line.fit.reduced_chi2 > most or slope > -SEARCH.lag_sure * error:
         return state
     parameters = line.model.parameters
     free = [
