@@ -124,6 +124,7 @@ contains
       if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
     else if (span%whole_periods .and. moving%has_drive_period .and. .not. is_short(moving, span)) then
       text = 'last '//to_text(nint(span%window/moving%period))//' drive periods'
+      if (.not. moving%timed) text = 'last '//to_text(span%window, 6)//' s'
     else
       text = 'last '//to_text(span%window, 6)//' s'
     end if

@@ -13,7 +13,7 @@ module motor_machine
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: log_t, options_t, tally_t
   use motor_choices, only: start_of_motor
-  use motor_equations, only: foot_half_range, y_at
+  use motor_equations, only: foot_half_range
   use motor_log, only: add_sample, motor_energy
   use motor_motion, only: advance_motor, motor_motion_t, prepare_motor, start_motor
   use section_size, only: most_coordinates
@@ -105,7 +105,7 @@ contains
 
   pure integer function coordinates(self) result(n)
     class(motor_machine_t), intent(in) :: self
-    n = self%motor%system%variables - 1
+    n = merge(4, 3, self%motor%system%control%has_own)
   end function coordinates
 
   pure function section_obstacle(self) result(text)
@@ -126,6 +126,14 @@ contains
     call start_motor(self%motor, all, section%state, section%motor)
   end function start
 
+  !> The same after a ramp.
+  pure function start_settled(self, values) result(section)
+    class(motor_machine_t), intent(in) :: self
+    real(wp), intent(in) :: values(5)
+    type(section_state_t) :: section
+    call start_motor(self%motor, values, section%state, section%motor, settled=.true.)
+  end function start_settled
+
   pure logical function allows(self, values) result(allowed)
     class(motor_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
@@ -137,7 +145,7 @@ contains
     type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(section_state_t) :: section
-    section = self%start([before%state%x, before%state%v, angle, before%motor%w, before%motor%y])
+    section = start_settled(self, [before%state%x, before%state%v, angle, before%motor%w, before%motor%y])
     ! What sticks stays so where both machines would hold it; the rest of the state has no memory.
     section%motor%turns = before%motor%turns
   end function resume
@@ -149,7 +157,7 @@ contains
     real(wp) :: y
     y = 0
     if (self%coordinates() > 3) y = point(4)
-    section = self%start([point(1), point(2), 0.0_wp, point(3), y])
+    section = start_settled(self, [point(1), point(2), 0.0_wp, point(3), y])
   end function state_at
 
   pure function point_of(self, section) result(point)
@@ -263,7 +271,7 @@ contains
       call set_column(columns(5), 'motor_power', 'W', 'power of the motor at its shaft', values(3, :n))
       if (self%motor%system%current > 0) then
         call set_column(columns(6), 'current', 'A', 'current of the motor', values(4, :n))
-      else if (self%motor%system%variables == y_at) then
+      else if (self%motor%system%control%has_own) then
         call set_column(columns(6), 'integral', 'rad', 'integral of the speed control', values(4, :n))
       else
         columns = columns(:5)

@@ -5,8 +5,9 @@
 module motor_log
   use constants, only: two_pi
   use kinds, only: wp
-  use motion_state, only: energy_balance_t, log_t, mode_slip_minus, put_column, record_event, record_sample, state_t
+  use motion_state, only: energy_balance_t, log_t, put_column, record_event, record_sample, state_t
   use motor_equations, only: motor_system_t
+  use motor_now, only: parameters_now, state_vector
   use motor_state, only: motor_state_t
   use tape_value, only: evaluate
   implicit none
@@ -22,13 +23,9 @@ contains
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
     real(wp) :: values(6)
-    real(wp) :: node(system%sheet%tape%count), parameters(size(system%sheet%parameters)), z(5)
+    real(wp) :: node(system%sheet%tape%count)
     integer :: fault(system%sheet%tape%count)
-    z = [crank%phi, crank%w, state%x, state%v, crank%y]
-    parameters = system%sheet%parameters
-    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
-    parameters(system%turning) = crank%turning
-    call evaluate(system%sheet%tape, z(:system%variables), parameters, node, fault)
+    call evaluate(system%sheet%tape, state_vector(system, state, crank), parameters_now(system, state, crank), node, fault)
     values = [node(system%torque), node(system%load), node(system%torque)*crank%w, crank%y, node(system%kinetic), &
               node(system%energy)]
     if (system%current > 0) values(4) = node(system%current)

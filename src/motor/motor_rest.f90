@@ -6,13 +6,14 @@ module motor_rest
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, state_t
   use motor_equations, only: body_held, both_held, both_move, crank_held, motor_system_t
+  use motor_now, only: parameters_now, state_vector
   use motor_state, only: motor_state_t
   use series_flight, only: flight_t
   use tape_series, only: expand, prepare_series, series_t
   implicit none
   private
 
-  public :: choose_body, choose_crank, equation_mode, slips, state_vector, chatter_dies_out, low_series, zero_order
+  public :: choose_body, choose_crank, equation_mode, slips, chatter_dies_out, low_series, zero_order
 
   !> Terms that decide which way a motion from rest goes.
   integer, parameter, public :: low_order = 8
@@ -33,17 +34,6 @@ contains
     mode = merge(merge(both_move, crank_held, crank_turns), merge(body_held, both_held, crank_turns), body_slips)
   end function equation_mode
 
-  !> The variables of the equations.
-  pure function state_vector(system, state, crank) result(z)
-    type(motor_system_t), intent(in) :: system
-    type(state_t), intent(in) :: state
-    type(motor_state_t), intent(in) :: crank
-    real(wp) :: z(system%variables)
-    real(wp) :: all(5)
-    all = [crank%phi, crank%w, state%x, state%v, crank%y]
-    z = all(:system%variables)
-  end function state_vector
-
   !> First Taylor coefficients of everything in a mode. The sign of slip is that of the mode of the body.
   pure subroutine low_series(system, mode, state, crank, series, fault)
     type(motor_system_t), intent(in) :: system
@@ -52,14 +42,10 @@ contains
     type(motor_state_t), intent(in) :: crank
     type(series_t), intent(out) :: series
     integer, intent(out) :: fault
-    real(wp) :: parameters(size(system%sheet%parameters))
-    parameters = system%sheet%parameters
-    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
-    parameters(system%turning) = crank%turning
     associate (flight => system%flights(mode, 0))
       call prepare_series(flight%tape, low_order, flight%rates, &
                           [flight%guards%node, system%torque, system%load, system%foot, system%inertia], [integer ::], series)
-      call expand(flight%tape, state_vector(system, state, crank), parameters, series, fault)
+      call expand(flight%tape, state_vector(system, state, crank), parameters_now(system, state, crank), series, fault)
     end associate
   end subroutine low_series
 
