@@ -46,6 +46,10 @@ module hybrid_machine
     real(wp) :: turn = 0
     !> Rigid stops that bound it [m].
     real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
+    !> Of one body: size of the forces [N]; positions at which it meets something below and above [m], and whether that is soft;
+    !> whether a turning point is no event, as no force depends on the direction.
+    real(wp) :: force_size = 1, barriers(2) = [-huge(1.0_wp), huge(1.0_wp)]
+    logical :: soft = .false., smooth_turns = .false.
   contains
     procedure :: size_of_time
     procedure :: section_sizes
