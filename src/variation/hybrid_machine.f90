@@ -38,6 +38,8 @@ module hybrid_machine
     !> Time from section to section [s]; without a clock an event is the section, and this a size of times.
     real(wp) :: period = 0
     logical :: has_clock = .true.
+    !> The section is the passage of a crank: no cycle shrinks to nothing there.
+    logical :: crank_section = .false.
     !> Natural sizes of the coordinates.
     real(wp), allocatable :: size_of(:)
     !> Rows that give position [m] and speed [m/s] of what is watched.

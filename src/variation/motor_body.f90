@@ -132,6 +132,7 @@ pure function motor_body_of(machine, sizes) result(body)
     body%n = system%variables
     body%positions = 2
     body%has_clock = .false.
+    body%crank_section = .true.
     body%period = machine%period
     body%order = order(:body%n)
     body%lower = machine%lower

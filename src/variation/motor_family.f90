@@ -38,10 +38,24 @@ contains
       call fail(error, exit_bad_case, why)
       return
     end if
-    sizes = machine%sizes%length*[1.0_wp, machine%drive_frequency]
+    sizes = reach_of(machine)*[1.0_wp, machine%drive_frequency]
     if (family%sizes(1) > 0) sizes = family%sizes
     body = motor_body_of(machine, sizes)
   end subroutine motor_body_of_family
+
+  !> Size of the positions [m]: at resonance that of the foot times the quality of the oscillator, up to ten, as far as a stop allows.
+  pure real(wp) function reach_of(machine) result(reach)
+    type(motor_machine_t), intent(in) :: machine
+    real(wp), parameter :: most_quality = 10
+    real(wp) :: quality, room
+    associate (system => machine%motor%system, length => machine%sizes%length)
+      quality = most_quality
+      if (system%friction%damping > 0) quality = sqrt(system%stiffness*system%mass)/system%friction%damping
+      reach = length*max(1.0_wp, min(quality, most_quality))
+      room = min(system%contact%upper - system%free_length, system%free_length - system%contact%lower)
+      if (machine%has_stops) reach = min(reach, max(length, abs(room)))
+    end associate
+  end function reach_of
 
   !> The machine and its neighbours in the parameter.
   pure subroutine motor_neighbourhood(family, value, machines, error)
