@@ -18,7 +18,7 @@ module motor_choices
   character(len=*), parameter :: too_steep = 'motor.inertia: so little that the speed follows the torque within 1e-4 of a '// &
     'turn; allowed more, or a drive without a motor, whose speed is given'
 
-  public :: cannot_start, has_motor, has_ramp, supply_of, number_of_family, refuse_laws, speed_of, start_of_motor
+  public :: cannot_start, has_motor, has_ramp, resonance_of, supply_of, number_of_family, refuse_laws, speed_of, start_of_motor
 
 contains
 
@@ -49,6 +49,18 @@ contains
       if (has_ramp) has_ramp = value_of(motor, 'ramp_time') > 0
     end associate
   end function has_ramp
+
+  !> Speed of the crank at resonance, the natural angular frequency of body and spring [rad/s]; 0 without a motor.
+  pure real(wp) function resonance_of(choices) result(speed)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer :: body, restoring
+    speed = 0
+    body = number_of_family(choices, 'body')
+    restoring = number_of_family(choices, 'restoring')
+    if (.not. has_motor(choices) .or. body == 0 .or. restoring == 0) return
+    if (choices(restoring)%name /= 'linear') return
+    speed = sqrt(value_of(choices(restoring), 'stiffness')/value_of(choices(body), 'mass'))
+  end function resonance_of
 
   !> Key of what sets the speed of a motor.
   pure function supply_of(choices) result(key)
