@@ -13,8 +13,12 @@ module motor_flow
   use tape_derivative, only: differentiate
   use tape_series, only: expand, prepare_series, series_t
   use tape_value, only: evaluate
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
+
+  !> Steps after which a flight is given up: a turn takes some twenty.
+  integer, parameter :: most_steps = 20000
 
   public :: add_slopes, fly_on, new_flow, rates_at
 
@@ -116,21 +120,22 @@ contains
     real(wp), intent(inout) :: z(:)
     type(series_t) :: series
     real(wp) :: left, step
-    integer :: fault, i
+    integer :: fault, i, k
     call prepare_series(tape, series_order, rates, [integer ::], [integer ::], series)
     left = duration
-    do while (abs(left) > 0)
+    do i = 1, most_steps
+      if (.not. abs(left) > 0) return
       call expand(tape, z, parameters, series, fault)
-      if (fault /= 0) z = sqrt(-abs(left))
       if (fault /= 0) exit
       step = step_of(series%c(:, states), max(scales, abs(z)))
       if (step >= abs(left)) step = abs(left)
       step = sign(step, left)
-      do i = 1, size(states)
-        z(i) = value_of(series%c(:, states(i)), step)
+      do k = 1, size(states)
+        z(k) = value_of(series%c(:, states(k)), step)
       end do
       left = left - step
     end do
+    if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
   end subroutine take_steps
 
   !> The step whose last two terms are rounding (Jorba & Zou 2005).
