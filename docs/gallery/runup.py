@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The motor that the machine slows down.
 
-A lever mechanism shakes a body that may hit a stop. In grey the amplitudes that a drive of given speed has, on the
-way up and down. A motor of limited power does not reach them all: as its no-load speed rises slowly, the crank
-lags behind, until it jumps over the resonance. On the way down it jumps back elsewhere. This is the Sommerfeld effect.
+A lever mechanism shakes a body that may hit a stop. In grey the amplitudes under a drive of given speed, on
+the way up and down. A motor of limited power does not reach them all. Its no-load speed rises slowly, and the
+crank lags behind until it jumps over the resonance. On the way down it jumps back elsewhere. This is the
+Sommerfeld effect.
 """
 
 import sys

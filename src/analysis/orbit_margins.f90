@@ -151,7 +151,7 @@ contains
       end select
       if (margin%kind > 0) list = [list, margin]
       if (is_dead_impact(machine, event)) list = [list, rest_or_return(machine, event, k)]
-      ! The section closes the orbit of a machine without a clock: it has no place in the order.
+      ! The section closes the orbit of a machine without a clock: it is not part of the order.
       if (k == 1 .or. (.not. machine%has_clock .and. k == size(orbit%events))) return
       margin = margin_t(event=k, side=event%side, time=event%time, kind=of_order, &
                         value=(event%time - orbit%events(k - 1)%time)/machine%period)
@@ -261,7 +261,8 @@ contains
     end do
   end subroutine look_while_stuck
 
-  !> The least reserve of friction [N] and its instant [s] in a stick that begins at `from` with `y`, by the Illinois form of the secant rule.
+  !> The least reserve of friction [N] and its instant [s] in a stick that begins at `from` with `y`, by the Illinois form of the
+  !> secant rule.
   pure subroutine least_reserve(machine, side, from, y, within, t, value)
     class(hybrid_t), intent(in) :: machine
     integer, intent(in) :: side
@@ -320,8 +321,8 @@ contains
     end associate
   end subroutine note_slowest
 
-  !> Where the velocity (`row` 1) or the acceleration (that of the velocity) changes its sign between `low` and `high` [s], by the Illinois form of
-  !> the secant rule from the state `start` at `low`; the state there.
+  !> Where the rate of a coordinate, `row`, changes its sign between `low` and `high` [s], by the Illinois form of the secant rule
+  !> from the state `start` at `low`; the state there.
   pure subroutine find_zero(machine, mode, start, low, high, row, t, y)
     class(hybrid_t), intent(in) :: machine
     integer, intent(in) :: mode, row

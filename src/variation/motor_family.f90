@@ -43,7 +43,8 @@ contains
     body = motor_body_of(machine, sizes)
   end subroutine motor_body_of_family
 
-  !> Size of the positions [m]: at resonance that of the foot times the quality of the oscillator, up to ten, as far as a stop allows.
+  !> Size of the positions [m]: at resonance that of the foot times the quality of the oscillator, up to ten, and as far as a stop
+  !> allows.
   pure real(wp) function reach_of(machine) result(reach)
     type(motor_machine_t), intent(in) :: machine
     real(wp), parameter :: most_quality = 10

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Machines with a motor: speed and power in time, speed within a turn, where the power goes, speed over a parameter."""
+"""Machines with a motor: speed and power in time, speed within a turn, shares of the power."""
+
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -16,17 +18,21 @@ from separatrix.labels import axis_label, unit
 
 # so many of the last turns are drawn over one
 _TURNS = 5
-_LOSSES = (("contact_loss", "impacts"), ("friction_loss", "dry friction"), ("damping_loss", "viscous friction"))
+_LOSSES = (
+    ("contact_loss", "impacts"),
+    ("friction_loss", "dry friction"),
+    ("damping_loss", "viscous friction"),
+)
 
 
 def turns(result: xr.Dataset) -> tuple[np.ndarray, ...]:
-    """Return, for every turn of the crank in a trajectory, its begin and end [s], mean speed [rad/s] and amplitude [m].
+    """Return the turns of the crank in a trajectory: begin and end [s], mean speed [rad/s], amplitude [m].
 
-    The amplitude is half the range of the position in the turn. Turns that the crank does not complete are left out.
+    The amplitude is half the range of the position. Turns that are not completed are left out.
     """
     time, angle, x = (result[name].values for name in ("time", "crank_angle", "x"))
     number = np.floor(angle / (2 * np.pi)).astype(int)
-    # the crank may swing back: a turn begins where it is reached for good
+    # the crank may turn back: a turn begins where it is reached for the first time
     first = np.maximum.accumulate(number)
     marks = np.flatnonzero(np.diff(first) > 0) + 1
     begins = np.array(
@@ -35,12 +41,12 @@ def turns(result: xr.Dataset) -> tuple[np.ndarray, ...]:
     if begins.size < 2:
         return np.empty(0), np.empty(0), np.empty(0), np.empty(0)
     counts = np.diff(first[marks])
-    half = np.array([np.ptp(x[a:b]) / 2 for a, b in zip(marks[:-1], marks[1:], strict=True)])
+    half = np.array([np.ptp(x[a:b]) / 2 for a, b in pairwise(marks)])
     return begins[:-1], begins[1:], 2 * np.pi * counts / np.diff(begins), half
 
 
 def history(result: xr.Dataset, title: str, caption: list[str], look: Look = DEFAULT) -> Figure:
-    """Return the speed of the crank, the position of the body and the power of the motor during the whole run."""
+    """Return speed of the crank, position of the body and power of the motor during the whole run."""
     page = Page(look, (style.DOUBLE_COLUMN, 120.0), 3, sharex=True)
     page.letter()
     time = result["time"].values
@@ -86,7 +92,13 @@ def power(result: xr.Dataset, title: str, caption: list[str], look: Look = DEFAU
     names = list(parts)[::-1]
     hatches = dict(zip(parts, ("", "///", "...", "xx"), strict=True))
     for name in names:
-        ax.barh(name, parts[name], color="white" if name != "motor" else "0.6", edgecolor="black", hatch=hatches[name])
+        ax.barh(
+            name,
+            parts[name],
+            color="white" if name != "motor" else "0.6",
+            edgecolor="black",
+            hatch=hatches[name],
+        )
         ax.text(parts[name], name, f" {parts[name]:.4g} W", va="center", fontsize=7)
     ax.set_xlim(0, 1.18 * max(parts.values()))
     ax.set_xlabel("mean power (W)")
