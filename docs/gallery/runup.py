@@ -30,8 +30,8 @@ ideal = sx.sweep(given.with_({"run.duration": 60.0, "sweep": swept}), "drive.rat
 figure, (left, right) = plt.subplots(1, 2, figsize=(6.9, 3.2), layout="constrained")
 ratio = ideal["drive_ratio"].values
 for half in ((ideal["x_max"] - ideal["x_min"]).values / 2).reshape(-1, ratio.size):
-    right.plot(ratio, half, ".", color="0.6", markersize=4, label="given speed")
-for case, colour, line, name in ((up, "C1", "-", "run-up"), (down, "C0", "--", "coast-down")):
+    right.plot(ratio, half, ".", color="0.75", markersize=5, label="given speed")
+for case, colour, line, name in ((up, "black", "-", "run-up"), (down, "C0", "--", "coast-down")):
     motion = sx.trajectory(case)
     begin, _, speed, half = turns(motion)
     ramp = case.resolved["motor"]
