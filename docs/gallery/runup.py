@@ -18,7 +18,8 @@ from separatrix.figures.motor import turns
 
 count = int(sys.argv[1]) if sys.argv[1:] else 240
 natural = 3 * np.pi
-up = sx.load("runup.toml").with_({"run.duration": float(count), "motor.ramp_time": float(count)})
+ramp = {"run.duration": float(count), "motor.ramp_time": float(count), "run.window": 5.0}
+up = sx.load("runup.toml").with_(ramp)
 down = up.with_({"motor.no_load_speed": 8.0, "motor.ramp_from": 20.0, "motor.crank_speed": 20.0})
 # the same mechanism with a given speed
 text = Path("runup.toml").read_text()
@@ -34,8 +35,9 @@ for half in ((ideal["x_max"] - ideal["x_min"]).values / 2).reshape(-1, ratio.siz
 for case, colour, line, name in ((up, "black", "-", "run-up"), (down, "C0", "--", "coast-down")):
     motion = sx.trajectory(case)
     begin, _, speed, half = turns(motion)
-    ramp = case.resolved["motor"]
-    supply = ramp["ramp_from"] + (ramp["no_load_speed"] - ramp["ramp_from"]) * begin / ramp["ramp_time"]
+    motor = case.resolved["motor"]
+    first, last = motor["ramp_from"], motor["no_load_speed"]
+    supply = first + (last - first) * begin / motor["ramp_time"]
     left.plot(supply, speed / natural, line, color=colour, linewidth=1, label=name)
     right.plot(speed / natural, half, line, color=colour, linewidth=1, label=name)
     jump = np.argmax(np.abs(np.convolve(speed, [1] * 5 + [-1] * 5, "valid"))) + 5 if speed.size > 10 else 0

@@ -49,7 +49,8 @@ class Accessor:
     def attractors(self) -> "pandas.DataFrame":
         """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ...
 
-        `crank_speed` is the mean speed of the crank of a motor [rad/s]. `grazing_margin` is NaN where no turning point missed a barrier.
+        `crank_speed` is the mean of a machine with a motor [rad/s].
+        `grazing_margin` is NaN where no turning point missed a barrier.
         """
         self._require("basin")
         catalogue = table(self._result, "catalogue")

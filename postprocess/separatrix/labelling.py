@@ -23,7 +23,7 @@ _PIECE = 1024
 
 
 def can_label(case: Case) -> bool:
-    """Whether the library does it: one body on a line without a motor, every point of the grid, an axis of starts."""
+    """Whether the library does it: one body on a line, no motor, every point of the grid, starts."""
     resolved = case.resolved
     starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
     # a machine of several bodies has no restoring law

@@ -3,9 +3,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares machines with a motor with an independent program, writes docs/motor_checks.md.
 
-The values of the other program come from Taylor series of order 36 in quadruple precision. SciPy's DOP853 confirms
-them to 2e-12. Machines: Y, a scotch yoke without friction and stop; I, the same with dry friction and a stop; R, an
-unbalance; P, the lever mechanism of examples/motor_lever.toml.
+The values of the other program come from Taylor series of order 36 in quadruple precision. Machines: Y, a
+scotch yoke without friction and stop; I, the same with dry friction and a stop; R, an unbalance; P, the lever
+mechanism of examples/motor_lever.toml.
 """
 
 import argparse
@@ -56,10 +56,10 @@ THRESHOLD, THRESHOLD_BAR = 6.383280023598, 1e-7
 PAGE = """\
 # Machines with a motor against another program
 
-Written by `scripts/evidence/motor_checks.py`; do not edit. The values of the other program come from Taylor series of
-order 36 in quadruple precision, confirmed by SciPy's DOP853 to 2e-12. Y is a scotch yoke without friction and stop, I
-the same with dry friction and a stop (`examples/motor_impact.toml`), R an unbalance, P the lever mechanism of
-`examples/motor_lever.toml`. Values are in V, of P in rad/s.
+Written by `scripts/evidence/motor_checks.py`; do not edit. The values of the other program come from Taylor
+series of order 36 in quadruple precision, confirmed by SciPy's DOP853 to 2e-12. Y is a scotch yoke without
+friction and stop, I the same with dry friction and a stop (`examples/motor_impact.toml`). R is an unbalance,
+P the lever mechanism of `examples/motor_lever.toml`. Values are in V, of P in rad/s.
 
 ## Bifurcations, by `branches`
 
@@ -71,7 +71,8 @@ The least voltage that passes the resonance of Y is {threshold} V in the other p
 
 {runs}
 
-The suites `test_motor_orbits` and `test_motor_motion` compare 16 cycles with their multipliers (to 1e-9) and 52 events.
+The suite `test_motor_orbits` compares 16 cycles with their multipliers to 1e-9.
+The suite `test_motor_motion` compares lists of events.
 
 ## Not as it must be
 
