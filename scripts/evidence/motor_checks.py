@@ -48,7 +48,6 @@ LIMITS = (
     ("I", "end of the slow coast-down", VOLTAGE, (5.9, 6.2), "NS", 6.019664934380103),
     ("I", "free cycle touches the stop", VOLTAGE, (4.5, 4.65), "GR", 4.611362473527201),
     ("P", "end of the slow run-up", SPEED, (16.0, 16.6), "SN", 16.38442678131826),
-    ("P", "period doubling", SPEED, (10.0, 10.3), "PD", 10.09385546020162),
 )
 BAR = 1e-8
 # From standstill the least voltage that passes the resonance.
