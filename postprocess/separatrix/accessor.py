@@ -49,6 +49,7 @@ class Accessor:
     def attractors(self) -> "pandas.DataFrame":
         """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ...
 
+        `crank_speed` is the mean of a machine with a motor [rad/s].
         `grazing_margin` is NaN where no turning point missed a barrier.
         """
         self._require("basin")
@@ -61,6 +62,8 @@ class Accessor:
             frame["kind"] = [KINDS[code - 1] for code in catalogue["kind"].values]
         frame["regime"] = [REGIMES[code] for code in catalogue["regime"].values]
         frame["event_word"] = decode_words(catalogue["event_word"]).values
+        if "motor" in self.case.resolved:
+            frame["crank_speed"] = 2 * np.pi * frame["period"] / frame["cycle_time"]
         # not a number where no turning point missed a barrier; files of version 1 have the largest number
         margins = frame["grazing_margin"]
         frame["grazing_margin"] = margins.where(margins < np.finfo(float).max)

@@ -23,12 +23,13 @@ _PIECE = 1024
 
 
 def can_label(case: Case) -> bool:
-    """Whether the library does it: one body on a line, every point of the grid, an axis of starts."""
+    """Whether the library does it: one body on a line, no motor, every point of the grid, starts."""
     resolved = case.resolved
     starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
     # a machine of several bodies has no restoring law
     line = resolved.get("restoring", {}).get("law", "pendulum") != "pendulum"
-    return starts and line and "refine" not in resolved and "driven_mass" not in resolved["body"]
+    more = "refine" in resolved or "motor" in resolved or "driven_mass" in resolved["body"]
+    return starts and line and not more
 
 
 class SecondLookError(Exception):

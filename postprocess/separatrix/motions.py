@@ -87,11 +87,16 @@ def trajectory(
     if samples is not None:
         asked["trajectory.samples_per_period"] = int(samples)
     changed = case.with_(asked)
-    result, given_up = (_of_program if several_bodies(changed.resolved) else _of_library)(changed)
+    result, given_up = (_of_program if _has_more(changed.resolved) else _of_library)(changed)
     if given_up and not partial:
         message = f"{given_up} after {float(result.time[-1]) if result.time.size else 0.0:.6g} s"
         raise GivenUpError(f"{message} (partial=True returns it as far as it went)", result)
     return result
+
+
+def _has_more(resolved: dict) -> bool:
+    """Whether a motion has more than the samples of one body: other bodies, or the crank of a motor."""
+    return several_bodies(resolved) or "motor" in resolved
 
 
 def _of_library(case: Case) -> tuple[xr.Dataset, str]:

@@ -31,7 +31,9 @@ _MODES = "slip_plus slip_minus stick upper_barrier lower_barrier held"
 
 
 # Axes over starts: of one body, of bodies and structures by name, the count of starts drawn at random.
-_START = re.compile(r"x0|v0|crank_angle|sample|body_.+_[xv]0|structure_.+_[xv]0_\d+")
+_START = re.compile(
+    r"x0|v0|crank_angle|sample|motor_(?:crank_speed|start_current|start_integral)|body_.+_[xv]0|structure_.+_[xv]0_\d+"
+)
 
 
 def is_start(axis: str) -> bool:

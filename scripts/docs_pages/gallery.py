@@ -11,7 +11,7 @@ from .reference import MADE
 # in the order in which they are shown
 ORDER = (
     "petals", "zoom", "flow", "twins", "ratios", "cascade", "shells", "eye", "strange", "islands", "dry",
-    "soft", "pendulum", "duffing", "belt", "pounding",
+    "soft", "pendulum", "duffing", "belt", "pounding", "runup",
 )  # fmt: skip
 
 

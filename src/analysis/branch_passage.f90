@@ -11,7 +11,6 @@ module branch_passage
   use kinds, only: wp
   use margin_cause, only: cause_of, together
   use motion_state, only: event_separation
-  use one_body, only: one_body_t
   use orbit_margins, only: margin_t, margins_t, of_gap, of_hold, of_impact, of_order, of_release, of_slip, of_stick, &
     of_turning, same_meaning
   use other_sequence, only: change_sequence
@@ -286,10 +285,10 @@ contains
         cycle
       end if
       select type (machine => at%machines%centre)
-      type is (one_body_t)
-        call change_sequence(machine, before, at%margins%list(i), changed, known)
       type is (structure_t)
         call change_structure_sequence(machine, before, at%margins%list(i), changed, known)
+      class default
+        call change_sequence(machine, before, at%margins%list(i), changed, known)
       end select
     end do
   end subroutine change_all

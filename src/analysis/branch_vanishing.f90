@@ -29,7 +29,7 @@ contains
   !> Whether the cycle of a machine without a clock has shrunk to nothing between a point and the next.
   pure logical function has_vanished(trace, next)
     type(trace_t), intent(in) :: trace, next
-    has_vanished = .not. trace%machines%centre%has_clock
+    has_vanished = .not. (trace%machines%centre%has_clock .or. trace%machines%centre%crank_section)
     if (has_vanished) has_vanished = amplitude_of(trace)*amplitude_of(next) < 0
   end function has_vanished
 

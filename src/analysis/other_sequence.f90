@@ -4,12 +4,11 @@
 !> The sequence of events on the other side of a point where a margin of a periodic orbit is zero: an impact put in or taken out,
 !> a turning point that becomes a stick, and back.
 module other_sequence
-  use hybrid_machine, only: event_t
+  use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_impact_lower, event_impact_upper, event_release, event_separation, &
     event_stick, event_touch_lower, event_touch_upper, event_turning_point, mode_lower_barrier, mode_slip_minus, mode_slip_plus, &
     mode_stick, mode_upper_barrier
-  use one_body, only: one_body_t, turns_smoothly
   use orbit_margins, only: is_impact, margin_t, of_gap, of_hold, of_impact, of_slip, of_stick, of_turning
   use periodic_orbit, only: orbit_t
   implicit none
@@ -21,7 +20,7 @@ contains
 
   !> The orbit at which `margin` is zero, with the sequence of events beyond; `known` is false where there is no rule.
   pure subroutine change_sequence(machine, orbit, margin, other, known)
-    type(one_body_t), intent(in) :: machine
+    class(hybrid_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
     type(margin_t), intent(in) :: margin
     type(orbit_t), intent(out) :: other
@@ -30,7 +29,7 @@ contains
     integer :: k
     other = orbit
     known = .true.
-    smooth = turns_smoothly(machine)
+    smooth = machine%smooth_turns
     k = margin%event
     select case (margin%kind)
     case (of_impact)
@@ -140,7 +139,7 @@ contains
 
   !> With an impact, or a touch and a separation, at the turning point that meets the barrier.
   pure subroutine put_impact_in(machine, margin, other, known)
-    type(one_body_t), intent(in) :: machine
+    class(hybrid_t), intent(in) :: machine
     type(margin_t), intent(in) :: margin
     type(orbit_t), intent(inout) :: other
     logical, intent(out) :: known
@@ -150,7 +149,7 @@ contains
     hit%time = margin%time
     hit%side = margin%side
     known = .true.
-    if (machine%moving%machine%contact%soft) then
+    if (machine%soft) then
       hit%kind = merge(event_touch_upper, event_touch_lower, margin%side > 0)
       hit%after = slip_in(margin%side) + merge(10, 20, margin%side > 0)
       turn = event_t(kind=event_turning_point, side=-margin%side, time=margin%time, &

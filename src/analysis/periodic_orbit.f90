@@ -285,9 +285,14 @@ contains
       y = orbit%y
       call vary_section(machines, structure, orbit%mode, orbit%y, orbit%events, orbit%periods, y, orbit%matrix, ok)
     class default
-      allocate (determinant)
-      call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, unbounded, orbit%matrix, ok, &
-                determinant=determinant)
+      if (machines%centre%has_clock) then
+        allocate (determinant)
+        call vary(machines, orbit%mode, orbit%y, orbit%events, orbit%periods*machines%centre%period, unbounded, orbit%matrix, ok, &
+                  determinant=determinant)
+      else
+        y = orbit%y
+        call vary_section(machines, machines%centre, orbit%mode, orbit%y, orbit%events, orbit%periods, y, orbit%matrix, ok)
+      end if
     end select
     if (.not. ok) then
       orbit%matrix = unreachable

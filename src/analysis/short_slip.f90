@@ -11,7 +11,6 @@ module short_slip
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use motion_state, only: event_release, event_stick, event_turning_point, mode_slip_minus, mode_slip_plus
-  use one_body, only: one_body_t
   use orbit_margins, only: margin_t, margins_t, of_hold, of_slip, of_stick
   use periodic_orbit, only: orbit_t
   use structure, only: mode_number, phases_in, structure_t
@@ -145,11 +144,11 @@ contains
     turn%kind = event_turning_point
     stick%side = -stick%side
     select type (machine)
-    type is (one_body_t)
-      turn%side = -turn%side
-      turn%after = merge(mode_slip_plus, mode_slip_minus, turn%side > 0)
     type is (structure_t)
       turn%after = mode_with(machine, stick%after, stick%joint, stick%side)
+    class default
+      turn%side = -turn%side
+      turn%after = merge(mode_slip_plus, mode_slip_minus, turn%side > 0)
     end select
     stick%before = turn%after
     longer%events = [orbit%events(:k - 1), turn, stick, orbit%events(k + 1:)]
@@ -196,10 +195,10 @@ contains
     call machine%fly(mode, from, y, hold%time, reached)
     stop = event_t(kind=event_stick, side=hold%side, joint=hold%joint, guard=slide_ends)
     select type (machine)
-    type is (one_body_t)
-      stop%before = merge(mode_slip_plus, mode_slip_minus, hold%side > 0)
     type is (structure_t)
       stop%before = mode_with(machine, mode, hold%joint, hold%side)
+    class default
+      stop%before = merge(mode_slip_plus, mode_slip_minus, hold%side > 0)
     end select
     call machine%guard(stop, hold%time, reached, value, by_state, by_time)
     associate (rate => sum(by_state*machine%slope(stop%before, hold%time, reached)) + by_time)

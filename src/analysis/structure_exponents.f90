@@ -4,10 +4,12 @@
 !> Lyapunov spectrum of a motion of a structure, by orthogonal directions carried from section to section (Benettin et al. 1980).
 module structure_exponents
   use cycle_reached, only: note_cycle
+  use direction_frame, only: log_of, orthogonalise
   use elementary, only: logarithm
   use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
+  use turn_exponents, only: exponents_of_turns
   use multibody, only: joint_contact, joint_soft
   use multibody_section, only: multibody_point, lay_out
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
@@ -57,6 +59,9 @@ contains
     type is (structure_t)
       multibody = state_at_start(machine, start)
       call exponents_of_structure(machines, machine, multibody, transient, sections, spectrum, series)
+    class default
+      call exponents_of_turns(machines, start, transient, sections, spectrum, series)
+      call look_at_section(machines, series, spectrum)
     end select
   end subroutine exponents_of_machine
 
@@ -270,40 +275,6 @@ contains
     spectrum%sum_exact = spectrum%sum_exact/duration - damping_rate(structure)
     spectrum%has_sum = spectrum%has_sum .and. left == structure%n
   end subroutine conclude
-
-  !> Orthonormal columns that span what the first columns of `frame` do, and how long they were.
-  pure subroutine orthogonalise(frame, growth)
-    real(wp), intent(inout) :: frame(:, :)
-    real(wp), intent(out) :: growth(:)
-    real(wp) :: rest
-    integer :: k, i, pass, unit
-    do k = 1, size(growth)
-      growth(k) = 0
-      unit = 0
-      do
-        rest = norm2(frame(:, k))
-        do pass = 1, 2
-          do i = 1, k - 1
-            frame(:, k) = frame(:, k) - frame(:, i)*sum(frame(:, i)*frame(:, k))
-          end do
-        end do
-        if (unit == 0) growth(k) = norm2(frame(:, k))
-        if (norm2(frame(:, k)) > 1e-12_wp*rest) exit
-        ! A direction that is lost: any other replaces it.
-        unit = unit + 1
-        frame(:, k) = 0
-        frame(min(unit, size(growth)), k) = 1
-        if (unit > size(growth)) exit
-      end do
-      frame(:, k) = frame(:, k)/norm2(frame(:, k))
-    end do
-  end subroutine orthogonalise
-
-  pure elemental real(wp) function log_of(x)
-    real(wp), intent(in) :: x
-    log_of = 0
-    if (x > 0) log_of = logarithm(x)
-  end function log_of
 
   !> Whether volumes change by a formula: linear damping, constant restitutions, friction that does not depend on the speed; no
   !> contact that is a spring.

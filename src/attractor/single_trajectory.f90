@@ -292,7 +292,9 @@ contains
     logical, intent(in) :: slipped
     type(trajectory_state_t), intent(inout) :: trajectory
     type(outcome_t), intent(inout) :: outcome
-    trajectory%converged = attractor_reached(moving, catalogue, trajectory, slipped)
+    ! While a ramp goes on, the machine is not yet that of the attractors.
+    trajectory%converged = 0
+    if (.not. trajectory%motor%ramps) trajectory%converged = attractor_reached(moving, catalogue, trajectory, slipped)
     if (trajectory%converged == 0) then
       outcome%settle_time = -1
     else if (outcome%settle_time < 0) then

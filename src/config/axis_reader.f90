@@ -13,6 +13,7 @@ module axis_reader
     take_range, take_real, take_reals, take_text
   use kinds, only: wp
   use law_table, only: is_start_parameter, law_choice_t
+  use motor_choices, only: has_motor, supply_of
   use restoring_law, only: position_is_angle
   use text, only: to_text
   use toml_bindings, only: toml_array
@@ -108,6 +109,8 @@ contains
       ! Of a family whose law is wrong nobody knows the parameters.
       allowed = parameter_names(laws)
       if (starts_too) allowed = 'x0, v0, crank_angle, '//allowed
+      if (name == 'drive.ratio' .and. has_motor(laws)) allowed = &
+        allowed//'; the motor sets the speed of the crank (did you mean "'//supply_of(laws)//'"?)'
       call report(source, key, 'found "'//name//'", allowed '//allowed)
     end if
   end subroutine take_name

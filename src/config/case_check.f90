@@ -16,6 +16,7 @@ module case_check
   use kinds, only: wp
   use law_check, only: check_laws, is_good
   use law_table, only: effect_family, families, force_family, law_choice_t, motor_family, state_family
+  use motor_choices, only: has_ramp
   use machine_type, only: machine_t
   use motion_state, only: options_t
   use restoring_law, only: position_is_angle
@@ -345,6 +346,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (.not. the_case%sweep%present) then
       call fail(error, exit_bad_case, the_case%path//': a sweep needs a table [sweep]')
+    else if (has_ramp(the_case%laws)) then
+      call fail(error, exit_bad_case, the_case%path//': key ''motor.ramp_time'': found with a sweep, allowed with trajectory '// &
+                'and basin: a sweep changes its parameter itself')
     else
       call allow_start(the_case, [the_case%sweep%swept], error)
     end if

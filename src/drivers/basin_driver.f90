@@ -15,7 +15,6 @@ module basin_driver
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
   use refined_tile, only: pilot_share
-  use restoring_law, only: position_is_angle
   use second_look, only: look_again, resume_second_look
   use session, only: identity_of, open_session, session_t
   use shard, only: describe_shard, finish_search, finish_shard, shard_path
@@ -141,7 +140,7 @@ contains
     missed = missed_text(work%catalogues, session%the_case%attractors%sample)
     if (len(missed) > 0) call session%journal%line('missed', missed)
     if (size(work%catalogues) > 1) return
-    call list_attractors(session%journal, work%catalogues(1)%attractors, position_is_angle(session%the_case%laws))
+    call list_attractors(session%journal, work%catalogues(1)%attractors, session%the_case%laws)
   end subroutine report_catalogue
 
 end module basin_driver

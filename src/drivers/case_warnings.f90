@@ -14,6 +14,7 @@ module case_warnings
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
   use machine_type, only: machine_t
+  use motor_choices, only: cannot_start
   use multibody, only: joint_contact, multibody_t
   use journal, only: journal_t
   use kinds, only: int64, wp
@@ -50,6 +51,7 @@ contains
     end if
     if (any(index(the_case%laws%name, 'structure:') == 1)) call warn_about_modes(the_case, journal)
     call warn_about_impulses(the_case, journal)
+    call warn_about_standstill(the_case, journal)
     if (any(the_case%laws%family == 'body' .and. the_case%laws%name == 'structure')) call note_row(grid, moving, journal)
     if (moving%presses_by_steps) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
@@ -65,6 +67,17 @@ contains
     call journal%line('warning', 'warning: body.impulse_time = '//to_text(time)//' s is after the end, run.duration = '// &
       to_text(the_case%run%duration)//' s: no impulse acts')
   end subroutine warn_about_impulse
+
+  !> Warns of a motor that does not start.
+  subroutine warn_about_standstill(the_case, journal)
+    type(case_t), intent(in) :: the_case
+    type(journal_t), intent(inout) :: journal
+    real(wp) :: torque
+    logical :: remains
+    call cannot_start(the_case%laws, torque, remains)
+    if (remains) call journal%line('warning', 'warning: the motor cannot start: at standstill its torque is '//to_text(torque)// &
+      ' N m, motor.bearing_friction = '//to_text(parameter_value(the_case%laws, 'motor.bearing_friction', 0.0_wp))//' N m')
+  end subroutine warn_about_standstill
 
   !> Warns of impulses of a structure that come after the end.
   subroutine warn_about_impulses(the_case, journal)

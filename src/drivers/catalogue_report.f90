@@ -6,8 +6,12 @@ module catalogue_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_family, kind_not_known, regime_names
   use basin, only: catalogue_t
+  use constants, only: two_pi
   use journal, only: journal_t
   use kinds, only: wp
+  use law_table, only: law_choice_t
+  use motor_choices, only: resonance_of
+  use restoring_law, only: position_is_angle
   use statistics, only: share_upper_limit
   use text, only: to_text
   implicit none
@@ -67,18 +71,35 @@ contains
   end function counted
 
   !> The attractors, each in a line.
-  subroutine list_attractors(journal, attractors, is_angle)
+  subroutine list_attractors(journal, attractors, laws)
     type(journal_t), intent(inout) :: journal
     type(attractor_t), intent(in) :: attractors(:)
-    logical, intent(in) :: is_angle
+    type(law_choice_t), intent(in) :: laws(:)
+    real(wp) :: resonance
+    logical :: is_angle
     integer :: first, last
+    is_angle = position_is_angle(laws)
+    resonance = resonance_of(laws)
     first = 1
     do while (first <= size(attractors))
       last = alike_until(attractors, first)
-      call journal%line('attractor', attractor_text(attractors(first:last), is_angle))
+      call journal%line('attractor', attractor_text(attractors(first:last), is_angle)//speed_text(attractors(first), resonance))
       first = last + 1
     end do
   end subroutine list_attractors
+
+  !> The mean speed of the crank of a motor on a cycle, and on which side of the resonance [rad/s] that is; '' without a motor.
+  pure function speed_text(attractor, resonance) result(text)
+    type(attractor_t), intent(in) :: attractor
+    real(wp), intent(in) :: resonance
+    character(len=:), allocatable :: text
+    real(wp) :: speed
+    text = ''
+    if (.not. resonance > 0 .or. attractor%kind /= kind_cycle .or. .not. attractor%duration > 0) return
+    speed = two_pi*attractor%period/attractor%duration
+    text = ', crank speed '//to_text(speed, 6)//' rad/s, '//to_text(speed/resonance, 4)//' of the natural: '// &
+      trim(merge('passed  ', 'captured', speed > resonance))
+  end function speed_text
 
   !> The last of the entries from `first` on that share one line: motions that are not known to be periodic, alike but for their
   !> amplitude.

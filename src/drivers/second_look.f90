@@ -22,7 +22,6 @@ module second_look
   use match, only: carry_labels, number_new
   use point_columns, only: at_reason
   use random, only: uniform
-  use restoring_law, only: position_is_angle
   use session, only: session_t
   use status, only: reason_time_over
   use stop_check, only: check_stop
@@ -147,7 +146,7 @@ contains
       suggestion, '"starts": '//to_text(count(rows >= 0))//', "found": '//to_text(found)//', "left": '//to_text(left))
     if (size(work%catalogues) > 1) return
     associate (attractors => work%catalogues(1)%attractors)
-      call list_attractors(session%journal, pack(attractors, attractors%id > highest), position_is_angle(session%the_case%laws))
+      call list_attractors(session%journal, pack(attractors, attractors%id > highest), session%the_case%laws)
     end associate
   end subroutine look_again
 

@@ -6,6 +6,7 @@
 module trajectory_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, features_t, kind_rest, regime_names
+  use crank_report, only: report_crank
   use kinds, only: wp
   use machine_type, only: machine_t
   use motion_state, only: log_t, options_t
@@ -42,6 +43,7 @@ contains
         '"amplitude": '//to_text(f%amplitude)//', "v_max": '// &
         to_text(f%v_max)//', "impacts_per_period": '//to_text(f%impacts_per_period)// &
         ', "mean_impact_speed": '//to_text(f%mean_impact_speed))
+      call report_crank(journal, session%the_case%laws, span%window, log)
       call journal%line('end', to_text(log%events)//' events, '//to_text(log%samples)//' samples, '// &
         name_of_period(moving)//' '// &
         to_text(moving%period, 6)//' s, ended as '//reason_name(outcome%reason))
@@ -124,6 +126,7 @@ contains
       if (cycle%kind == kind_rest .and. .not. cycle%rests) text = 'at its equilibrium'
     else if (span%whole_periods .and. moving%has_drive_period .and. .not. is_short(moving, span)) then
       text = 'last '//to_text(nint(span%window/moving%period))//' drive periods'
+      if (.not. moving%timed) text = 'last '//to_text(span%window, 6)//' s'
     else
       text = 'last '//to_text(span%window, 6)//' s'
     end if

@@ -106,7 +106,7 @@ contains
 
   pure integer function coordinates(self) result(n)
     class(motor_machine_t), intent(in) :: self
-    n = self%motor%system%variables - 1
+    n = merge(4, 3, self%motor%system%control%has_own)
   end function coordinates
 
   pure function section_obstacle(self) result(text)
@@ -127,6 +127,14 @@ contains
     call start_motor(self%motor, all, section%state, section%motor)
   end function start
 
+  !> The same after a ramp.
+  pure function start_settled(self, values) result(section)
+    class(motor_machine_t), intent(in) :: self
+    real(wp), intent(in) :: values(5)
+    type(section_state_t) :: section
+    call start_motor(self%motor, values, section%state, section%motor, settled=.true.)
+  end function start_settled
+
   pure logical function allows(self, values) result(allowed)
     class(motor_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
@@ -138,7 +146,7 @@ contains
     type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(section_state_t) :: section
-    section = self%start([before%state%x, before%state%v, angle, before%motor%w, before%motor%own(1)])
+    section = start_settled(self, [before%state%x, before%state%v, angle, before%motor%w, before%motor%own(1)])
     ! What sticks stays so where both machines would hold it; the rest of the state has no memory.
     section%motor%turns = before%motor%turns
   end function resume
@@ -150,7 +158,7 @@ contains
     real(wp) :: y
     y = 0
     if (self%coordinates() > 3) y = point(4)
-    section = self%start([point(1), point(2), 0.0_wp, point(3), y])
+    section = start_settled(self, [point(1), point(2), 0.0_wp, point(3), y])
   end function state_at
 
   pure function point_of(self, section) result(point)
@@ -272,7 +280,7 @@ contains
       call set_column(columns(5), 'motor_power', 'W', 'power of the motor at its shaft', values(3, :n))
       if (self%motor%system%current > 0) then
         call set_column(columns(6), 'current', 'A', 'current of the motor', values(4, :n))
-      else if (self%motor%system%variables == y_at) then
+      else if (self%motor%system%control%has_own) then
         call set_column(columns(6), 'integral', 'rad', 'integral of the speed control', values(4, :n))
       else
         columns = columns(:5)

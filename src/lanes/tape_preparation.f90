@@ -58,7 +58,8 @@ contains
     type(lane_flow_t), intent(inout) :: flow
     type(tape_body_t) :: body
     flow%available = .false.
-    if (system%clock) return
+    ! Without a motor, and where the equations of a motor change on the way, the event loop goes on.
+    if (system%clock .or. system%control%supply > 0 .or. system%control%torque_limit > 0 .or. system%control%curve%count > 0) return
     associate (flight => system%flights(both_move, 0))
       body%tape = flight%tape
       body%parameters = system%sheet%parameters

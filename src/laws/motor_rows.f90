@@ -9,7 +9,9 @@ module motor_rows
   private
 
   character(len=*), parameter :: kononenko = 'Kononenko, Vibrating Systems with a Limited Power Supply (1969)'
-  character(len=law_length), parameter :: names(4) = [character(len=law_length) :: 'linear', 'kloss', 'dc', 'pi']
+  integer, parameter :: count = 5
+  character(len=law_length), parameter :: names(count) = [character(len=law_length) :: 'linear', 'kloss', 'dc', 'pi', &
+                                                                            'table']
 
   type(law_row_t), parameter, public :: motor_laws(*) = [ &
     law_row_t('motor', 'linear', 'torque M0 (1 - w/w0)', kononenko), &
@@ -18,10 +20,12 @@ module motor_rows
     law_row_t('motor', 'dc', 'torque k i; L i'' = U - R i - k w', kononenko), &
     law_row_t('motor', 'pi', 'speed control: torque Kp (wr - w) + Ki z; z'' = wr - w', &
               'Astrom, Hagglund, PID Controllers (1995)'), &
+    law_row_t('motor', 'table', 'measured torque: a table over the speed, C1', kononenko), &
     law_row_t('drive', 'slider_crank', 'crank and rod push the foot along a guide through the axis; needs a motor', &
               'Reuleaux, Theoretische Kinematik (1875)'), &
     law_row_t('drive', 'unbalance', 'rotor on the body; needs a motor', 'Sommerfeld, Z. Ver. Dtsch. Ing. 46 (1902)')]
 
+  integer :: i
   type(parameter_row_t), parameter :: own_parameters(*) = [ &
     parameter_row_t('motor', 'linear', 'stall_torque', 'N m', not_negative, 'M0, torque at standstill'), &
     parameter_row_t('motor', 'linear', 'no_load_speed', 'rad/s', positive, 'w0, speed without torque'), &
@@ -36,24 +40,35 @@ module motor_rows
     parameter_row_t('motor', 'pi', 'start_integral', 'rad', any_value, 'z at the start', optional=.true.), &
     parameter_row_t('motor', 'pi', 'proportional', 'N m s', not_negative, 'Kp'), &
     parameter_row_t('motor', 'pi', 'integral', 'N m', not_negative, 'Ki'), &
-    parameter_row_t('motor', 'pi', 'reference', 'rad/s', positive, 'wr, the speed that is wanted')]
+    parameter_row_t('motor', 'pi', 'reference', 'rad/s', positive, 'wr, the speed that is wanted'), &
+    parameter_row_t('motor', 'pi', 'torque_limit', 'N m', not_negative, 'largest torque, either way; 0: none', optional=.true.), &
+    parameter_row_t('motor', 'table', 'speed', 'rad/s', any_value, 'knots of the table, ascending, at most 16', list=.true.), &
+    parameter_row_t('motor', 'table', 'torque', 'N m', any_value, 'torque at these speeds, falling where it is 0', list=.true.), &
+    parameter_row_t('motor', 'linear', 'ramp_from', 'rad/s', not_negative, 'no_load_speed at the start of a ramp', &
+                    optional=.true.), &
+    parameter_row_t('motor', 'kloss', 'ramp_from', 'rad/s', not_negative, 'synchronous_speed at the start of a ramp', &
+                    optional=.true.), &
+    parameter_row_t('motor', 'dc', 'ramp_from', 'V', any_value, 'voltage at the start of a ramp', optional=.true.), &
+    parameter_row_t('motor', 'pi', 'ramp_from', 'rad/s', not_negative, 'reference at the start of a ramp', optional=.true.), &
+    (parameter_row_t('motor', names(i), 'ramp_time', 's', not_negative, 'duration of the ramp, linear in time; 0: none', &
+                     optional=.true.), i=1, 4)]
 
-  integer :: i
   type(parameter_row_t), parameter :: inertias(*) = [ &
     (parameter_row_t('motor', names(i), 'inertia', 'kg m^2', positive, &
-                     'rotor, gear and crank about the axis of the crank; of an unbalance with its mass'), i=1, 4), &
-    (parameter_row_t('motor', names(i), 'lever_inertia', 'kg m^2', not_negative, 'lever about C', optional=.true.), i=1, 4), &
+                     'rotor, gear and crank about the axis of the crank; of an unbalance with its mass'), i=1, count), &
+    (parameter_row_t('motor', names(i), 'lever_inertia', 'kg m^2', not_negative, 'lever about C', optional=.true.), &
+     i=1, count), &
     (parameter_row_t('motor', names(i), 'rod_mass', 'kg', not_negative, 'rod of a lever mechanism, its centre in the middle', &
-                     optional=.true.), i=1, 4), &
+                     optional=.true.), i=1, count), &
     (parameter_row_t('motor', names(i), 'rod_inertia', 'kg m^2', not_negative, 'the same rod about its centre', &
-                     optional=.true.), i=1, 4), &
+                     optional=.true.), i=1, count), &
     (parameter_row_t('motor', names(i), 'foot_mass', 'kg', not_negative, 'what moves with the foot of the spring', &
-                     optional=.true.), i=1, 4), &
+                     optional=.true.), i=1, count), &
     (parameter_row_t('motor', names(i), 'bearing_damping', 'N m s', not_negative, 'h, torque over speed', &
-                     optional=.true.), i=1, 4), &
-    (parameter_row_t('motor', names(i), 'bearing_friction', 'N m', not_negative, 'H0, dry', optional=.true.), i=1, 4), &
+                     optional=.true.), i=1, count), &
+    (parameter_row_t('motor', names(i), 'bearing_friction', 'N m', not_negative, 'H0, dry', optional=.true.), i=1, count), &
     (parameter_row_t('motor', names(i), 'crank_speed', 'rad/s', any_value, 'speed of the crank at the start', &
-                     optional=.true.), i=1, 4)]
+                     optional=.true.), i=1, count)]
 
   type(parameter_row_t), parameter :: mechanism_parameters(*) = [ &
     parameter_row_t('drive', 'slider_crank', 'crank', 'm', positive, 'r'), &

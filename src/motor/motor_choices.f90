@@ -4,17 +4,21 @@
 !> The laws of a machine with a motor, and those that do not go with one.
 module motor_choices
   use constants, only: two_pi
+  use curve_law, only: continued_at, curve_of, curve_t, knots_problem, steepest, value_at
   use errors, only: error_t, fail
-  use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, motor_family, own_law, path_of, value_of
+  use kinds, only: real64, wp
+  use law_table, only: effect_family, law_choice_t, list_of, motor_family, own_law, path_of, value_of
   use status, only: exit_bad_case
+  use text, only: to_text
   implicit none
   private
 
   !> Largest decay of a difference of speeds over a turn, as an exponent.
-  real(wp), parameter :: steepest = 1e4_wp
+  real(wp), parameter :: most_decay = 1e4_wp
+  character(len=*), parameter :: too_steep = 'motor.inertia: so little that the speed follows the torque within 1e-4 of a '// &
+    'turn; allowed more, or a drive without a motor, whose speed is given'
 
-  public :: has_motor, number_of_family, refuse_laws, speed_of, start_of_motor
+  public :: cannot_start, has_motor, has_ramp, resonance_of, supply_of, number_of_family, refuse_laws, speed_of, start_of_motor
 
 contains
 
@@ -34,6 +38,78 @@ contains
       if (choices(i)%family == family) number = i
     end do
   end function number_of_family
+
+  !> Whether a motor is among the choices whose voltage or speed rises in a ramp.
+  pure logical function has_ramp(choices)
+    type(law_choice_t), intent(in) :: choices(:)
+    has_ramp = has_motor(choices)
+    if (.not. has_ramp) return
+    associate (motor => choices(number_of_family(choices, motor_family)))
+      has_ramp = motor%name /= 'table'
+      if (has_ramp) has_ramp = value_of(motor, 'ramp_time') > 0
+    end associate
+  end function has_ramp
+
+  !> Speed of the crank at resonance, the natural angular frequency of body and spring [rad/s]; 0 without a motor.
+  pure real(wp) function resonance_of(choices) result(speed)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer :: body, restoring
+    speed = 0
+    body = number_of_family(choices, 'body')
+    restoring = number_of_family(choices, 'restoring')
+    if (.not. has_motor(choices) .or. body == 0 .or. restoring == 0) return
+    if (choices(restoring)%name /= 'linear') return
+    speed = sqrt(value_of(choices(restoring), 'stiffness')/value_of(choices(body), 'mass'))
+  end function resonance_of
+
+  !> Key of what sets the speed of a motor.
+  pure function supply_of(choices) result(key)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=:), allocatable :: key
+    select case (choices(number_of_family(choices, motor_family))%name)
+    case ('linear')
+      key = 'motor.no_load_speed'
+    case ('kloss')
+      key = 'motor.synchronous_speed'
+    case ('dc')
+      key = 'motor.voltage'
+    case ('pi')
+      key = 'motor.reference'
+    case default
+      key = 'motor.torque'
+    end select
+  end function supply_of
+
+  !> Whether a motor that starts from standstill never overcomes the friction of its bearing by itself. `torque` [N m] is the most
+  !> that it then has.
+  pure subroutine cannot_start(choices, torque, remains)
+    type(law_choice_t), intent(in) :: choices(:)
+    real(wp), intent(out) :: torque
+    logical, intent(out) :: remains
+    torque = 0
+    remains = has_motor(choices)
+    if (.not. remains) return
+    associate (motor => choices(number_of_family(choices, motor_family)))
+      select case (motor%name)
+      case ('linear')
+        torque = value_of(motor, 'stall_torque')
+      case ('kloss')
+        associate (slip => value_of(motor, 'breakdown_slip'))
+          torque = 2*value_of(motor, 'breakdown_torque')*slip/(1 + slip**2)
+        end associate
+      case ('dc')
+        torque = value_of(motor, 'torque_constant')*value_of(motor, 'voltage')/value_of(motor, 'resistance')
+      case ('pi')
+        torque = value_of(motor, 'proportional')*value_of(motor, 'reference')
+        if (value_of(motor, 'integral') > 0) torque = huge(torque)
+        if (value_of(motor, 'torque_limit') > 0) torque = min(torque, value_of(motor, 'torque_limit'))
+      case default
+        torque = continued_at(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')), 0.0_wp)
+      end select
+      remains = .not. abs(value_of(motor, 'crank_speed')) > 0 .and. abs(torque) <= value_of(motor, 'bearing_friction')
+      remains = remains .and. value_of(motor, 'bearing_friction') > 0
+    end associate
+  end subroutine cannot_start
 
   !> Speed of the crank [rad/s] and current [A] or integral [rad] at the start.
   pure function start_of_motor(choices) result(start)
@@ -66,17 +142,61 @@ contains
                 '", allowed with a motor: harmonic, fourier, slider_crank, crank_lever_rod, unbalance')
     else if (.not. value_of(motor, 'inertia') > 0) then
       call fail(error, exit_bad_case, 'motor.inertia: allowed above 0')
+    else if (motor%name == 'table') then
+      call refuse_table(motor, error)
     else if (.not. abs(speed_of(motor)) > 0) then
       call fail(error, exit_bad_case, 'motor.voltage: found 0.0 V, allowed other than 0: a turn without load is the unit of time')
-    else if (slope_of(motor)*two_pi/abs(speed_of(motor)) > steepest*value_of(motor, 'inertia')) then
-      call fail(error, exit_bad_case, 'motor.inertia: so little that the speed follows the torque within 1e-4 of a turn; '// &
-                'allowed more, or a drive without a motor, whose speed is given')
-    else if (drive%name == 'slider_crank') then
+    else if (slope_of(motor)*two_pi/abs(speed_of(motor)) > most_decay*value_of(motor, 'inertia')) then
+      call fail(error, exit_bad_case, too_steep)
+    else
+      call refuse_control(motor, error)
+    end if
+    if (allocated(error)) return
+    if (drive%name == 'slider_crank') then
       if (.not. value_of(drive, 'rod') > value_of(drive, 'crank')) then
         call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: a shorter rod cannot go round')
       end if
     end if
   end subroutine refuse_laws
+
+  !> What is wrong with a table of the torque; its own slopes bound those of the speed.
+  pure subroutine refuse_table(motor, error)
+    type(law_choice_t), intent(in) :: motor
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: problem
+    problem = knots_problem(list_of(motor, 'speed'), size(list_of(motor, 'torque')))
+    if (len(problem) > 0) then
+      call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque has its values there')
+    else if (.not. speed_of(motor) > 0) then
+      call fail(error, exit_bad_case, 'motor.torque: allowed falling through 0 at a speed above 0: a turn at that speed is the '// &
+                'unit of time')
+    else if (steepest(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')))*two_pi > &
+             most_decay*value_of(motor, 'inertia')*speed_of(motor)) then
+      call fail(error, exit_bad_case, too_steep)
+    end if
+  end subroutine refuse_table
+
+  !> What is wrong with a ramp or a limit of the torque.
+  pure subroutine refuse_control(motor, error)
+    type(law_choice_t), intent(in) :: motor
+    type(error_t), allocatable, intent(out) :: error
+    if (motor%name == 'table') return
+    if (value_of(motor, 'ramp_time') > 0 .and. any(motor%name == ['linear', 'kloss '])) then
+      if (.not. value_of(motor, 'ramp_from') > 0) then
+        call fail(error, exit_bad_case, 'motor.ramp_from: found '//to_text(real(value_of(motor, 'ramp_from'), real64))// &
+                  ' rad/s, allowed above 0: the torque is divided by this speed')
+      end if
+    else if (abs(value_of(motor, 'ramp_from')) > 0 .and. .not. value_of(motor, 'ramp_time') > 0) then
+      call fail(error, exit_bad_case, 'motor.ramp_time: missing, allowed above 0 s: motor.ramp_from is where a ramp begins')
+    end if
+    if (motor%name /= 'pi' .or. allocated(error)) return
+    associate (limit => value_of(motor, 'torque_limit'), own => abs(value_of(motor, 'start_integral')*value_of(motor, 'integral')))
+      if (limit > 0 .and. own > limit) then
+        call fail(error, exit_bad_case, 'motor.start_integral: times motor.integral it is '//to_text(real(own, real64))// &
+                  ' N m, allowed at most motor.torque_limit')
+      end if
+    end associate
+  end subroutine refuse_control
 
   !> Speed of the crank without torque [rad/s].
   pure real(wp) function speed_of(motor) result(speed)
@@ -88,10 +208,33 @@ contains
       speed = value_of(motor, 'synchronous_speed')
     case ('dc')
       speed = value_of(motor, 'voltage')/value_of(motor, 'torque_constant')
-    case default
+    case ('pi')
       speed = value_of(motor, 'reference')
+    case default
+      speed = zero_of(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')))
     end select
   end function speed_of
+
+  !> The highest speed at which a table of the torque falls through zero, by bisection; 0 without any above 0.
+  pure real(wp) function zero_of(curve) result(speed)
+    type(curve_t), intent(in) :: curve
+    real(wp) :: low, high
+    integer :: i, k
+    speed = 0
+    do i = 1, curve%count - 1
+      if (.not. (curve%value(i) > 0 .and. curve%value(i + 1) <= 0 .and. curve%at(i + 1) > 0)) cycle
+      low = max(0.0_wp, curve%at(i))
+      high = curve%at(i + 1)
+      do k = 1, digits(1.0_wp)
+        speed = (low + high)/2
+        if (value_at(curve, speed) > 0) then
+          low = speed
+        else
+          high = speed
+        end if
+      end do
+    end do
+  end function zero_of
 
   !> Torque over the difference of the speed to that without torque [N m s].
   pure real(wp) function slope_of(motor) result(slope)

@@ -19,8 +19,9 @@ module motor_equations
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
   use motor_choices, only: number_of_family, refuse_laws, speed_of
-  use motor_system, only: both_held, body_held, both_move, crank_held, far, guard_count, low_order, motor_system_t, phi_at, &
-    v_at, w_at, x_at, y_at
+  use motor_system, only: both_held, body_held, both_move, crank_held, far, guard_count, guard_fastest, guard_ramp_end, low_order, &
+    motor_system_t, phi_at, v_at, w_at, x_at, y_at
+  use motor_torque, only: add_motor, control_guards
   use restoring_law, only: restoring_of, restoring_t
   use series_flight, only: guard_t, set_branches, start_flight
   use status, only: exit_bad_case, exit_internal
@@ -58,7 +59,11 @@ contains
     call new_sheet(system%sheet)
     call add_state(system, choices(at(6)))
     call add_mechanism(choices(at(5)), choices(at(6)), system%sheet)
-    call add_motor(choices(at(6)), system)
+    call add_motor(choices(at(6)), system%sheet, system%control)
+    system%variables = system%sheet%variables
+    system%no_load_speed = abs(speed_of(choices(at(6))))
+    if (choices(at(6))%name == 'dc') system%own_size = max(abs(value_of(choices(at(6)), 'voltage'))/ &
+                                                           value_of(choices(at(6)), 'resistance'), tiny(1.0_wp))
     call add_forces(system)
     if (choices(at(5))%name == 'unbalance') then
       call add_unbalance(choices(at(5)), system)
@@ -139,51 +144,6 @@ contains
     system%turning = parameter_number(system%sheet, 'turning')
   end subroutine add_state
 
-  !> Torque of the motor, and its own state.
-  pure subroutine add_motor(motor, system)
-    type(law_choice_t), intent(in) :: motor
-    type(motor_system_t), intent(inout) :: system
-    associate (sheet => system%sheet)
-      select case (motor%name)
-      case ('linear')
-        call add_values(motor, [character(len=13) :: 'stall_torque', 'no_load_speed'], system)
-        call define(sheet, 'torque', 'stall_torque*(1 - w/no_load_speed)')
-      case ('kloss')
-        call add_values(motor, [character(len=17) :: 'breakdown_torque', 'breakdown_slip', 'synchronous_speed'], system)
-        call define(sheet, 'lag', '1 - w/synchronous_speed')
-        call define(sheet, 'torque', '2*breakdown_torque*breakdown_slip*lag/(lag^2 + breakdown_slip^2)')
-      case ('dc')
-        call add_values(motor, [character(len=15) :: 'voltage', 'torque_constant', 'resistance', 'inductance'], system)
-        if (value_of(motor, 'inductance') > 0) then
-          call add_variable(sheet, 'y')
-          call define(sheet, 'y_rate', '(voltage - resistance*y - torque_constant*w)/inductance')
-          call define(sheet, 'current', 'y')
-        else
-          call define(sheet, 'current', '(voltage - torque_constant*w)/resistance')
-        end if
-        call define(sheet, 'torque', 'torque_constant*current')
-        system%own_size = max(abs(value_of(motor, 'voltage'))/value_of(motor, 'resistance'), tiny(1.0_wp))
-      case ('pi')
-        call add_values(motor, [character(len=12) :: 'proportional', 'integral', 'reference'], system)
-        call add_variable(sheet, 'y')
-        call define(sheet, 'y_rate', 'reference - w')
-        call define(sheet, 'torque', 'proportional*y_rate + integral*y')
-      end select
-    end associate
-    system%no_load_speed = abs(speed_of(motor))
-    system%variables = system%sheet%variables
-  end subroutine add_motor
-
-  pure subroutine add_values(choice, names, system)
-    type(law_choice_t), intent(in) :: choice
-    character(len=*), intent(in) :: names(:)
-    type(motor_system_t), intent(inout) :: system
-    integer :: i
-    do i = 1, size(names)
-      call add_parameter(system%sheet, names(i), value_of(choice, trim(names(i))))
-    end do
-  end subroutine add_values
-
   !> Spring, friction of a slipping body, bearing.
   pure subroutine add_forces(system)
     type(motor_system_t), intent(inout) :: system
@@ -252,10 +212,9 @@ contains
   pure subroutine set_levels(system)
     type(motor_system_t), intent(inout) :: system
     real(wp), parameter :: share = 256*epsilon(1.0_wp)
-    real(wp) :: value(system%sheet%tape%count), z(5), force
+    real(wp) :: value(system%sheet%tape%count), force
     integer :: fault(system%sheet%tape%count)
-    z = 0
-    call evaluate(system%sheet%tape, z(:system%variables), system%sheet%parameters, value, fault)
+    call evaluate(system%sheet%tape, at_angle(system, 0.0_wp), system%sheet%parameters, value, fault)
     associate (sheet => system%sheet, half_range => foot_half_range(system))
       force = system%stiffness*(system%free_length + abs(value(node_of(sheet, 'foot'))) + half_range) &
               + system%moment*system%no_load_speed**2
@@ -299,7 +258,8 @@ contains
         rates(x_at) = merge(zero, node_of(sheet, 'v'), is_held(mode))
         rates(v_at) = zero
         if (.not. is_held(mode)) rates(v_at) = node_of(sheet, 'v_rate'//trim(suffix(mode)))
-        if (system%variables == y_at) rates(y_at) = node_of(sheet, 'y_rate')
+        if (system%control%has_own) rates(y_at) = node_of(sheet, 'y_rate')
+        if (system%control%supply > 0) rates(system%control%supply) = node_of(sheet, 'ramp_rate')
         call prepare_series(sheet%tape, low_order, rates, [guards%node, system%torque, system%load, system%foot, system%inertia], &
                             [integer ::], system%low(mode))
         do kept = 0, 1
@@ -327,23 +287,32 @@ contains
             'body_hold'//trim(suffix(mode))//' - static', 'body_hold'//trim(suffix(mode))//' + static', &
             'crank_hold'//trim(suffix(mode))//' - bearing_static', 'crank_hold'//trim(suffix(mode))//' + bearing_static', &
             'v_rate'//trim(merge(suffix(crank_held), suffix(both_move), mode == crank_held))]
-    do i = 1, guard_count
+    do i = 1, guard_fastest
       name = 'guard'//to_text(i)//trim(suffix(mode))
       call define(system%sheet, name, trim(text(i)))
       guards(i) = guard_t(node_of(system%sheet, name), 0)
     end do
+    guards(guard_ramp_end:) = [(guard_t(node_of(system%sheet, control_guards(i)), 0), i=1, size(control_guards))]
   end subroutine add_guards
+
+  !> All at rest with the crank at an angle [rad], after a ramp.
+  pure function at_angle(system, phi) result(z)
+    type(motor_system_t), intent(in) :: system
+    real(wp), intent(in) :: phi
+    real(wp) :: z(system%variables)
+    z = 0
+    z(phi_at) = phi
+    if (system%control%supply > 0) z(system%control%supply) = system%control%to
+  end function at_angle
 
   !> Half the range of the foot over a turn [m].
   pure real(wp) function foot_half_range(system) result(size_of)
     type(motor_system_t), intent(in) :: system
     integer, parameter :: angles = 32
-    real(wp) :: value(system%sheet%tape%count), foot(angles), z(5)
+    real(wp) :: value(system%sheet%tape%count), foot(angles)
     integer :: fault(system%sheet%tape%count), i
-    z = 0
     do i = 1, angles
-      z(phi_at) = i*two_pi/angles
-      call evaluate(system%sheet%tape, z(:system%variables), system%sheet%parameters, value, fault)
+      call evaluate(system%sheet%tape, at_angle(system, i*two_pi/angles), system%sheet%parameters, value, fault)
       foot(i) = value(node_of(system%sheet, 'foot'))
     end do
     size_of = (maxval(foot) - minval(foot))/2

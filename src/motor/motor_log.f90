@@ -6,8 +6,8 @@ module motor_log
   use constants, only: two_pi
   use kinds, only: wp
   use motion_state, only: energy_balance_t, log_t, put_column, record_event, record_sample, state_t
+  use motor_now, only: node_values
   use motor_system, only: motor_system_t
-  use motor_rest, only: node_values
   use motor_state, only: motor_state_t
   implicit none
   private

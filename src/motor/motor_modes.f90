@@ -8,7 +8,9 @@ module motor_modes
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_upper_barrier, state_t
   use motor_system, only: guard_back, guard_body_down, guard_body_up, guard_crank_down, guard_crank_up, guard_fastest, &
     guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
-  use motor_rest, only: equation_mode, low_series, size_of_forces, slips, state_vector, zero_order
+  use motor_limits, only: active_limits
+  use motor_now, only: parameters_now, state_vector
+  use motor_rest, only: equation_mode, low_series, size_of_forces, slips, zero_order
   use motor_state, only: motor_state_t
   use series_flight, only: flight_t, set_branches
   use switch_branches, only: choose_branches
@@ -38,8 +40,7 @@ contains
     flight%state(:system%variables) = state_vector(system, state, crank)
     flight%state(system%variables + 1:) = 0
     flight%time = state%time
-    flight%parameters(system%slip) = slip
-    flight%parameters(system%turning) = crank%turning
+    flight%parameters = parameters_now(system, state, crank)
     call low_series(system, mode, state, crank, series, fault)
     own = size(flight%guards) - size(flight%tape%switches)
     if (own < size(flight%guards)) call begin_branches(flight, own)
@@ -66,6 +67,7 @@ contains
       call watch(flight, guard_crank_down, -1)
       call mark_zeros(flight, series, [guard_crank_up, guard_crank_down], 32*epsilon(1.0_wp)*abs(series%c(0, system%torque)))
     end if
+    call watch_motor(system, crank, series, flight)
   end subroutine begin_mode
 
   !> The branches of the switching functions, whose guards follow the `own` ones.
@@ -79,6 +81,22 @@ contains
     flight%zeros(own + 1:) = max(zeros, 0)
     flight%is_active(own + 1:) = flight%is_active(own + 1:) .and. zeros >= 0
   end subroutine begin_branches
+
+  !> The guards of the motor itself.
+  pure subroutine watch_motor(system, crank, series, flight)
+    type(motor_system_t), intent(in) :: system
+    type(motor_state_t), intent(in) :: crank
+    type(series_t), intent(in) :: series
+    type(flight_t), intent(inout) :: flight
+    integer, allocatable :: guards(:), directions(:)
+    real(wp) :: rounding
+    integer :: i
+    call active_limits(system, crank, guards, directions, rounding)
+    do i = 1, size(guards)
+      call watch(flight, guards(i), directions(i))
+    end do
+    call mark_zeros(flight, series, guards, rounding)
+  end subroutine watch_motor
 
   !> What rounding does to the acceleration of the body [m/s^2].
   pure real(wp) function least(system, state, series)

@@ -15,12 +15,14 @@ module motor_motion
     state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, word_stick, word_upper
   use motor_choices, only: has_motor
   use motor_equations, only: build_motor_equations
+  use motor_limits, only: change_limits, start_limits
   use motor_log, only: add_sample, motor_energy, record_motor_event
   use motor_modes, only: begin_mode, keep_angle
-  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, restitution_of, slips
+  use motor_now, only: restitution_of
+  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, slips
   use motor_state, only: motor_state_t
   use motor_system, only: far, guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
-    guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t
+    guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t, y_at
   use own_equations, only: build_own_equations
   use series_flight, only: advance_flight, change_branches, flight_crossed, flight_left_domain, flight_no_progress, &
     flight_reached, flight_step_budget, flight_t, flight_wrong_branch
@@ -56,18 +58,24 @@ contains
     moving%options = options
   end subroutine prepare_motor
 
-  !> A body at `x` [m], `v` [m/s], the crank at `angle` [rad] with `speed` [rad/s], current [A] or integral `y`.
-  pure subroutine start_motor(moving, values, state, crank)
+  !> A body at x [m], v [m/s], the crank at an angle [rad] with a speed [rad/s], current [A] or integral: the `values`. `settled`: a
+  !> ramp is over.
+  pure subroutine start_motor(moving, values, state, crank, settled)
     type(motor_motion_t), intent(in) :: moving
     real(wp), intent(in) :: values(5)
     type(state_t), intent(out) :: state
     type(motor_state_t), intent(out) :: crank
+    logical, intent(in), optional :: settled
     integer :: i
+    logical :: over
+    over = .false.
+    if (present(settled)) over = settled
     state = state_t(x=values(1), v=values(2), mode=merge(mode_slip_minus, mode_slip_plus, values(2) < 0))
     crank%phi = modulo(values(3), two_pi)
     crank%w = values(4)
     crank%own(1) = values(5)
     crank%turning = merge(-1, 1, crank%w < 0)
+    call start_limits(moving%system, over, state, crank)
     ! Of an unbalance, what holds the one depends on whether the other moves.
     do i = 1, 2
       if (.not. abs(crank%w) > 0) call choose_crank(moving%system, state, crank)
@@ -218,7 +226,9 @@ contains
     if (.not. system%clock) crank%w = flight%state(2)
     state%x = flight%state(3)
     state%v = flight%state(4)
-    crank%own(:n - 4) = flight%state(5:n)
+    if (system%clock) crank%own(:n - 4) = flight%state(5:n)
+    if (system%control%has_own) crank%own(1) = flight%state(y_at)
+    if (system%control%supply > 0) crank%supply = flight%state(system%control%supply)
     if (.not. present(log)) return
     log%balance%work = log%balance%work + flight%state(n + 1)
     log%balance%friction = log%balance%friction + flight%state(n + 2)
@@ -237,6 +247,7 @@ contains
     type(log_t), intent(inout), optional :: log
     associate (system => moving%system)
       passed = crossed(guard_section)
+      call change_limits(system, crossed, state, crank)
       if (crossed(guard_section)) then
         crank%phi = two_pi
         call keep_angle(crank)

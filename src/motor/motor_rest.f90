@@ -6,17 +6,17 @@ module motor_rest
   use constants, only: two_pi
   use kinds, only: wp
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, state_t
+  use motor_now, only: node_values, parameters_now, restitution_of, state_vector
+  use motor_state, only: motor_state_t
   use motor_system, only: body_held, both_held, both_move, crank_held, guard_body_down, guard_body_up, low_order, &
     motor_system_t, v_at
-  use motor_state, only: most_own, motor_state_t
   use switch_branches, only: choose_branches
   use tape_series, only: expand, prepare_series, series_t
   use tape_value, only: evaluate
   implicit none
   private
 
-  public :: choose_body, choose_crank, equation_mode, node_values, restitution_of, size_of_forces, slips, &
-    state_vector, chatter_dies_out, low_series, zero_order
+  public :: choose_body, choose_crank, equation_mode, size_of_forces, slips, chatter_dies_out, low_series, zero_order
 
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
@@ -35,54 +35,6 @@ contains
     mode = merge(merge(both_move, crank_held, crank_turns), merge(body_held, both_held, crank_turns), body_slips)
   end function equation_mode
 
-  !> The variables of the equations.
-  pure function state_vector(system, state, crank) result(z)
-    type(motor_system_t), intent(in) :: system
-    type(state_t), intent(in) :: state
-    type(motor_state_t), intent(in) :: crank
-    real(wp) :: z(system%variables)
-    real(wp) :: all(4 + most_own)
-    all = [crank%phi, crank%w, state%x, state%v, crank%own]
-    if (system%clock) all(:2) = [crank%phi + state%time, 0.0_wp]
-    if (system%clock .and. system%period > 0) all(2) = state%time*two_pi/system%period
-    z = all(:system%variables)
-  end function state_vector
-
-  !> Parameters of the equations with the signs of slip and turning.
-  pure function signed_parameters(system, state, crank) result(parameters)
-    type(motor_system_t), intent(in) :: system
-    type(state_t), intent(in) :: state
-    type(motor_state_t), intent(in) :: crank
-    real(wp) :: parameters(size(system%sheet%parameters))
-    parameters = system%sheet%parameters
-    parameters(system%slip) = merge(-1, 1, state%mode == mode_slip_minus)
-    parameters(system%turning) = crank%turning
-  end function signed_parameters
-
-  !> Values of the nodes, those that are not defined being zero.
-  pure function node_values(system, state, crank) result(values)
-    type(motor_system_t), intent(in) :: system
-    type(state_t), intent(in) :: state
-    type(motor_state_t), intent(in) :: crank
-    real(wp) :: values(system%sheet%tape%count)
-    integer :: fault(system%sheet%tape%count)
-    call evaluate(system%sheet%tape, state_vector(system, state, crank), signed_parameters(system, state, crank), values, fault)
-  end function node_values
-
-  !> Ratio of the speeds after and before an impact, the body arriving; -1 where it is not defined.
-  pure real(wp) function restitution_of(system, state, crank) result(restitution)
-    type(motor_system_t), intent(in) :: system
-    type(state_t), intent(in) :: state
-    type(motor_state_t), intent(in) :: crank
-    real(wp) :: values(system%sheet%tape%count)
-    integer :: fault(system%sheet%tape%count)
-    restitution = system%contact%restitution
-    if (system%restitution == 0) return
-    call evaluate(system%sheet%tape, state_vector(system, state, crank), signed_parameters(system, state, crank), values, fault)
-    restitution = values(system%restitution)
-    if (fault(system%restitution) > 0) restitution = -1
-  end function restitution_of
-
   !> First Taylor coefficients of everything in a mode. The sign of slip is that of the mode of the body. `fault` is -1 if no
   !> branches of the switching functions fit the state.
   pure subroutine low_series(system, mode, state, crank, series, fault)
@@ -95,7 +47,7 @@ contains
     real(wp) :: parameters(size(system%sheet%parameters)), z(system%variables)
     integer :: branches(size(system%sheet%tape%switches)), zeros(size(system%sheet%tape%switches))
     logical :: fits
-    parameters = signed_parameters(system, state, crank)
+    parameters = parameters_now(system, state, crank)
     z = state_vector(system, state, crank)
     fits = .true.
     associate (flight => system%flights(mode, 0))

@@ -19,6 +19,13 @@ module motor_state
     integer :: turning = 1
     !> Turns taken off the angle.
     integer :: turns = 0
+    !> What a ramp changes, voltage [V] or speed without torque [rad/s], and whether it still does.
+    real(wp) :: supply = 0
+    logical :: ramps = .false.
+    !> Of a speed control: at which limit its torque is, and at which its integral is held; 0: at none.
+    integer :: limited = 0, held = 0
+    !> Piece of a table of the torque.
+    integer :: piece = 0
   end type motor_state_t
 
 end module motor_state

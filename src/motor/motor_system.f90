@@ -7,6 +7,7 @@ module motor_system
   use equation_sheet, only: sheet_t
   use friction_law, only: friction_t
   use kinds, only: wp
+  use motor_torque, only: motor_control_t
   use series_flight, only: flight_t
   use tape_series, only: series_t
   implicit none
@@ -16,10 +17,11 @@ module motor_system
   integer, parameter, public :: phi_at = 1, w_at = 2, x_at = 3, v_at = 4, y_at = 5
 
   !> Guards: the stops; v and w zero; a turn forwards or back; what holds the body and the crank at its limits; the largest
-  !> velocity, which ends no mode.
+  !> velocity, which ends no mode; those of the motor (`control_guards`).
   integer, parameter, public :: guard_upper = 1, guard_lower = 2, guard_turning = 3, guard_standstill = 4, guard_section = 5, &
     guard_back = 6, guard_body_up = 7, guard_body_down = 8, guard_crank_up = 9, guard_crank_down = 10, guard_fastest = 11, &
-    guard_count = 11
+    guard_ramp_end = 12, guard_limit_up = 13, guard_limit_down = 14, guard_integral_up = 15, guard_integral_down = 16, &
+    guard_resume = 17, guard_piece_up = 18, guard_piece_down = 19, guard_count = 19
   !> A mode of the equations: which of body and crank move.
   integer, parameter, public :: both_move = 1, body_held = 2, crank_held = 3, both_held = 4
   !> Terms that decide which way a motion from rest goes.
@@ -29,8 +31,9 @@ module motor_system
 
   type, public :: motor_system_t
     type(sheet_t) :: sheet
-    !> Number of variables: 4, and states beside them.
+    !> Number of variables: 4, and states beside them; with a motor one of its own and one that a ramp changes.
     integer :: variables = 4
+    type(motor_control_t) :: control
     !> A motion per mode, without and with work, dry and viscous losses [J] as three further states.
     type(flight_t) :: flights(4, 0:1)
     !> With a motor: room for the first Taylor coefficients of everything in a mode.

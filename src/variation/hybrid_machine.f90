@@ -38,6 +38,8 @@ module hybrid_machine
     !> Time from section to section [s]; without a clock an event is the section, and this a size of times.
     real(wp) :: period = 0
     logical :: has_clock = .true.
+    !> The section is the passage of a crank: no cycle shrinks to nothing there.
+    logical :: crank_section = .false.
     !> Natural sizes of the coordinates.
     real(wp), allocatable :: size_of(:)
     !> Rows that give position [m] and speed [m/s] of what is watched.
@@ -46,6 +48,10 @@ module hybrid_machine
     real(wp) :: turn = 0
     !> Rigid stops that bound it [m].
     real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
+    !> Of one body: size of the forces [N]; positions at which it meets something below and above [m], and whether that is soft;
+    !> whether a turning point is no event, as no force depends on the direction.
+    real(wp) :: force_size = 1, barriers(2) = [-huge(1.0_wp), huge(1.0_wp)]
+    logical :: soft = .false., smooth_turns = .false.
   contains
     procedure :: size_of_time
     procedure :: section_sizes

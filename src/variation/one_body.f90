@@ -139,6 +139,13 @@ pure function one_body_of(moving, size_of_x) result(body)
     if (law%second_excess > 0) body%step_of(2) = min(body%step_of(2), law%second_velocity)
   end associate
   body%step_of = step*body%step_of
+  body%force_size = max(moving%machine%force_scale, tiny(1.0_wp))
+  body%smooth_turns = turns_smoothly(body)
+  associate (contact => moving%machine%contact)
+    body%soft = contact%soft
+    body%barriers = [contact%lower, contact%upper]
+    if (contact%soft) body%barriers = [contact%soft_lower, contact%soft_upper]
+  end associate
 end function one_body_of
 
  !> Mode of a state of the event loop.

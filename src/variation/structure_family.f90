@@ -9,7 +9,7 @@ module structure_family
   use errors, only: error_t, fail
   use guarded_march, only: most_equations
   use guards, only: meets_lower, meets_upper
-  use hybrid_machine, only: event_t, most_states
+  use hybrid_machine, only: event_t, hybrid_t, most_states
   use multibody, only: integral_of, is_stop, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, multibody_t, &
     most_joints
   use multibody_motion, only: multibody_motion_t
@@ -212,7 +212,7 @@ contains
   !> flow, less what the section takes out of them.
   pure subroutine vary_section(machines, structure, mode, point, events, sections, image, by_start, ok, by_parameter)
     type(neighbourhood_t), intent(in) :: machines
-    type(structure_t), intent(in) :: structure
+    class(hybrid_t), intent(in) :: structure
     integer, intent(in) :: mode, sections
     real(wp), intent(in) :: point(:), image(:)
     type(event_t), intent(in) :: events(:)

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from separatrix import style
+from separatrix.figures import motor
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.figures.page import Figures, Page
@@ -48,6 +49,8 @@ def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figure of a file of branches by name."""
     look.require("file of branches", "units")
     makers = {"branches": partial(diagram, result, title, look)}
+    if motor.has_motor(result) and "cycle_time" in result:
+        makers["speed"] = partial(speeds, result, title, look)
     if result.sizes.get("curve_point"):
         makers["curves"] = partial(chart, result, title, look)
     return Figures(makers)
@@ -163,9 +166,30 @@ def diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     return page.finish(title, caption, handles, columns=4)
 
 
-def draw(ax: Axes, result: xr.Dataset, look: Look = DEFAULT) -> list[Line2D]:
-    """Draw the branches of orbits and equilibria and their labelled points; return what the legend needs."""
+def speeds(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the mean speed of the crank on every orbit over the parameter, of a machine with a motor."""
+    page = Page(look, (style.DOUBLE_COLUMN, 85.0))
+    (ax,) = page.axes
+    handles = draw(ax, result, look, motor.mean_speed(result))
+    case = resolved_case(result)
+    natural = np.sqrt(case["restoring"].get("stiffness", 0.0) / case["body"]["mass"])
+    handles.append(motor.mark_natural(ax, natural))
+    across = look.selected(result)["parameter"].copy()
+    _set_label(across, str(result.attrs["parameter"]), ax.set_xlabel)
+    ax.set_ylabel("mean speed of the crank (rad/s)")
+    caption = [*caption_pieces(result, look, describe_case(result)), plain(version_text(result))]
+    return page.finish(title, caption, handles, columns=4)
+
+
+def draw(
+    ax: Axes, result: xr.Dataset, look: Look = DEFAULT, values: np.ndarray | None = None
+) -> list[Line2D]:
+    """Draw the branches of orbits and equilibria and their labelled points; return what the legend needs.
+
+    `values` of the orbits replace their amplitudes.
+    """
     up, name = height(result, look)
+    up = up if values is None else values
     result = look.selected(result)
     labels = []
     if "branch" in result:

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from separatrix import style
 from separatrix.errors import SeparatrixError
-from separatrix.figures import contact, energy, impacts, pair, stroboscopic
+from separatrix.figures import contact, energy, impacts, motor, pair, stroboscopic
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
 from separatrix.figures.page import Figures, Page
@@ -49,6 +49,10 @@ def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     # files of earlier versions have no energies of one body
     if "kinetic_energy" in result:
         made["energy"] = partial(energy.decomposition, result, title, caption, look)
+    if "motor_power" in result:
+        made["crank"] = partial(motor.history, result, title, caption, look)
+        made["turn"] = partial(motor.turn, result, title, caption, look)
+        made["power"] = partial(motor.power, result, title, caption, look)
     if "contact_force" in result:
         made["contact"] = lambda: contact.loops(pair.relative_to_stop(given), title, look)
     if impacts.settled(seen).sum() >= impacts.FEWEST:

@@ -22,7 +22,18 @@ TEACHING = [
     *sorted((DOCS / "machines").glob("*.md")),
     *sorted((DOCS / "howto").glob("*.md")),
 ]
-HEAVY = {"belt", "compare", "duffing", "figures", "measures", "oscillator", "parameters", "reasons", "sweep"}
+HEAVY = {
+    "belt",
+    "compare",
+    "duffing",
+    "figures",
+    "measures",
+    "oscillator",
+    "parameters",
+    "reasons",
+    "sweep",
+    "through-resonance",
+}
 """Pages that take longest."""
 RUN = [pytest.param(page, marks=[pytest.mark.long] if page.stem in HEAVY else []) for page in TEACHING]
 

@@ -1,0 +1,114 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Lyapunov spectrum of a machine with a motor, by orthogonal directions carried from turn to turn of the crank. The trivial
+!> exponent 0 is left out.
+module turn_exponents
+  use direction_frame, only: log_of, orthogonalise
+  use exponents, only: batches, decay_of, error_of, spectrum_t
+  use hybrid_machine, only: event_t
+  use kinds, only: int64, wp
+  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, tally_t
+  use status, only: reason_not_smooth, reason_step_failed
+  use structure_family, only: vary_section
+  use variations, only: neighbourhood_t
+  implicit none
+  private
+
+  public :: exponents_of_turns
+
+contains
+
+  !> Exponents of the motion from `start` (see `machine_t`), after `transient` turns, over `turns` (at least 32). `series` has the
+  !> position on the section.
+  subroutine exponents_of_turns(machines, start, transient, turns, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: start(:)
+    integer, intent(in) :: transient, turns
+    type(spectrum_t), intent(out) :: spectrum
+    real(wp), intent(out) :: series(:)
+    type(event_t), allocatable :: events(:)
+    real(wp), dimension(machines%centre%n) :: point, growth
+    real(wp) :: frame(machines%centre%n, machines%centre%n), batch(batches, machines%centre%n), duration
+    logical :: ok
+    integer :: i, k, left, part
+    series = 0
+    batch = 0
+    duration = 0
+    left = size(point) - 1
+    frame = 0
+    do k = 1, size(point)
+      frame(k, k) = 1
+    end do
+    call machines%centre%fly_to_section(start, point, events, ok)
+    if (.not. ok) spectrum%reason = reason_step_failed
+    do i = 1 - transient, turns
+      if (spectrum%reason == 0) call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
+      if (spectrum%reason /= 0) return
+      if (i < 1) cycle
+      duration = duration + events(size(events))%time
+      part = 1 + int((int(i - 1, int64)*batches)/turns)
+      batch(part, :) = batch(part, :) + log_of(growth)
+      spectrum%impacts = spectrum%impacts + count(events%kind == event_impact_upper .or. events%kind == event_impact_lower)
+      if (i <= size(series)) series(i) = point(1)
+      if (i == size(series)) spectrum%point = point
+    end do
+    spectrum%known = .true.
+    spectrum%periods = turns
+    spectrum%passed = transient + turns
+    spectrum%mean_period = duration/turns
+    call conclude(batch*batches/duration, left, spectrum)
+  end subroutine exponents_of_turns
+
+  !> One turn, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions that
+  !> the motion leaves of its start.
+  subroutine advance_frame(machines, point, frame, growth, events, left, reason)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(inout) :: point(:), frame(:, :)
+    real(wp), intent(out) :: growth(:)
+    type(event_t), allocatable, intent(out) :: events(:)
+    integer, intent(inout) :: left
+    integer, intent(inout) :: reason
+    type(tally_t) :: tally
+    real(wp) :: image(size(point)), by_start(size(point), size(point))
+    integer :: k, mode
+    logical :: ok
+    associate (machine => machines%centre)
+      call machine%fly_sections(point, 1, .false., image, events, mode, tally, ok)
+      if (.not. ok) reason = reason_step_failed
+      if (.not. ok) return
+      ok = .not. any(events%kind == event_chatter_upper .or. events%kind == event_chatter_lower)
+      if (ok) call vary_section(machines, machine, mode, point, events, 1, image, by_start, ok)
+      if (.not. ok) reason = reason_not_smooth
+      if (.not. ok) return
+      do k = 1, size(point)
+        by_start(:, k) = by_start(:, k)*machine%size_of(k)/machine%size_of
+      end do
+      do k = 1, size(events)
+        if (machine%rests(events(k)%after)) left = min(left, size(point) - 2)
+      end do
+      frame = matmul(by_start, frame)
+      call orthogonalise(frame, growth)
+      point = image
+    end associate
+  end subroutine advance_frame
+
+  !> Means and standard errors of the batches (one column per exponent); directions beyond those `left` are lost.
+  pure subroutine conclude(batch, left, spectrum)
+    real(wp), intent(in) :: batch(:, :)
+    integer, intent(in) :: left
+    type(spectrum_t), intent(inout) :: spectrum
+    integer :: k, n
+    n = size(batch, 2) - 1
+    allocate (spectrum%exponents(n), spectrum%errors(n))
+    do k = 1, n
+      spectrum%exponents(k) = sum(batch(:, k))/batches
+      spectrum%errors(k) = error_of(batch(:, k))
+      if (k > left) spectrum%exponents(k) = -huge(1.0_wp)
+    end do
+    spectrum%decay = decay_of(batch(:, 1))
+    spectrum%halves = 2*[sum(batch(:batches/2, 1)), sum(batch(batches/2 + 1:, 1))]/batches
+    spectrum%sum_found = sum(spectrum%exponents)
+  end subroutine conclude
+
+end module turn_exponents

@@ -1,0 +1,162 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Flights of a machine with a motor between events, forwards or back, with their derivatives by the start: Taylor series of the
+!> equations and of their variational equations on one tape.
+module motor_flow
+  use kinds, only: wp
+  use motor_system, only: motor_system_t
+  use operations, only: op_add, op_multiply
+  use series_flight, only: series_order
+  use tape, only: constant, tape_t, variable
+  use tape_algebra, only: binary
+  use tape_derivative, only: differentiate
+  use tape_series, only: expand, prepare_series, series_t
+  use tape_value, only: evaluate
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  !> Steps after which a flight is given up: a turn takes some twenty.
+  integer, parameter :: most_steps = 20000
+
+  public :: add_slopes, fly_on, new_flow, rates_at
+
+  !> A system z' = f(z) on its own tape, and that of z and of its derivatives by the start, one column after the other.
+  type, public :: motor_flow_t
+    type(tape_t) :: tape
+    !> The same without derivatives: it has the first nodes.
+    type(tape_t) :: plain
+    integer :: n = 0
+    !> Nodes of variables and of their rates.
+    integer, allocatable :: states(:), rates(:)
+  end type motor_flow_t
+
+contains
+
+  !> The equations of a mode (`motor_equations`), with their variational equations.
+  pure subroutine new_flow(system, mode, flow)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: mode
+    type(motor_flow_t), intent(out) :: flow
+    integer :: slopes(system%variables, system%variables), i, j, k, n, term, sum_of, rate
+    n = system%variables
+    flow%n = n
+    flow%tape = system%sheet%tape
+    flow%plain = system%sheet%tape
+    allocate (flow%states(n + n**2), flow%rates(n + n**2))
+    do i = 1, size(flow%states)
+      call variable(flow%tape, i, flow%states(i))
+    end do
+    flow%rates(:n) = system%flights(mode, 0)%rates
+    do k = 1, n
+      call differentiate(flow%tape, flow%rates(:n), flow%states(k), slopes(:, k))
+    end do
+    do j = 1, n
+      do i = 1, n
+        call constant(flow%tape, 0.0_wp, rate)
+        do k = 1, n
+          call binary(flow%tape, op_multiply, slopes(i, k), flow%states(n*j + k), term)
+          call binary(flow%tape, op_add, rate, term, sum_of)
+          rate = sum_of
+        end do
+        flow%rates(n*j + i) = rate
+      end do
+    end do
+  end subroutine new_flow
+
+  !> Derivatives of a node by the variables, as nodes.
+  pure subroutine add_slopes(flow, node, slopes)
+    type(motor_flow_t), intent(inout) :: flow
+    integer, intent(in) :: node
+    integer, intent(out) :: slopes(:)
+    integer :: k
+    do k = 1, flow%n
+      call differentiate(flow%tape, [node], flow%states(k), slopes(k:k))
+    end do
+  end subroutine add_slopes
+
+  !> Rates of the variables.
+  pure function rates_at(flow, z, parameters) result(rates)
+    type(motor_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: rates(flow%n), value(flow%plain%count)
+    integer :: fault(flow%plain%count)
+    call evaluate(flow%plain, z, parameters, value, fault)
+    rates = value(flow%rates(:flow%n))
+  end function rates_at
+
+  !> Moves a state by a `duration` [s] of either sign; `sizes` of the variables set how small an error is. With `slopes` its
+  !> derivative by the start, too. Where the equations are not defined nothing comes out that is a number.
+  pure subroutine fly_on(flow, parameters, sizes, duration, z, slopes)
+    type(motor_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: parameters(:), sizes(:), duration
+    real(wp), intent(inout) :: z(:)
+    real(wp), intent(out), optional :: slopes(:, :)
+    real(wp) :: all(size(flow%states)), scales(size(flow%states))
+    integer :: i, n
+    n = flow%n
+    if (.not. present(slopes)) then
+      call take_steps(flow%plain, flow%states(:n), flow%rates(:n), parameters, sizes, duration, z)
+      return
+    end if
+    all = 0
+    all(:n) = z
+    scales(:n) = sizes
+    do i = 1, n
+      all(n*i + i) = 1
+      scales(n*i + 1:n*(i + 1)) = sizes/sizes(i)
+    end do
+    call take_steps(flow%tape, flow%states, flow%rates, parameters, scales, duration, all)
+    z = all(:n)
+    slopes = reshape(all(n + 1:), [n, n])
+  end subroutine fly_on
+
+  !> Steps of the series of a tape with these nodes of variables and rates.
+  pure subroutine take_steps(tape, states, rates, parameters, scales, duration, z)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: states(:), rates(:)
+    real(wp), intent(in) :: parameters(:), scales(:), duration
+    real(wp), intent(inout) :: z(:)
+    type(series_t) :: series
+    real(wp) :: left, step
+    integer :: fault, i, k
+    call prepare_series(tape, series_order, rates, [integer ::], [integer ::], series)
+    left = duration
+    do i = 1, most_steps
+      if (.not. abs(left) > 0) return
+      call expand(tape, z, parameters, series, fault)
+      if (fault /= 0) exit
+      step = step_of(series%c(:, states), max(scales, abs(z)))
+      if (step >= abs(left)) step = abs(left)
+      step = sign(step, left)
+      do k = 1, size(states)
+        z(k) = value_of(series%c(:, states(k)), step)
+      end do
+      left = left - step
+    end do
+    if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
+  end subroutine take_steps
+
+  !> The step whose last two terms are rounding (Jorba & Zou 2005).
+  pure real(wp) function step_of(c, scales) result(step)
+    real(wp), intent(in) :: c(0:, :), scales(:)
+    real(wp) :: share
+    integer :: k
+    step = huge(step)
+    do k = ubound(c, 1) - 1, ubound(c, 1)
+      share = maxval(abs(c(k, :))/scales)
+      if (share > 0) step = min(step, (epsilon(1.0_wp)/4/share)**(1.0_wp/k))
+    end do
+  end function step_of
+
+  pure real(wp) function value_of(c, t) result(value)
+    real(wp), intent(in) :: c(0:), t
+    integer :: k
+    value = 0
+    do k = ubound(c, 1), 0, -1
+      value = value*t + c(k)
+    end do
+  end function value_of
+
+end module motor_flow

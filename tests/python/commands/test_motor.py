@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Machines with a motor: outcomes of a run-up, branches and exponents, maps on several ranks."""
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import differences, run, succeed
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+IMPACT = EXAMPLES / "motor_impact.toml"
+STOPPED = 75
+# The yoke without friction and stop of a published benchmark, method 1: its run-up ends in a fold.
+YOKE = """\
+body = { mass = 1, gravity = 1 }
+restoring = { law = "linear", stiffness = 88.82643960980423 }
+friction = { law = "viscous", damping = 0.5 }
+drive = { law = "harmonic", amplitude = 0.02 }
+start = { x0 = 0.02, v0 = 0 }
+run = { duration = 120, window = 20 }
+[motor]
+law = "dc"
+voltage = 7
+torque_constant = 0.5
+resistance = 5
+inertia = 0.05
+bearing_damping = 0.002
+"""
+# From standstill the least voltage that passes the resonance.
+THRESHOLD = 6.383280023598
+
+
+def outcome(separatrix: Path, case: Path, folder: Path, *settings: str) -> str:
+    """The last word of the line about the crank."""
+    sets = [f"--set={setting}" for setting in settings]
+    report = succeed(separatrix, "trajectory", case, *sets, "-o", "motion.h5", "--force", folder=folder).out
+    return re.search(r"^crank speed .*: (\w+)$", report, re.MULTILINE)[1]
+
+
+@pytest.fixture
+def yoke(tmp_path: Path) -> Path:
+    """The case in a file."""
+    (tmp_path / "yoke.toml").write_text(YOKE)
+    return tmp_path / "yoke.toml"
+
+
+def test_outcomes_of_a_run_up(separatrix, yoke, tmp_path):
+    """On both sides of the published threshold; held by the bearing; with a negative voltage."""
+    assert outcome(separatrix, yoke, tmp_path, f"motor.voltage={THRESHOLD - 1e-6}") == "captured"
+    assert outcome(separatrix, yoke, tmp_path, f"motor.voltage={THRESHOLD + 1e-6}") == "passed"
+    assert outcome(separatrix, yoke, tmp_path, "motor.bearing_friction=0.8", "run.duration=20") == "stalled"
+    assert outcome(separatrix, yoke, tmp_path, "motor.voltage=-3", "run.duration=20") == "reversed"
+
+
+def test_slow_ramp_is_captured_longer(separatrix, yoke, tmp_path):
+    """A voltage between threshold and fold: reached slowly, the crank stays below the resonance."""
+    quick, slow = "motor.voltage=7.5", "motor.ramp_time=100"
+    assert outcome(separatrix, yoke, tmp_path, quick) == "passed"
+    assert outcome(separatrix, yoke, tmp_path, quick, slow, "motor.ramp_from=3") == "captured"
+
+
+def test_balance_of_a_ramp(separatrix, yoke, tmp_path):
+    """The samples of a ramp have the crank, and its energy balance closes."""
+    outcome(separatrix, yoke, tmp_path, "motor.ramp_time=60", "motor.voltage=9")
+    with h5py.File(tmp_path / "motion.h5") as file:
+        speed, torque, power = (file[name][()] for name in ("crank_speed", "motor_torque", "motor_power"))
+        np.testing.assert_allclose(power, torque * speed, atol=1e-12)
+        assert abs(file.attrs["energy_closing_error"]) < 1e-8
+
+
+def test_branches_find_the_fold(separatrix, yoke, tmp_path):
+    """The slow branch turns where it is published to."""
+    report = succeed(
+        separatrix, "branches", yoke, "--parameter", "motor.voltage", "--from", "8.1", "--to", "8.3",
+        "-o", "branches.h5", folder=tmp_path, timeout=600,
+    ).out  # fmt: skip
+    fold = re.search(r"SN at motor\.voltage = (\S+) V", report)
+    assert abs(float(fold[1]) - 8.252828124769745) < 1e-8
+
+
+def test_exponents_are_those_of_the_multipliers(separatrix, tmp_path):
+    """The free cycle at 8 V: logarithms of its multipliers over its time."""
+    report = succeed(separatrix, "stability", IMPACT, "--periods", "2000", folder=tmp_path).out
+    found = [float(value) for value in re.findall(r"exponent \d: (\S+) 1/s", report)]
+    period = 2 * np.pi / 15.30884297906753
+    pair, single = np.log(abs(-0.609077686526 + 0.567414199022j)), np.log(0.652441520152)
+    np.testing.assert_allclose(sorted(found), np.array([single, pair, pair]) / period, rtol=0.02)
+    assert "the motion is periodic" in report
+
+
+SMALL = ("axis[1].count=6", "axis[2].count=5", "run.duration=8", "run.window=2", "attractors.sample=8")
+PLANE = (
+    "axis=[{name='motor.voltage', from=6, to=8, count=4},"
+    " {name='motor.inertia', from=0.04, to=0.06, count=3}]"
+)
+
+
+@pytest.mark.parametrize("more", [SMALL, (PLANE, *SMALL[2:])], ids=["starts", "plane"])
+def test_maps_are_the_same_bits(separatrix, mpi_separatrix, tmp_path, more):
+    """Serial, on 1 to 4 ranks, and stopped and gone on with other ranks."""
+    command = ["basin", IMPACT, *(f"--set={word}" for word in more)]
+    succeed(separatrix, *command, "-o", "one.h5", folder=tmp_path, timeout=300)
+    for ranks in (1, 2, 3, 4):
+        shared = [*command, "--set=grid.tile=[2, 3]", "-o", f"{ranks}.h5"]
+        stopped = run(
+            mpi_separatrix, *shared, "--time-limit", "0.2", folder=tmp_path, ranks=ranks, timeout=300
+        )
+        assert stopped.code in (0, STOPPED), stopped
+        if stopped.code == STOPPED:
+            succeed(mpi_separatrix, *shared, "--resume", folder=tmp_path, ranks=5 - ranks, timeout=300)
+        assert differences(tmp_path / "one.h5", tmp_path / f"{ranks}.h5") == []
