@@ -175,7 +175,7 @@ contains
       call take_state(moving%system, flight, state, crank, log)
       if (status == flight_crossed) then
         tally%v_max = max(tally%v_max, state%v)
-        if (any(flight%crossed(:guard_fastest - 1))) exit
+        if (any(flight%crossed(:guard_fastest - 1)) .or. any(flight%crossed(guard_fastest + 1:guard_count))) exit
         call pass_switches(flight, at_switch, idle, status)
         ! A jump of the forces may release what was held.
         if (any(flight%crossed(guard_count + 1:)) .and. .not. slips(state%mode)) exit
