@@ -111,6 +111,8 @@ SWEPT = (0.7, 1.8)
 SAME_MACHINE = {
     *("basin_coulomb", "basin_coulomb_refined", "basin_ratio_stack", "basin_stribeck", "basin_viscous"),
     *("trajectory_coulomb_crank_lever_rod", "pair_backlash", "basin_pair_regimes"),
+    # machines with a motor: docs/motor_checks.md
+    *("motor_impact", "motor_lever", "motor_unbalance"),
     *(
         f"trajectory_{friction}_{ratio}"
         for friction in ("coulomb", "stribeck", "viscous")
@@ -127,6 +129,7 @@ REFUSED = {
     "measured_positioning": "body.mass",
     "contact_hunt_crossley": "body.mass",
     "contact_kelvin_voigt": "body.mass",
+    "own_equation": "restoring.k",
 }
 
 
