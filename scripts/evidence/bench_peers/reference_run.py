@@ -70,6 +70,8 @@ class Reference:
         failed = self.entry(
             ctypes.c_int(len(self.rows)),
             self.rows,
+            # no law of these cases is an expression
+            ctypes.c_char_p(b""),
             self.lengths,
             self.values,
             ctypes.c_int(0),

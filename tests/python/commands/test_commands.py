@@ -215,7 +215,7 @@ def test_laws(separatrix, tmp_path):
         kind, _, name = law["law"].rpartition(":")
         assert (f"[{kind}.NAME]" if kind else name) in text
         assert law["meaning"] in text
-        assert law["source"] or law["law"] == "none" or kind
+        assert law["source"] or law["law"] in ("none", "expression") or kind
         for parameter in law["parameters"]:
             assert parameter["unit"]
             assert parameter["meaning"]

@@ -353,7 +353,7 @@ sys.exit(code)
 
 
 def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_path):
-    """5 times the rows, 800 000 points more, may take 1.5 MB more: 2 bytes a point. Ranks also
+    """5 times the rows, 800 000 points more, may take 2 MB more: 2.5 bytes a point. Ranks also
     pack the final file, a slab of up to 2**20 values at a time: as many rows as a chunk has, so longer rows
     take more until it is full. The peak of one run varies by 1 MB with the messages in flight: the smallest
     of three is taken, and of maps that are all large enough to have the buffers in use."""
@@ -370,5 +370,5 @@ def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_pat
             peaks[shape] = np.minimum(peaks[shape], seen)
             (tmp_path / "map.h5").unlink()
     small = peaks[1000, 200]
-    assert np.subtract(peaks[5000, 200], small).max() < 1500
+    assert np.subtract(peaks[5000, 200], small).max() < 2000
     assert np.subtract(peaks[200, 5000], small).max() < 16000

@@ -249,6 +249,7 @@ def test_a_function_that_misses_held_out_records_is_no_name(monkeypatch, left, n
     one = scored(np.full(COUNT, 5.0), np.ones(COUNT))
     prediction = Prediction(None, None, None, None, left[0], 1.0, None)
     one = replace(one, prediction=prediction)
+    monkeypatch.setattr(function, "extrapolates", lambda *_: False)
     monkeypatch.setattr(function, "cleaned_prediction", lambda *_: left[1])
     monkeypatch.setattr(function, "misses", lambda prediction, *_: prediction.fit > 1.1)
     monkeypatch.setattr(function, "as_function", lambda *_: Choice(one, []))

@@ -150,7 +150,9 @@ def test_what_a_force_depends_on_is_what_explains_most(speed, position, pieces, 
     assert Ceiling(families, None).mostly == mostly
 
 
-def test_a_note_states_that_errors_count_noise_alone_where_a_law_leaves_more():
+def test_a_note_states_that_errors_count_noise_alone_where_a_law_leaves_more(monkeypatch):
+    monkeypatch.setattr("separatrix.discovery.decision.verdict.within_tables", lambda _: np.ones(1, bool))
+
     def notes(leaves: str, beside: bool) -> list[str]:
         left = SimpleNamespace(fit=SimpleNamespace(sample_chi2=1.44))
         ahead = SimpleNamespace(with_imperfections=beside)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 LANES = Path(__file__).parents[3] / "src" / "lanes"
+HEADERS = ("lane_types.hpp", "structure_types.hpp", "tape_types.hpp")
 #: Fortran dimensions run the other way round.
 Member = tuple[str, tuple[int, ...], str]
 
@@ -23,7 +24,7 @@ def number(text: str, names: dict[str, int]) -> int:
 
 def cpp_constants() -> dict[str, int]:
     names: dict[str, int] = {}
-    for file in ("lane_types.hpp", "structure_types.hpp"):
+    for file in HEADERS:
         text = re.sub(r"//.*", "", (LANES / file).read_text())
         for body in re.findall(r"enum \{(.*?)\}", text, re.S):
             for name, value in re.findall(r"(\w+)\s*=\s*([^,}]+)", body):
@@ -31,10 +32,12 @@ def cpp_constants() -> dict[str, int]:
     return names
 
 
-def fortran_constants() -> dict[str, int]:
+def fortran_constants(file: Path) -> dict[str, int]:
+    """Those that a module has or uses; private names of others may be the same."""
     names: dict[str, int] = {}
     curves = (LANES.parent / "laws" / "curve_law.f90").read_text()
-    for text in (curves, *((LANES / f"{one}.f90").read_text() for one in ("lane_types", "structure_types"))):
+    modules = dict.fromkeys((LANES / "lane_types.f90", file))
+    for text in (curves, *(module.read_text() for module in modules)):
         joined = re.sub(r"&\s*\n\s*", " ", text)
         for row in re.findall(r"integer, parameter(?:, public)? :: (.*)", joined):
             for name, value in re.findall(r"(\w+)\s*=\s*([^,]+?)(?=,\s*\w+\s*=|$)", row):
@@ -44,7 +47,7 @@ def fortran_constants() -> dict[str, int]:
 
 def cpp_members(name: str) -> list[Member]:
     """Members of a structure of C++; a field over lanes has that many."""
-    texts = [re.sub(r"//.*", "", (LANES / f).read_text()) for f in ("lane_types.hpp", "structure_types.hpp")]
+    texts = [re.sub(r"//.*", "", (LANES / f).read_text()) for f in HEADERS]
     names = cpp_constants()
     body = next(
         found[1] for text in texts if (found := re.search(rf"struct {name} \{{(.*?)\n\}};", text, re.S))
@@ -69,8 +72,8 @@ def length(bounds: str, names: dict[str, int]) -> int:
     return number(upper, names) - (number(lower, names) if lower else 1) + 1
 
 
-def fortran_members(body: str, mirrored: dict[str, str]) -> list[Member]:
-    names = fortran_constants()
+def fortran_members(body: str, file: Path, mirrored: dict[str, str]) -> list[Member]:
+    names = fortran_constants(file)
     kinds = {"real(c_double)": "double", "integer(c_int)": "int"}
     members: list[Member] = []
     for row in re.sub(r"&\s*\n\s*", " ", body).splitlines():
@@ -89,22 +92,22 @@ def fortran_members(body: str, mirrored: dict[str, str]) -> list[Member]:
     return members
 
 
-def mirrors() -> dict[str, tuple[str, str]]:
-    """Name in C++ by the name in Fortran, with the body there."""
+def mirrors() -> dict[str, tuple[str, str, Path]]:
+    """Name in C++ by the name in Fortran, with the body and the file there."""
     comment = r"Mirrors `(\w+)` of \w+\.hpp[^\n]*\n(?:  !>[^\n]*\n)*"
     pattern = comment + r"  type, bind\(c\)(?:, public)? :: (\w+)\n(.*?)\n  end type"
     found = {}
     for file in sorted(LANES.glob("*.f90")):
         for cpp, fortran, body in re.findall(pattern, file.read_text(), re.S):
-            found[fortran] = (cpp, body)
+            found[fortran] = (cpp, body, file)
     return found
 
 
 @pytest.mark.parametrize("fortran", sorted(mirrors()))
 def test_members_are_the_same(fortran: str) -> None:
     every = mirrors()
-    cpp, body = every[fortran]
-    ours = fortran_members(body, {name: other for name, (other, _) in every.items()})
+    cpp, body, file = every[fortran]
+    ours = fortran_members(body, file, {name: other for name, (other, _, _) in every.items()})
     theirs = cpp_members(cpp)
     assert len(theirs) > 2
     assert ours == theirs
