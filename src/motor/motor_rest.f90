@@ -21,6 +21,9 @@ module motor_rest
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
   real(wp), parameter :: chatter_uniformity = 1e-6_wp, unflown_uniformity = 0.5_wp
+  !> Longest rest of a chatter sequence that is completed, in periods or turns, or in s; and under a force that no spring makes,
+  !> which is as uniform over a bounce of any height.
+  real(wp), parameter :: longest_rest = 1e-2_wp, longest_rest_under_load = 1e-6_wp
 
 contains
 
@@ -216,11 +219,29 @@ contains
       height = speed**2/(2*out)
       change = change + abs(force(2))*left + abs(force(3))*left**2
       change = change/(system%mass*back)
-      over = change <= chatter_uniformity
+      over = change <= chatter_uniformity .and. left <= longest_completion(system, resting, crank)
       if (height < 8*epsilon(1.0_wp)*(abs(state%x) + abs(series%c(0, system%foot)) + system%free_length)) then
         over = change <= unflown_uniformity
       end if
     end associate
   end subroutine chatter_dies_out
+
+  !> Longest rest of a chatter sequence [s] that is completed.
+  pure real(wp) function longest_completion(system, resting, crank) result(longest)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: resting
+    type(motor_state_t), intent(in) :: crank
+    real(wp) :: values(system%sheet%tape%count)
+    logical :: has_spring
+    longest = 1
+    if (system%period > 0) longest = system%period
+    if (system%no_load_speed > 0) longest = two_pi/system%no_load_speed
+    has_spring = system%stiffness > 0
+    if (system%force_slope > 0) then
+      values = node_values(system, resting, crank)
+      has_spring = abs(values(system%force_slope)) > 0
+    end if
+    longest = longest*merge(longest_rest, longest_rest_under_load, has_spring)
+  end function longest_completion
 
 end module motor_rest
