@@ -48,10 +48,7 @@ module body_machine
     procedure :: event_columns
     procedure :: contact_forces
     procedure :: kinetic_energies
-    procedure :: rests_at_end
     procedure :: has_mode
-    procedure :: driver
-    procedure :: contacts_in_row
     procedure :: contact_sizes
     procedure :: free_multipliers
     procedure :: measured_force => force_samples
@@ -299,32 +296,10 @@ contains
     values = 0.5_wp*self%body%machine%mass*log%sample_data(3, :log%samples)**2
   end function kinetic_energies
 
-  !> Always false: the mode of a body shows whether it rests.
-  pure logical function rests_at_end(self, amplitude, since, log) result(rests)
-    class(body_machine_t), intent(in) :: self
-    real(wp), intent(in) :: amplitude, since
-    type(log_t), intent(in) :: log
-    rests = .false.
-  end function rests_at_end
-
   pure logical function has_mode(self) result(fact)
     class(body_machine_t), intent(in) :: self
     fact = self%body%machine%natural_frequency > 0
   end function has_mode
-
-  pure function driver(self, section) result(motion)
-    class(body_machine_t), intent(in) :: self
-    class(section_state_t), intent(in) :: section
-    real(wp) :: motion(2)
-    motion = 0
-  end function driver
-
-  pure function contacts_in_row(self, values) result(names)
-    class(body_machine_t), intent(in) :: self
-    real(wp), intent(in) :: values(3)
-    character(len=:), allocatable :: names
-    names = ''
-  end function contacts_in_row
 
   pure subroutine contact_sizes(self, mass, force, closed_form)
     class(body_machine_t), intent(in) :: self

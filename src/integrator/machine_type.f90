@@ -102,14 +102,14 @@ module machine_type
     procedure(event_columns_interface), deferred :: event_columns
     procedure(samples_interface), deferred :: contact_forces
     procedure(samples_interface), deferred :: kinetic_energies
-    procedure(rests_interface), deferred :: rests_at_end
+    procedure :: rests_at_end
     procedure(fact_of_machine), deferred :: has_mode
-    procedure(driver_interface), deferred :: driver
-    procedure(row_interface), deferred :: contacts_in_row
+    procedure :: driver
+    procedure :: contacts_in_row
     procedure(sizes_interface), deferred :: contact_sizes
     procedure(multipliers_interface), deferred :: free_multipliers
-    procedure(force_interface), deferred :: measured_force
-    procedure(force_at_interface), deferred :: force_at
+    procedure :: measured_force
+    procedure :: force_at
     procedure(options_interface), deferred :: options
     procedure(set_options_interface), deferred :: set_options
     procedure :: limit_budgets
@@ -292,32 +292,6 @@ module machine_type
       real(wp) :: values(log%samples)
     end function samples_interface
 
-    !> Whether a machine that nothing drives has come to rest over the samples of a log after `since` [s], in a motion of this
-    !> `amplitude` [m].
-    pure logical function rests_interface(self, amplitude, since, log) result(rests)
-      import :: log_t, machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp), intent(in) :: amplitude, since
-      type(log_t), intent(in) :: log
-    end function rests_interface
-
-    !> Position and velocity of the driving body of two [m, m/s], zeros without one.
-    pure function driver_interface(self, section) result(motion)
-      import :: machine_t, section_state_t, wp
-      class(machine_t), intent(in) :: self
-      class(section_state_t), intent(in) :: section
-      real(wp) :: motion(2)
-    end function driver_interface
-
-    !> Names of the rigid contacts that are closed at the `start` (x [m], v [m/s], crank angle [rad] of the watched body) and whose
-    !> impacts change the speed of another one, as 'ab, bc'; '' if there are none, or if impacts come one after the other.
-    pure function row_interface(self, values) result(names)
-      import :: machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp), intent(in) :: values(3)
-      character(len=:), allocatable :: names
-    end function row_interface
-
     !> What presses a soft stop: the mass that an impact feels [kg], the size of the forces [N], and whether the contact is flown
     !> in closed form.
     pure subroutine sizes_interface(self, mass, force, closed_form)
@@ -335,21 +309,6 @@ module machine_type
       complex(wp) :: multipliers(2)
     end function multipliers_interface
 
-    !> The samples of a measured force [N].
-    pure function force_interface(self) result(force)
-      import :: machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp) :: force(self%force_samples)
-    end function force_interface
-
-    !> The measured force [N] that drives a machine, at `times` [s since the start at `crank_angle` [rad]].
-    pure function force_at_interface(self, crank_angle, times) result(force)
-      import :: machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp), intent(in) :: crank_angle, times(:)
-      real(wp) :: force(size(times))
-    end function force_at_interface
-
     !> How the machine is flown.
     pure type(options_t) function options_interface(self) result(options)
       import :: machine_t, options_t
@@ -365,6 +324,47 @@ module machine_type
   end interface
 
 contains
+
+  !> Whether a machine that nothing drives has come to rest over the samples of a log after `since` [s], in a motion of this
+  !> `amplitude` [m].
+  pure logical function rests_at_end(self, amplitude, since, log) result(rests)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(in) :: amplitude, since
+    type(log_t), intent(in) :: log
+    rests = .false.
+  end function rests_at_end
+
+  !> Position and velocity of the driving body of two [m, m/s], zeros without one.
+  pure function driver(self, section) result(motion)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    real(wp) :: motion(2)
+    motion = 0
+  end function driver
+
+  !> Names of the rigid contacts that are closed at the `start` (x [m], v [m/s], crank angle [rad] of the watched body) and whose
+  !> impacts change the speed of another one, as 'ab, bc'; '' if there are none, or if impacts come one after the other.
+  pure function contacts_in_row(self, values) result(names)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(in) :: values(3)
+    character(len=:), allocatable :: names
+    names = ''
+  end function contacts_in_row
+
+  !> The samples of a measured force [N].
+  pure function measured_force(self) result(force)
+    class(machine_t), intent(in) :: self
+    real(wp) :: force(self%force_samples)
+    force = 0
+  end function measured_force
+
+  !> The measured force [N] that drives a machine, at `times` [s since the start at `crank_angle` [rad]].
+  pure function force_at(self, crank_angle, times) result(force)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(in) :: crank_angle, times(:)
+    real(wp) :: force(size(times))
+    force = 0
+  end function force_at
 
   !> A copy of a state, to be moved on its own.
   pure type(section_state_t) function copy_of(section) result(copy)

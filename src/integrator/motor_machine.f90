@@ -55,14 +55,9 @@ module motor_machine
     procedure :: event_columns
     procedure :: contact_forces
     procedure :: kinetic_energies
-    procedure :: rests_at_end
     procedure :: has_mode
-    procedure :: driver
-    procedure :: contacts_in_row
     procedure :: contact_sizes
     procedure :: free_multipliers
-    procedure :: measured_force
-    procedure :: force_at
     procedure :: options => options_now
     procedure :: set_options
   end type motor_machine_t
@@ -318,31 +313,10 @@ contains
     values = log%sample_coordinates(5, :log%samples)
   end function kinetic_energies
 
-  pure logical function rests_at_end(self, amplitude, since, log) result(rests)
-    class(motor_machine_t), intent(in) :: self
-    real(wp), intent(in) :: amplitude, since
-    type(log_t), intent(in) :: log
-    rests = .false.
-  end function rests_at_end
-
   pure logical function has_mode(self) result(fact)
     class(motor_machine_t), intent(in) :: self
     fact = self%motor%system%stiffness > 0
   end function has_mode
-
-  pure function driver(self, section) result(motion)
-    class(motor_machine_t), intent(in) :: self
-    class(section_state_t), intent(in) :: section
-    real(wp) :: motion(2)
-    motion = 0
-  end function driver
-
-  pure function contacts_in_row(self, values) result(names)
-    class(motor_machine_t), intent(in) :: self
-    real(wp), intent(in) :: values(3)
-    character(len=:), allocatable :: names
-    names = ''
-  end function contacts_in_row
 
   pure subroutine contact_sizes(self, mass, force, closed_form)
     class(motor_machine_t), intent(in) :: self
@@ -360,19 +334,6 @@ contains
     complex(wp) :: multipliers(2)
     multipliers = 0
   end function free_multipliers
-
-  pure function measured_force(self) result(force)
-    class(motor_machine_t), intent(in) :: self
-    real(wp) :: force(self%force_samples)
-    force = 0
-  end function measured_force
-
-  pure function force_at(self, crank_angle, times) result(force)
-    class(motor_machine_t), intent(in) :: self
-    real(wp), intent(in) :: crank_angle, times(:)
-    real(wp) :: force(size(times))
-    force = 0
-  end function force_at
 
   pure type(options_t) function options_now(self) result(options)
     class(motor_machine_t), intent(in) :: self

@@ -59,8 +59,6 @@ module multibody_machine
     procedure :: contacts_in_row
     procedure :: contact_sizes
     procedure :: free_multipliers
-    procedure :: measured_force
-    procedure :: force_at
     procedure :: options => options_now
     procedure :: set_options
   end type multibody_machine_t
@@ -414,19 +412,6 @@ contains
     complex(wp) :: multipliers(2)
     multipliers = 0
   end function free_multipliers
-
-  pure function measured_force(self) result(force)
-    class(multibody_machine_t), intent(in) :: self
-    real(wp) :: force(self%force_samples)
-    force = 0
-  end function measured_force
-
-  pure function force_at(self, crank_angle, times) result(force)
-    class(multibody_machine_t), intent(in) :: self
-    real(wp), intent(in) :: crank_angle, times(:)
-    real(wp) :: force(size(times))
-    force = 0
-  end function force_at
 
   pure type(options_t) function options_now(self) result(options)
     class(multibody_machine_t), intent(in) :: self
