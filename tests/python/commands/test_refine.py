@@ -74,8 +74,8 @@ def test_the_file_states_how_much_was_computed(separatrix, tmp_path):
 
 def test_a_killed_run_goes_on_to_the_same_map(mpi_separatrix, tmp_path):
     write_case(tmp_path)
-    # Long enough to be killed on the way.
-    slow = ["--set", 'run.stop="duration"', "--set", "run.duration=60"]
+    # Several times longer than the half second after which the first run of tiles is written.
+    slow = ["--set", 'run.stop="duration"', "--set", "run.duration=600"]
     command = [
         mpi_separatrix,
         "basin",

@@ -16,7 +16,7 @@ from program import change_tile, differences, listing, run, succeed, tiles_done,
 LONG = [
     *("basin", "case.toml", "--set", 'run.stop="duration"', "--set", "grid.tile=[8, 8]"),
     *("--set", 'integrator.lanes="off"'),
-    *("--set", "axis[1].count=120", "--set", "axis[2].count=104", "--set", "run.duration=25"),
+    *("--set", "axis[1].count=120", "--set", "axis[2].count=104", "--set", "run.duration=50"),
 ]
 TILES = 15 * 13
 SHORT = ["basin", "case.toml"]
