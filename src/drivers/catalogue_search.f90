@@ -5,13 +5,14 @@
 !> then all are known to all. The result does not depend on the number of ranks.
 module catalogue_search
   use attractors, only: attractor_t, least_packed, pack_attractor, packed_length, unpack_attractor
-  use basin, only: catalogue_t, label_slices, open_slice, search_starts
+  use basin, only: catalogue_t, label_slices, open_ensemble, open_slice, search_starts
   use case_type, only: attractors_t
   use discover, only: discover_attractors, sort_attractors
   use errors, only: error_t, fail
   use grid, only: grid_t, slice_neighbours
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use known_starts, only: note_known_starts
   use machine_type, only: machine_t
   use parallel, only: make_scheduler
   use scheduler, only: scheduler_options_t, scheduler_t
@@ -19,6 +20,7 @@ module catalogue_search
   use stop_check, only: check_stop
   use team, only: team_t
   use text, only: to_text
+  use trajectories, only: describe_regime, ensemble_t
   use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none
@@ -123,7 +125,8 @@ contains
       'was written yet, the same command starts again')
   end subroutine search_round
 
-  !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is noticed between them.
+  !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is noticed between them. Those that lead to
+  !> what is known are found many at once, where lanes can fly them.
   subroutine search_slice(journal, slices, grid, span, slice, starts, max_period, time_limit, catalogue, error)
     type(journal_t), intent(in) :: journal
     class(scheduler_t), intent(inout) :: slices
@@ -134,12 +137,26 @@ contains
     integer, intent(in) :: max_period
     type(catalogue_t), intent(inout) :: catalogue
     type(error_t), allocatable, intent(out) :: error
-    class(machine_t), allocatable :: moving
-    integer :: i
-    call open_slice(grid, span, slice, moving, error)
+    type(ensemble_t) :: ensemble
+    logical :: known(size(starts, 2)), useful
+    integer :: i, decided, attractors
+    call open_ensemble(grid, span, slice, describe_regime, ensemble, error)
     if (allocated(error)) return
+    ! Lanes end at convergence, whatever a map does.
+    ensemble%span%stop_when_converged = .true.
+    if (.not. allocated(catalogue%attractors)) allocate (catalogue%attractors(0))
+    known = .false.
+    useful = .true.
+    decided = 0
+    attractors = 0
     do i = 1, size(starts, 2)
-      call discover_attractors(moving, span, starts(:, i:i), max_period, catalogue%attractors)
+      associate (found => size(catalogue%attractors))
+        if (found > 0 .and. (i > decided .or. found > attractors)) then
+          call note_known_starts(ensemble, catalogue%attractors, starts, i - 1, known, decided, useful)
+          attractors = found
+        end if
+      end associate
+      if (.not. known(i)) call discover_attractors(ensemble%moving, span, starts(:, i:i), max_period, catalogue%attractors)
       call check_stop(journal, time_limit, 'searching for attractors', error)
       call slices%poll()
       if (allocated(error)) return

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> One slip against a soft barrier: in closed form where the barrier is a spring with a linear damper that may pull, for then
-!> the body is one on a stiffer spring with more damping; adaptively otherwise.
+!> One slip against a soft barrier: in closed form where the barrier is a spring with a linear damper, whose force never has to be
+!> cut off, for then the body is one on a stiffer spring with more damping; adaptively otherwise.
 module pressed_flight
   use contact_flight, only: fly_contact
   use contact_law, only: contact_kelvin_voigt
@@ -32,7 +32,9 @@ contains
     real(wp) :: share, surface
     integer :: side
     associate (law => machine%contact)
-      if (.not. (law%soft .and. law%kind == contact_kelvin_voigt .and. law%tension)) return
+      if (.not. (law%soft .and. law%kind == contact_kelvin_voigt)) return
+      ! Without damping a pressed spring never pulls.
+      if (law%damping > 0 .and. .not. law%tension) return
       if (machine%friction%layer_speed > 0 .or. .not. machine%restoring%is_linear) return
       pressed%available = .true.
       do side = -1, 1, 2
