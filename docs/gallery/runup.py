@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The motor that the machine slows down.
 
-A lever mechanism shakes a body that may hit a stop. In grey the amplitudes under a drive of given speed, on
-the way up and down. A motor of limited power does not reach them all. Its no-load speed rises slowly, and the
-crank lags behind until it jumps over the resonance. On the way down it jumps back elsewhere. This is the
-Sommerfeld effect.
+A lever mechanism shakes a body that may hit a stop. Grey dots are the amplitudes at prescribed drive speed,
+in sweeps up and down. A motor of limited power does not reach them all. As its no-load speed rises slowly,
+the crank speed lags behind until it jumps past the resonance. On the way down it jumps back at another
+no-load speed. This is the Sommerfeld effect.
 """
 
 import sys

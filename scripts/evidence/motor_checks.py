@@ -4,8 +4,8 @@
 """Compares machines with a motor with an independent program, writes docs/motor_checks.md.
 
 The values of the other program come from Taylor series of order 36 in quadruple precision. Machines: Y, a
-scotch yoke without friction and stop; I, the same with dry friction and a stop; R, an unbalance; P, the lever
-mechanism of examples/motor_lever.toml.
+scotch yoke without dry friction and stop; I, that of examples/motor_impact.toml; R, an unbalanced rotor; P,
+the lever mechanism of examples/motor_lever.toml.
 """
 
 import argparse
@@ -53,12 +53,13 @@ BAR = 1e-8
 # From standstill the least voltage that passes the resonance.
 THRESHOLD, THRESHOLD_BAR = 6.383280023598, 1e-7
 PAGE = """\
-# Machines with a motor against another program
+# Machines with a motor compared with another program
 
 Written by `scripts/evidence/motor_checks.py`; do not edit. The values of the other program come from Taylor
 series of order 36 in quadruple precision, confirmed by SciPy's DOP853 to 2e-12. Y is a scotch yoke without
-friction and stop, I the same with dry friction and a stop (`examples/motor_impact.toml`). R is an unbalance,
-P the lever mechanism of `examples/motor_lever.toml`. Values are in V, of P in rad/s.
+dry friction and without a stop; I is the scotch yoke with both of `examples/motor_impact.toml`. R is an
+unbalanced rotor, P the lever mechanism of `examples/motor_lever.toml`. Values are voltages in V; those of P
+are no-load speeds in rad/s. Labels: `SN` fold, `NS` Neimark-Sacker bifurcation, `GR` grazing.
 
 ## Bifurcations, by `branches`
 
@@ -66,14 +67,14 @@ P the lever mechanism of `examples/motor_lever.toml`. Values are in V, of P in r
 
 ## Run-up from standstill, by `trajectory`
 
-The least voltage that passes the resonance of Y is {threshold} V in the other program.
+The lowest voltage at which Y passes through resonance is {threshold} V in the other program.
 
 {runs}
 
-The suite `test_motor_orbits` compares 16 cycles with their multipliers to 1e-9.
+The suite `test_motor_orbits` compares 16 cycles and their multipliers to 1e-9.
 The suite `test_motor_motion` compares lists of events.
 
-## Not as it must be
+## Disagreements
 
 {wrong}
 """
@@ -133,7 +134,7 @@ def main() -> None:
         if runs[-1][1] != expected:
             wrong.append(f"run-up at {voltage:.13g} V: {runs[-1][1]}")
     page = PAGE.format(
-        limits=table(["machine", "what", "label", "theirs", "ours", "difference"], lines),
+        limits=table(["machine", "what", "label", "other program", "Separatrix", "difference"], lines),
         runs=table(["voltage (V)", "outcome", "expected"], runs),
         threshold=f"{THRESHOLD:.13g}",
         wrong="\n".join(f"* {item}" for item in wrong) if wrong else "None.",

@@ -222,7 +222,7 @@ contains
       call report(source, path, 'found the name "'//name//'", allowed at most '//to_text(longest_name)// &
                   ' letters, digits and _, a letter first')
     else if (any(taken == name) .and. .not. (len(table) == 0 .and. starts_with(path, force_family))) then
-      call report(source, path, 'found the name "'//name//'", which means something else in an expression; allowed any other')
+      call report(source, path, 'found the name "'//name//'", which is reserved in expressions; allowed any other')
     end if
   end subroutine check_name
 

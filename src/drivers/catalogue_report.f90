@@ -97,7 +97,7 @@ contains
     text = ''
     if (.not. resonance > 0 .or. attractor%kind /= kind_cycle .or. .not. attractor%duration > 0) return
     speed = two_pi*attractor%period/attractor%duration
-    text = ', crank speed '//to_text(speed, 6)//' rad/s, '//to_text(speed/resonance, 4)//' of the natural: '// &
+    text = ', crank speed '//to_text(speed, 6)//' rad/s, '//to_text(speed/resonance, 4)//' times the natural frequency: '// &
       trim(merge('passed  ', 'captured', speed > resonance))
   end function speed_text
 

@@ -38,7 +38,7 @@ contains
       power = sum(values(3, :))/size(angle)
       outcome = crank_outcome(angle, speed, mean, resonance_of(laws))
       ratio = ''
-      if (resonance_of(laws) > 0) ratio = to_text(mean/resonance_of(laws), 4)//' of the natural, '
+      if (resonance_of(laws) > 0) ratio = to_text(mean/resonance_of(laws), 4)//' times the natural frequency, '
       call journal%line('crank', 'crank speed '//to_text(mean, 7)//' rad/s ('//ratio//to_text(minval(speed), 5)//' to '// &
         to_text(maxval(speed), 5)//'), torque '//to_text(torque, 5)//' N m (at most '//to_text(maxval(abs(values(1, :))), 5)// &
         '), power '//to_text(power, 5)//' W: '//outcome, '"speed": '//to_text(mean)//', "outcome": "'//outcome//'"')

@@ -107,8 +107,8 @@ contains
         end if
       end associate
     end do
-    if (.not. has_clock) call session%journal%line('trivial', 'and the trivial exponent 0 of a motion without a clock; the '// &
-      'section is passed every '//to_text(spectrum%mean_period, 10)//' s', '"mean_period": '//json_number(spectrum%mean_period))
+    if (.not. has_clock) call session%journal%line('trivial', 'and the trivial exponent 0 of an autonomous machine; the '// &
+      'section is crossed every '//to_text(spectrum%mean_period, 10)//' s', '"mean_period": '//json_number(spectrum%mean_period))
     if (spectrum%has_sum) then
       call session%journal%line('sum', 'their sum: '//to_text(spectrum%sum_found, 10)//' 1/s; exact, from damping, impacts and '// &
         'turning points: '//to_text(spectrum%sum_exact, 10)//' 1/s', '"found": '//json_number(spectrum%sum_found)// &

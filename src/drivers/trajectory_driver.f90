@@ -138,7 +138,8 @@ contains
     searched = session%the_case%run%extension*periods &
                + 2*(2*moving%coordinates() + 1)*min(periods, real(session%the_case%attractors%max_period, wp))**2
     if ((monotonic_seconds() - began)/periods*searched < worth_a_word) return
-    call session%journal%line('search', 'looking for the cycle that it came to; run.average = "window" leaves that out')
+    call session%journal%line('search', 'searching for the cycle on which the motion settled; run.average = "window" '// &
+      'skips this search')
   end subroutine fly
 
   !> A structure without a drive is at rest where all its velocities in the window are rounding.

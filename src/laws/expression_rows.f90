@@ -9,9 +9,10 @@ module expression_rows
 
   type(law_row_t), parameter, public :: expression_laws(*) = [ &
     law_row_t('restoring', 'expression', 'any force [N], an expression `force` of x, v, t, phase, states', ''), &
-    law_row_t('friction', 'expression', 'against v, an expression `force` of speed = |v|; its value at rest holds the body', ''), &
+    law_row_t('friction', 'expression', 'opposes v: an expression `force` of speed = |v|; its value at rest is the static limit', &
+              ''), &
     law_row_t('contact', 'expression', 'rigid barrier, an expression `restitution` of the impact speed', ''), &
-    law_row_t('drive', 'expression', 'x_A, an expression `position` of t, phase; `period`: a time or an expression', ''), &
+    law_row_t('drive', 'expression', 'foot x_A: an expression `position` of t, phase; `period`: a time or an expression', ''), &
     law_row_t('force', 'expression', 'any force [N], an expression `force` of x, v, t, phase, states', ''), &
     law_row_t('state', 'expression', 'at most 8, with an expression `rate` of x, v, t, phase, states, and a `start`', '')]
 

@@ -20,30 +20,32 @@ module motor_rows
     law_row_t('motor', 'dc', 'torque k i; L i'' = U - R i - k w', kononenko), &
     law_row_t('motor', 'pi', 'speed control: torque Kp (wr - w) + Ki z; z'' = wr - w', &
               'Astrom, Hagglund, PID Controllers (1995)'), &
-    law_row_t('motor', 'table', 'measured torque: a table over the speed, C1', kononenko), &
-    law_row_t('drive', 'slider_crank', 'crank and rod push the foot along a guide through the axis; needs a motor', &
+    law_row_t('motor', 'table', 'measured torque-speed table, interpolated with a continuous slope', kononenko), &
+    law_row_t('drive', 'slider_crank', 'crank and rod move the foot along a guide through the crank axis; needs a motor', &
               'Reuleaux, Theoretische Kinematik (1875)'), &
-    law_row_t('drive', 'unbalance', 'rotor on the body; needs a motor', 'Sommerfeld, Z. Ver. Dtsch. Ing. 46 (1902)')]
+    law_row_t('drive', 'unbalance', 'unbalanced rotor on the body; needs a motor', 'Sommerfeld, Z. Ver. Dtsch. Ing. 46 (1902)')]
 
   integer :: i
   type(parameter_row_t), parameter :: own_parameters(*) = [ &
     parameter_row_t('motor', 'linear', 'stall_torque', 'N m', not_negative, 'M0, torque at standstill'), &
-    parameter_row_t('motor', 'linear', 'no_load_speed', 'rad/s', positive, 'w0, speed without torque'), &
+    parameter_row_t('motor', 'linear', 'no_load_speed', 'rad/s', positive, 'w0, speed at zero torque'), &
     parameter_row_t('motor', 'kloss', 'breakdown_torque', 'N m', positive, 'M, largest torque'), &
-    parameter_row_t('motor', 'kloss', 'breakdown_slip', '1', positive, 'sb, slip of the largest torque'), &
-    parameter_row_t('motor', 'kloss', 'synchronous_speed', 'rad/s', positive, 'ws, speed without torque'), &
+    parameter_row_t('motor', 'kloss', 'breakdown_slip', '1', positive, 'sb, slip at the largest torque'), &
+    parameter_row_t('motor', 'kloss', 'synchronous_speed', 'rad/s', positive, 'ws, speed at zero torque'), &
     parameter_row_t('motor', 'dc', 'voltage', 'V', any_value, 'U'), &
-    parameter_row_t('motor', 'dc', 'torque_constant', 'N m/A', positive, 'k, torque over current; also voltage over speed'), &
+    parameter_row_t('motor', 'dc', 'torque_constant', 'N m/A', positive, 'k, torque per current; also back-EMF per speed'), &
     parameter_row_t('motor', 'dc', 'resistance', 'ohm', positive, 'R'), &
-    parameter_row_t('motor', 'dc', 'inductance', 'H', not_negative, 'L; 0: the current follows at once', optional=.true.), &
+    parameter_row_t('motor', 'dc', 'inductance', 'H', not_negative, 'L; 0: the current follows instantly', optional=.true.), &
     parameter_row_t('motor', 'dc', 'start_current', 'A', any_value, 'current at the start, with an inductance', optional=.true.), &
     parameter_row_t('motor', 'pi', 'start_integral', 'rad', any_value, 'z at the start', optional=.true.), &
     parameter_row_t('motor', 'pi', 'proportional', 'N m s', not_negative, 'Kp'), &
     parameter_row_t('motor', 'pi', 'integral', 'N m', not_negative, 'Ki'), &
-    parameter_row_t('motor', 'pi', 'reference', 'rad/s', positive, 'wr, the speed that is wanted'), &
-    parameter_row_t('motor', 'pi', 'torque_limit', 'N m', not_negative, 'largest torque, either way; 0: none', optional=.true.), &
+    parameter_row_t('motor', 'pi', 'reference', 'rad/s', positive, 'wr, reference speed'), &
+    parameter_row_t('motor', 'pi', 'torque_limit', 'N m', not_negative, 'largest torque in either direction; 0: no limit', &
+                    optional=.true.), &
     parameter_row_t('motor', 'table', 'speed', 'rad/s', any_value, 'knots of the table, ascending, at most 16', list=.true.), &
-    parameter_row_t('motor', 'table', 'torque', 'N m', any_value, 'torque at these speeds, falling where it is 0', list=.true.), &
+    parameter_row_t('motor', 'table', 'torque', 'N m', any_value, &
+                    'torque at these speeds; it falls through 0 at a positive speed', list=.true.), &
     parameter_row_t('motor', 'linear', 'ramp_from', 'rad/s', not_negative, 'no_load_speed at the start of a ramp', &
                     optional=.true.), &
     parameter_row_t('motor', 'kloss', 'ramp_from', 'rad/s', not_negative, 'synchronous_speed at the start of a ramp', &
@@ -55,18 +57,19 @@ module motor_rows
 
   type(parameter_row_t), parameter :: inertias(*) = [ &
     (parameter_row_t('motor', names(i), 'inertia', 'kg m^2', positive, &
-                     'rotor, gear and crank about the axis of the crank; of an unbalance with its mass'), i=1, count), &
-    (parameter_row_t('motor', names(i), 'lever_inertia', 'kg m^2', not_negative, 'lever about C', optional=.true.), &
+                     'rotor, gear and crank about the crank axis; of an unbalance including its mass'), i=1, count), &
+    (parameter_row_t('motor', names(i), 'lever_inertia', 'kg m^2', not_negative, 'lever about its pivot C', optional=.true.), &
      i=1, count), &
-    (parameter_row_t('motor', names(i), 'rod_mass', 'kg', not_negative, 'rod of a lever mechanism, its centre in the middle', &
+    (parameter_row_t('motor', names(i), 'rod_mass', 'kg', not_negative, 'rod of a lever mechanism, centre of mass in the middle', &
                      optional=.true.), i=1, count), &
-    (parameter_row_t('motor', names(i), 'rod_inertia', 'kg m^2', not_negative, 'the same rod about its centre', &
+    (parameter_row_t('motor', names(i), 'rod_inertia', 'kg m^2', not_negative, 'the same rod about its centre of mass', &
                      optional=.true.), i=1, count), &
-    (parameter_row_t('motor', names(i), 'foot_mass', 'kg', not_negative, 'what moves with the foot of the spring', &
+    (parameter_row_t('motor', names(i), 'foot_mass', 'kg', not_negative, 'mass that moves with the foot of the spring', &
                      optional=.true.), i=1, count), &
-    (parameter_row_t('motor', names(i), 'bearing_damping', 'N m s', not_negative, 'h, torque over speed', &
+    (parameter_row_t('motor', names(i), 'bearing_damping', 'N m s', not_negative, 'h, torque per speed', &
                      optional=.true.), i=1, count), &
-    (parameter_row_t('motor', names(i), 'bearing_friction', 'N m', not_negative, 'H0, dry', optional=.true.), i=1, count), &
+    (parameter_row_t('motor', names(i), 'bearing_friction', 'N m', not_negative, 'H0, dry friction torque', optional=.true.), &
+     i=1, count), &
     (parameter_row_t('motor', names(i), 'crank_speed', 'rad/s', any_value, 'speed of the crank at the start', &
                      optional=.true.), i=1, count)]
 

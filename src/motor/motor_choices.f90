@@ -15,8 +15,8 @@ module motor_choices
 
   !> Largest decay of a difference of speeds over a turn, as an exponent.
   real(wp), parameter :: most_decay = 1e4_wp
-  character(len=*), parameter :: too_steep = 'motor.inertia: so little that the speed follows the torque within 1e-4 of a '// &
-    'turn; allowed more, or a drive without a motor, whose speed is given'
+  character(len=*), parameter :: too_steep = 'motor.inertia: so small that the crank speed settles within 1e-4 of a turn; '// &
+    'allowed a larger one, or a drive of given speed without [motor]'
 
   public :: cannot_start, has_motor, has_ramp, resonance_of, supply_of, number_of_family, refuse_laws, speed_of, start_of_motor
 
@@ -145,7 +145,8 @@ contains
     else if (motor%name == 'table') then
       call refuse_table(motor, error)
     else if (.not. abs(speed_of(motor)) > 0) then
-      call fail(error, exit_bad_case, 'motor.voltage: found 0.0 V, allowed other than 0: a turn without load is the unit of time')
+      call fail(error, exit_bad_case, 'motor.voltage: found 0.0 V, allowed other than 0: the unit of time is a turn at '// &
+                'the no-load speed')
     else if (slope_of(motor)*two_pi/abs(speed_of(motor)) > most_decay*value_of(motor, 'inertia')) then
       call fail(error, exit_bad_case, too_steep)
     else
@@ -154,7 +155,7 @@ contains
     if (allocated(error)) return
     if (drive%name == 'slider_crank') then
       if (.not. value_of(drive, 'rod') > value_of(drive, 'crank')) then
-        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: a shorter rod cannot go round')
+        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully')
       end if
     end if
   end subroutine refuse_laws
@@ -168,8 +169,8 @@ contains
     if (len(problem) > 0) then
       call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque has its values there')
     else if (.not. speed_of(motor) > 0) then
-      call fail(error, exit_bad_case, 'motor.torque: allowed falling through 0 at a speed above 0: a turn at that speed is the '// &
-                'unit of time')
+      call fail(error, exit_bad_case, 'motor.torque: allowed values that fall through 0 at a speed above 0; a turn at that '// &
+                'speed is the unit of time')
     else if (steepest(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')))*two_pi > &
              most_decay*value_of(motor, 'inertia')*speed_of(motor)) then
       call fail(error, exit_bad_case, too_steep)
@@ -187,12 +188,12 @@ contains
                   ' rad/s, allowed above 0: the torque is divided by this speed')
       end if
     else if (abs(value_of(motor, 'ramp_from')) > 0 .and. .not. value_of(motor, 'ramp_time') > 0) then
-      call fail(error, exit_bad_case, 'motor.ramp_time: missing, allowed above 0 s: motor.ramp_from is where a ramp begins')
+      call fail(error, exit_bad_case, 'motor.ramp_time: missing, allowed above 0 s: motor.ramp_from is given')
     end if
     if (motor%name /= 'pi' .or. allocated(error)) return
     associate (limit => value_of(motor, 'torque_limit'), own => abs(value_of(motor, 'start_integral')*value_of(motor, 'integral')))
       if (limit > 0 .and. own > limit) then
-        call fail(error, exit_bad_case, 'motor.start_integral: times motor.integral it is '//to_text(real(own, real64))// &
+        call fail(error, exit_bad_case, 'motor.start_integral: multiplied by motor.integral it is '//to_text(real(own, real64))// &
                   ' N m, allowed at most motor.torque_limit')
       end if
     end associate

@@ -47,7 +47,7 @@ contains
     do i = 1, 6
       at(i) = number_of_family(choices, needed(i))
       if (at(i) == 0) then
-        call fail(error, exit_bad_case, trim(needed(i))//'.law: not found; a machine with a motor has one')
+        call fail(error, exit_bad_case, trim(needed(i))//'.law: missing; a machine with a motor needs it')
         return
       end if
     end do
@@ -69,7 +69,7 @@ contains
       call add_unbalance(choices(at(5)), system)
       if (.not. system%mass*value_of(choices(at(6)), 'inertia') > system%moment**2) then
         call fail(error, exit_bad_case, 'motor.inertia: found '//to_text(real(value_of(choices(at(6)), 'inertia'), kind(1d0)))// &
-                  ', allowed above drive.moment^2/body.mass: the mass of an unbalance has an inertia itself')
+                  ', allowed above drive.moment^2/body.mass: the unbalanced mass alone has more')
         return
       end if
     else

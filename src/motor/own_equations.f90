@@ -82,23 +82,23 @@ contains
     integer :: i
     do i = 1, size(choices)
       if (choices(i)%family == effect_family) call fail(error, exit_bad_case, 'effect.'//trim(choices(i)%name)// &
-                                                        ': not allowed beside laws by expressions; allowed as a [force.NAME]')
+                                                        ': not allowed with laws by expressions; a [force.NAME] can replace it')
       if (allocated(error)) return
     end do
     if (choices(at(1))%name /= 'point_mass') then
-      call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(at(1))%name)//'", allowed beside laws by expressions: '// &
+      call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(at(1))%name)//'", allowed with laws by expressions: '// &
                 'point_mass')
       return
     end if
     exponent = 1
     if (choices(at(3))%name == 'coulomb_stribeck') exponent = value_of(choices(at(3)), 'stribeck_exponent')
     if (all(choices(at(4))%name /= [character(len=10) :: 'none', 'newton', own_law])) then
-      call fail(error, exit_bad_case, 'contact.law: allowed beside laws by expressions: none, newton, expression')
+      call fail(error, exit_bad_case, 'contact.law: allowed with laws by expressions: none, newton, expression')
     else if (choices(at(5))%name == 'measured_force') then
-      call fail(error, exit_bad_case, 'drive.law: found "measured_force", allowed beside laws by expressions: none, harmonic, '// &
+      call fail(error, exit_bad_case, 'drive.law: found "measured_force", allowed with laws by expressions: none, harmonic, '// &
                 'fourier, crank_lever_rod, expression')
     else if (abs(exponent - nint(exponent)) > 0 .or. exponent > 8) then
-      call fail(error, exit_bad_case, 'friction.stribeck_exponent: allowed beside laws by expressions: 1, 2, ... 8')
+      call fail(error, exit_bad_case, 'friction.stribeck_exponent: allowed with laws by expressions: 1, 2, ... 8')
     else if (count(choices%family == state_family) > most_own) then
       call fail(error, exit_bad_case, 'state: found '//to_text(count(choices%family == state_family))//' states, allowed '// &
                 to_text(most_own))
@@ -234,7 +234,7 @@ contains
               ' s, allowed a positive number, or an expression of parameters that is one')
   end subroutine read_period
 
-  !> Rates of the states. A rate may use that of another state, as state.NAME.rate, in any order but in a circle.
+  !> Rates of the states. A rate may use that of another state, as state.NAME.rate, in any order but without an algebraic loop.
   pure subroutine add_rates(choices, system, names, error)
     type(law_choice_t), intent(in) :: choices(:)
     type(motor_system_t), intent(inout) :: system
@@ -260,7 +260,7 @@ contains
     i = findloc(is_open, .true., dim=1)
     call fail(error, exit_bad_case, path_of(choices(i))//'.rate: found '// &
               path_of(choices(open_rate(choices, is_open, text_of(choices(i), 'rate'))))// &
-              '.rate, which needs this rate itself; allowed without a circle')
+              '.rate, which needs this rate itself (an algebraic loop)')
   end subroutine add_rates
 
   !> Number of a state that is still open and whose rate a text uses; 0 if there is none.

@@ -121,7 +121,7 @@ contains
         if (operation_table(it%operation)%arguments > 1) b = it%second
         if (a == b) then
           problem = 'found '//trim(operation_table(it%operation)%name)//' of a quantity in '//spelled(quantity(a))// &
-            ', allowed of a number'
+            ', allowed of a dimensionless number'
         else
           problem = 'found '//trim(operation_table(it%operation)%name)//' between '//spelled(quantity(a))//' and '// &
             spelled(quantity(b))//', allowed between equal units'

@@ -112,11 +112,11 @@ pure function why_not_varied(machine) result(why)
   why = ''
   associate (system => machine%motor%system)
     if (system%control%supply > 0) then
-      why = 'motor.ramp_time: a machine that changes with time has no cycles'
+      why = 'motor.ramp_time: during a ramp there are no cycles'
     else if (system%control%torque_limit > 0) then
-      why = 'motor.torque_limit: the variations of a limited torque are not known'
+      why = 'motor.torque_limit: variations are not available for a limited torque'
     else if (system%control%curve%count > 0) then
-      why = 'motor.law: found "table"; the variations of a tabulated torque are not known'
+      why = 'motor.law: found "table"; variations are not available for a tabulated torque'
     end if
   end associate
 end function why_not_varied
