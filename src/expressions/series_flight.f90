@@ -33,6 +33,8 @@ module series_flight
   integer, parameter :: most_tries = 200
   !> Steps in which the time does not change, after which a motion into a pole is given up.
   integer, parameter :: most_idle_steps = 100
+  !> Margins of enclosures, as parts of the state.
+  real(wp), parameter :: widest_margin = epsilon(1.0_wp)**0.6_wp, least_margin = 16*epsilon(1.0_wp)
   !> Shortest step, as a part of the time.
   real(wp), parameter :: shortest = 0.01_wp*epsilon(1.0_wp)
 
@@ -62,8 +64,8 @@ module series_flight
     !> Steps, enclosures tried for them, and decisions that even short steps left to rounding.
     integer :: steps = 0, tries = 0, uncertain = 0
     integer :: step_budget = 1000000
-    !> Margin of an enclosure, as a part of the state.
-    real(wp) :: margin = epsilon(1.0_wp)**0.6_wp
+    !> Margin of an enclosure, as a part of the state; it is less where it would reach beyond the end of a domain.
+    real(wp) :: margin = widest_margin
     type(series_t), private :: series, bounds
     !> Nodes of the active guards that are more than a variable and a constant.
     integer, allocatable, private :: curved(:)
@@ -137,6 +139,8 @@ contains
     end do
     call set_branches(flight, branches)
     flight%is_active(:own) = watched
+    ! Other forces allow other steps.
+    flight%proven = 1
   end subroutine change_branches
 
   !> Moves on to the time `until`, or to the first crossing of a guard. `status` states how it ended.
@@ -224,6 +228,7 @@ contains
     fraction = 2
     fault = 0
     status = flight_reached
+    flight%margin = min(widest_margin, 64*flight%margin)
     do try = 1, most_tries
       flight%tries = flight%tries + 1
       if (.not. step > shortest*max(abs(flight%time), longest)) exit
@@ -231,6 +236,7 @@ contains
       if (flight%fault > 0) then
         fault = flight%fault
         step = 0.5_wp*step
+        flight%margin = max(least_margin, flight%margin/16)
         cycle
       end if
       ! What the remainder allows: it grows with the step to the power of its order.

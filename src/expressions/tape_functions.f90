@@ -5,7 +5,7 @@
 module tape_functions
   use kinds, only: wp
   use operations, only: op_acos, op_add, op_arc_tangent, op_asin, op_atan, op_constant, op_cos, op_cosh, op_divide, op_exp, &
-    op_log, op_multiply, op_negative, op_power, op_sin, op_sinh, op_sqrt, op_square, op_subtract, op_tan, op_tanh
+    op_log, op_multiply, op_negative, op_power, op_select, op_sin, op_sinh, op_sqrt, op_square, op_subtract, op_tan, op_tanh
   use tape, only: constant, tape_t
   use tape_algebra, only: binary, choice, unary
   implicit none
@@ -26,6 +26,9 @@ module tape_functions
 
   !> Largest whole exponent that is computed by multiplications.
   integer, parameter :: largest_exponent = 1024
+  !> A root or a positive power that is not whole is zero within this distance of a base of zero, where it has no Taylor series:
+  !> of x^p the impulse on a body that passes with amplitude A is that of the exact force but for the share (distance/A)^(p + 1).
+  real(wp), parameter :: zero_of_root = 1e-10_wp
 
 contains
 
@@ -43,6 +46,11 @@ contains
     integer :: opposite, i, before, difference, ends(2)
     if (number <= size(codes)) then
       call unary(tape, codes(number), arguments(1), node)
+      ! The argument has corners, as abs(x) has at zero.
+      if (codes(number) == op_sqrt .and. tape%nodes(arguments(1))%operation == op_select) then
+        call constant(tape, 0.5_wp, ends(1))
+        call leave_out_zero(tape, arguments(1), ends(1), node)
+      end if
       return
     end if
     node = arguments(1)
@@ -72,8 +80,8 @@ contains
     end select
   end subroutine apply_function
 
-  !> Node of base^exponent. Whole exponents multiply and halves of odd numbers multiply by a root, so that the base may have
-  !> any sign or be zero as far as the root allows. Another exponent without variables needs a positive base, and so does
+  !> Node of base^exponent. Whole exponents multiply, so that the base may have any sign, and halves of odd numbers multiply by a
+  !> root. Another exponent without variables needs a base of at least zero, or a positive one if it is negative, and so does
   !> exp(exponent log(base)) with variables in the exponent.
   pure recursive subroutine power(tape, base, exponent, node)
     type(tape_t), intent(inout) :: tape
@@ -92,18 +100,38 @@ contains
           call unary(tape, op_sqrt, base, root)
           call whole_power(tape, base, nint(value - 0.5_wp), factor)
           call binary(tape, op_multiply, factor, root, node)
+          call leave_out_zero(tape, base, exponent, node)
           return
         end if
       end if
     end if
     if (tape%nodes(exponent)%is_steady) then
       call binary(tape, op_power, base, exponent, node)
+      call leave_out_zero(tape, base, exponent, node)
     else
       call unary(tape, op_log, base, logarithm)
       call binary(tape, op_multiply, exponent, logarithm, factor)
       call unary(tape, op_exp, factor, node)
     end if
   end subroutine power
+
+  !> Makes the power in `node` zero where its base is zero but for `zero_of_root`, if the exponent is positive.
+  pure subroutine leave_out_zero(tape, base, exponent, node)
+    type(tape_t), intent(inout) :: tape
+    integer, intent(in) :: base, exponent
+    integer, intent(inout) :: node
+    integer :: small, above, below, zero, inner, power
+    if (tape%nodes(base)%is_steady) return
+    if (tape%nodes(exponent)%operation == op_constant .and. .not. tape%nodes(exponent)%value > 0) return
+    power = node
+    call constant(tape, zero_of_root, small)
+    call constant(tape, 0.0_wp, zero)
+    call binary(tape, op_subtract, base, small, above)
+    call binary(tape, op_add, base, small, below)
+    call choice(tape, exponent, -1, zero, power, inner)
+    call choice(tape, below, 1, inner, power, inner)
+    call choice(tape, above, -1, power, inner, node)
+  end subroutine leave_out_zero
 
   !> base^n by squares and products.
   pure recursive subroutine whole_power(tape, base, n, node)

@@ -265,22 +265,21 @@ contains
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(machine_column_t), allocatable :: columns(:)
-    integer :: n
-    n = log%samples
+    real(wp) :: values(4, log%samples)
+    ! A motion that was given up at its start has no samples.
+    if (log%samples > 0) values = log%sample_coordinates(:4, :log%samples)
     allocate (columns(6))
-    call set_crank(log%sample_driver(:, :n), columns)
-    associate (values => log%sample_coordinates)
-      call set_column(columns(3), 'motor_torque', 'N m', 'torque of the motor', values(1, :n))
-      call set_column(columns(4), 'load_torque', 'N m', 'torque of spring or body against the motor', values(2, :n))
-      call set_column(columns(5), 'motor_power', 'W', 'power of the motor at its shaft', values(3, :n))
-      if (self%motor%system%current > 0) then
-        call set_column(columns(6), 'current', 'A', 'current of the motor', values(4, :n))
-      else if (self%motor%system%control%has_own) then
-        call set_column(columns(6), 'integral', 'rad', 'integral of the speed control', values(4, :n))
-      else
-        columns = columns(:5)
-      end if
-    end associate
+    call set_crank(log%sample_driver(:, :log%samples), columns)
+    call set_column(columns(3), 'motor_torque', 'N m', 'torque of the motor', values(1, :))
+    call set_column(columns(4), 'load_torque', 'N m', 'torque of spring or body against the motor', values(2, :))
+    call set_column(columns(5), 'motor_power', 'W', 'power of the motor at its shaft', values(3, :))
+    if (self%motor%system%current > 0) then
+      call set_column(columns(6), 'current', 'A', 'current of the motor', values(4, :))
+    else if (self%motor%system%control%has_own) then
+      call set_column(columns(6), 'integral', 'rad', 'integral of the speed control', values(4, :))
+    else
+      columns = columns(:5)
+    end if
   end function sample_columns
 
   pure function event_columns(self, log) result(columns)
@@ -310,7 +309,7 @@ contains
     class(motor_machine_t), intent(in) :: self
     type(log_t), intent(in) :: log
     real(wp) :: values(log%samples)
-    values = log%sample_coordinates(5, :log%samples)
+    if (log%samples > 0) values = log%sample_coordinates(5, :log%samples)
   end function kinetic_energies
 
   pure logical function has_mode(self) result(fact)

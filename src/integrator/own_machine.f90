@@ -315,15 +315,16 @@ contains
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     type(machine_column_t), allocatable :: columns(:)
+    real(wp) :: values(6 + size(self%starts), log%samples)
     integer :: i
+    ! A motion that was given up at its start has no samples.
+    if (log%samples > 0) values = log%sample_coordinates(:size(values, 1), :log%samples)
     allocate (columns(1 + size(self%starts)))
-    associate (values => log%sample_coordinates, n => log%samples)
-      call set_column(columns(1), 'drive', 'm', 'position of the foot of the spring', values(6, :n))
-      do i = 1, size(self%starts)
-        call set_column(columns(1 + i), 'state_'//trim(self%names(i)), trim(self%units(i)), 'state '//trim(self%names(i)), &
-                        values(6 + i, :n))
-      end do
-    end associate
+    call set_column(columns(1), 'drive', 'm', 'position of the foot of the spring', values(6, :))
+    do i = 1, size(self%starts)
+      call set_column(columns(1 + i), 'state_'//trim(self%names(i)), trim(self%units(i)), 'state '//trim(self%names(i)), &
+                      values(6 + i, :))
+    end do
   end function sample_columns
 
   pure function event_columns(self, log) result(columns)
