@@ -33,6 +33,7 @@ contains
       if (control%largest_integral > 0 .and. abs(crank%own(1)) >= control%largest_integral) then
         crank%held = nint(sign(1.0_wp, crank%own(1)))
       end if
+      call release_integral(system, state, crank)
       call choose_limit(system, state, crank)
     end associate
   end subroutine start_limits
@@ -52,6 +53,22 @@ contains
       if (is_beyond(-series%c(:, guards(guard_limit_down)%node), room)) crank%limited = -1
     end associate
   end subroutine choose_limit
+
+  !> Lets a held integral go where the speed is beyond its reference, or there to rounding and on its way beyond: the torque leaves
+  !> its limit at the same instant, and the guard of only one of the two may have crossed.
+  pure subroutine release_integral(system, state, crank)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(series_t) :: series
+    integer :: fault, mode
+    if (crank%held == 0) return
+    mode = equation_mode(slips(state%mode), crank%turning /= 0)
+    call low_series(system, mode, state, crank, series, fault)
+    associate (beyond => crank%held*series%c(:, system%flights(mode, 0)%guards(guard_resume)%node))
+      if (is_beyond(beyond, 64*epsilon(1.0_wp)*abs(crank%w))) crank%held = 0
+    end associate
+  end subroutine release_integral
 
   pure logical function is_beyond(c, rounding)
     real(wp), intent(in) :: c(0:), rounding
@@ -124,7 +141,9 @@ contains
       crank%held = merge(1, -1, crossed(guard_integral_up))
       crank%own(1) = crank%held*system%control%largest_integral
     end if
-    if (system%control%torque_limit > 0) call choose_limit(system, state, crank)
+    if (.not. system%control%torque_limit > 0) return
+    call release_integral(system, state, crank)
+    call choose_limit(system, state, crank)
   end subroutine change_limits
 
 end module motor_limits

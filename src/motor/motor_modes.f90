@@ -53,8 +53,9 @@ contains
       if (.not. abs(state%v) > 0) flight%zeros(guard_turning) = zero_order(series%c(:, flight%rates(4)), &
                                                                                 least(system, state, series))
     else
-      if (state%mode /= mode_upper_barrier) call watch(flight, guard_body_up, 1)
-      if (state%mode /= mode_lower_barrier) call watch(flight, guard_body_down, -1)
+      ! Between stops without room a body is at both.
+      if (state%mode /= mode_upper_barrier .and. state%x < system%contact%upper) call watch(flight, guard_body_up, 1)
+      if (state%mode /= mode_lower_barrier .and. state%x > system%contact%lower) call watch(flight, guard_body_down, -1)
       call mark_zeros(flight, series, [guard_body_up, guard_body_down], system%mass*least(system, state, series))
     end if
     if (system%clock) return

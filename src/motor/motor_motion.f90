@@ -19,7 +19,7 @@ module motor_motion
   use motor_log, only: add_sample, motor_energy, record_motor_event
   use motor_modes, only: begin_mode, keep_angle
   use motor_now, only: restitution_of
-  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, slips
+  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, hold_without_room, slips
   use motor_state, only: motor_state_t
   use motor_system, only: far, guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
     guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t, y_at
@@ -75,6 +75,7 @@ contains
     crank%w = values(4)
     crank%own(1) = values(5)
     crank%turning = merge(-1, 1, crank%w < 0)
+    call hold_without_room(moving%system, state)
     call start_limits(moving%system, over, state, crank)
     ! Of an unbalance, what holds the one depends on whether the other moves.
     do i = 1, 2
@@ -91,13 +92,13 @@ contains
     type(motor_state_t), intent(out) :: crank
     state = state_t(x=values(1), v=values(2), time=time, mode=merge(mode_slip_minus, mode_slip_plus, values(2) < 0))
     crank%own(:size(values) - 2) = values(3:)
+    call hold_without_room(moving%system, state)
     if (.not. abs(state%v) > 0) call choose_body(moving%system, state, crank)
   end subroutine start_own
 
   !> Moves to `time_end` [s], or only to the next section, `at_section` then being true: the crank passes through zero upwards;
   !> without a motor the body turns round at a maximum, at a minimum where a stop cuts off the maxima alone.
-  !> `reason` stays 0 unless the motion had to be given up. With `one_event` it ends after the next
-  !> event.
+  !> `reason` stays 0 unless the motion had to be given up. With `one_event` it ends after the next event.
   pure subroutine advance_motor(moving, state, crank, time_end, at_section, tally, reason, log, one_event)
     type(motor_motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state
@@ -114,8 +115,8 @@ contains
     logical :: stops, passed
     stops = at_section
     at_section = .false.
-    reason = 0
     idle = 0
+    reason = 0
     do while (state%time < time_end)
       tally%events = tally%events + 1
       if (tally%events > moving%options%event_budget) reason = reason_event_budget
@@ -126,10 +127,9 @@ contains
       if (reason /= 0) return
       if (slips(state%mode)) tally%slips = tally%slips + 1
       call note_position(tally, state)
-      if (any(flight%crossed([guard_upper, guard_lower]))) then
-        if (abs(restitution_of(moving%system, state, crank) - 0.5_wp) > 0.5_wp) reason = reason_step_failed
-        if (reason /= 0) return
-      end if
+      if (any(flight%crossed([guard_upper, guard_lower])) .and. &
+          abs(restitution_of(moving%system, state, crank) - 0.5_wp) > 0.5_wp) reason = reason_step_failed
+      if (reason /= 0) return
       call do_events(moving, flight%crossed, state, crank, passed, tally, log)
       if (moving%system%clock) passed = flight%crossed(guard_turning) .and. turns_at_section(moving%system, mode, state%mode)
       idle = merge(0, idle + 1, state%time > before)
@@ -144,7 +144,7 @@ contains
     end do
   end subroutine advance_motor
 
-  !> One mode, to its next event or `time_end`, with the samples on the way.
+  !> One mode, to its next event or `time_end`, with its samples.
   pure subroutine fly(moving, state, crank, time_end, flight, tally, reason, log)
     type(motor_motion_t), intent(in) :: moving
     type(state_t), intent(inout) :: state

@@ -16,7 +16,8 @@ module motor_rest
   implicit none
   private
 
-  public :: choose_body, choose_crank, equation_mode, size_of_forces, slips, chatter_dies_out, low_series, zero_order
+  public :: choose_body, choose_crank, equation_mode, hold_without_room, size_of_forces, slips, chatter_dies_out, low_series, &
+    zero_order
 
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
@@ -101,6 +102,13 @@ contains
       state%mode = mode_stick
     end if
   end subroutine choose_body
+
+  !> A body between stops that leave no room does not move.
+  pure subroutine hold_without_room(system, state)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(inout) :: state
+    if (.not. system%contact%upper > system%contact%lower) state%v = 0
+  end subroutine hold_without_room
 
   !> Which way the crank turns from standstill, or whether its bearing holds it.
   pure subroutine choose_crank(system, state, crank)
