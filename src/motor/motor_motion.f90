@@ -75,6 +75,7 @@ contains
     crank%w = values(4)
     crank%own(1) = values(5)
     crank%turning = merge(-1, 1, crank%w < 0)
+    crank%passed_last = crank%turning
     call hold_without_room(moving%system, state)
     call start_limits(moving%system, over, state, crank)
     ! Of an unbalance, what holds the one depends on whether the other moves.
@@ -96,7 +97,7 @@ contains
     if (.not. abs(state%v) > 0) call choose_body(moving%system, state, crank)
   end subroutine start_own
 
-  !> Moves to `time_end` [s], or only to the next section, `at_section` then being true: the crank passes through zero upwards;
+  !> Moves to `time_end` [s], or only to the next section, `at_section` then being true: the crank passes through zero;
   !> without a motor the body turns round at a maximum, at a minimum where a stop cuts off the maxima alone.
   !> `reason` stays 0 unless the motion had to be given up. With `one_event` it ends after the next event.
   pure subroutine advance_motor(moving, state, crank, time_end, at_section, tally, reason, log, one_event)
@@ -236,7 +237,7 @@ contains
     flight%state(n + 1:) = 0
   end subroutine take_state
 
-  !> What happens where guards crossed zero; `passed`: the section upwards.
+  !> What happens where guards crossed zero; `passed`: the section.
   pure subroutine do_events(moving, crossed, state, crank, passed, tally, log)
     type(motor_motion_t), intent(in) :: moving
     logical, intent(in) :: crossed(:)
@@ -246,14 +247,12 @@ contains
     type(tally_t), intent(inout) :: tally
     type(log_t), intent(inout), optional :: log
     associate (system => moving%system)
-      passed = crossed(guard_section)
+      passed = crossed(guard_section) .or. (crossed(guard_back) .and. crank%passed_last < 0)
       call change_limits(system, crossed, state, crank)
-      if (crossed(guard_section)) then
-        crank%phi = two_pi
-        call keep_angle(crank)
-        call append_word(tally, word_period)
-      else if (crossed(guard_back)) then
-        crank%phi = 0
+      if (passed) call append_word(tally, word_period)
+      if (crossed(guard_section) .or. crossed(guard_back)) then
+        crank%passed_last = merge(1, -1, crossed(guard_section))
+        crank%phi = merge(two_pi, 0.0_wp, crossed(guard_section))
         call keep_angle(crank)
       end if
       if (crossed(guard_standstill)) then

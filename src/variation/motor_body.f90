@@ -156,7 +156,7 @@ end function motor_body_of
 pure type(motor_state_t) function crank_in(self, y) result(crank)
   class(motor_body_t), intent(in) :: self
   real(wp), intent(in) :: y(:)
-  crank = motor_state_t(phi=y(angle_of), w=y(speed_of))
+  crank = motor_state_t(phi=y(angle_of), w=y(speed_of), turning=merge(-1, 1, y(speed_of) < 0))
   if (self%n == own_of) crank%own(1) = y(own_of)
 end function crank_in
 
@@ -236,7 +236,7 @@ pure subroutine guard_of_body(self, event, t, y, value, by_state, by_time)
   by_state = 0
   by_time = 0*t
   if (event%guard == turns_round) then
-    value = y(angle_of) - two_pi
+    value = y(angle_of) - sign(two_pi, y(speed_of))
     by_state(angle_of) = 1
     return
   end if
@@ -286,7 +286,7 @@ pure subroutine jump_of_body(self, event, t, y, after, by_state, by_time)
   end do
   after = y
   if (event%guard == turns_round) then
-    after(angle_of) = y(angle_of) - two_pi
+    after(angle_of) = y(angle_of) - sign(two_pi, y(speed_of))
     return
   end if
   select case (event%kind)

@@ -53,7 +53,7 @@ contains
     image = point
     mode = 0
     call self%begin(point, section, ok)
-    if (ok) ok = section%motor%turning > 0
+    if (ok) ok = section%motor%turning /= 0
     if (ok) call fly_turns(self, section%state, section%motor, sections, image, events, mode, tally, ok)
     if (.not. allocated(events)) allocate (events(0))
   end procedure fly_motor_over_sections
@@ -82,7 +82,7 @@ contains
       passed = .true.
       log%events = 0
       call advance_motor(self%machine%motor, state, crank, state%time + longest*self%period, passed, tally, reason, log)
-      ok = reason == 0 .and. passed .and. crank%turning > 0
+      ok = reason == 0 .and. passed .and. crank%turning == crank%passed_last
       if (.not. ok) return
       call add_events(self, log, i - 1, mode, image, events)
       call add_section(self, state, crank, events)
@@ -105,7 +105,7 @@ contains
     event%departure(:self%n) = point_of_crank(self, state, crank)
     event%departure(angle_of) = 0
     event%arrival = event%departure
-    event%arrival(angle_of) = two_pi
+    event%arrival(angle_of) = sign(two_pi, crank%w)
     events = [events, event]
   end subroutine add_section
 
@@ -130,7 +130,7 @@ contains
       if (self%smooth_turns .and. log%event_kind(i) == event_turning_point) cycle
       event = event_t(kind=log%event_kind(i), before=now, time=log%event_data(1, i))
       event%arrival([x_of, v_of]) = log%event_data(2:3, i)
-      event%arrival([angle_of, speed_of]) = log%event_driver(:, i) - [two_pi*turns, 0.0_wp]
+      event%arrival([angle_of, speed_of]) = log%event_driver(:, i) - [sign(two_pi, start(speed_of))*turns, 0.0_wp]
       if (self%n == own_of) then
         call self%fly(now, t, y, event%time, flown)
         event%arrival(own_of) = flown(own_of)
