@@ -17,8 +17,8 @@ module motor_state
     real(wp) :: own(most_own) = 0
     !> 1 or -1: the crank turns this way; 0: its bearing holds it.
     integer :: turning = 1
-    !> Turns taken off the angle; which way the crank last passed through zero. Backwards that is a section only if it did so before:
-    !> a crank that rocks about zero passes its section once a cycle.
+    !> Turns taken off the angle; which way the crank last passed through zero. Backwards that is a section only if it was so the
+    !> last time: a crank that rocks about zero passes its section once a cycle.
     integer :: turns = 0, passed_last = 1
     !> What a ramp changes, voltage [V] or speed without torque [rad/s], and whether it still does.
     real(wp) :: supply = 0
