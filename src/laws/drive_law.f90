@@ -17,7 +17,7 @@ module drive_law
   real(wp), parameter :: same_force = 1e-9_wp
 
   public :: drive_of, add_harmonics, add_ripple, foot_motion, measured_force, ends_with_its_first, next_sample, lever_foot, &
-    lever_assembles
+    lever_assembles, moves_foot, is_speed
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
   integer, parameter :: max_harmonics = 1024
@@ -25,6 +25,8 @@ module drive_law
   type, public :: drive_t
     !> Drive angular frequency over the natural one; 0 without a drive.
     real(wp) :: ratio = 0
+    !> Angular frequency [rad/s] where that is given, not the ratio; else 0.
+    real(wp) :: frequency = 0
     real(wp) :: mean = 0
     !> Fourier coefficients [m], index = harmonic.
     real(wp), allocatable :: cosine(:), sine(:)
@@ -44,6 +46,18 @@ module drive_law
   end type lever_t
 
 contains
+
+  !> Whether a drive of one body moves the foot of its spring.
+  pure logical function moves_foot(name)
+    character(len=*), intent(in) :: name
+    moves_foot = name == 'harmonic' .or. name == 'fourier' .or. name == 'crank_lever_rod'
+  end function moves_foot
+
+  !> Whether a parameter of such a drive is its speed, as a ratio or a frequency: it has one of them.
+  pure logical function is_speed(name)
+    character(len=*), intent(in) :: name
+    is_speed = name == 'ratio' .or. name == 'frequency'
+  end function is_speed
 
   !> The law that a choice of the family `drive` names.
   pure function drive_of(choice) result(law)
@@ -72,6 +86,7 @@ contains
     end select
     if (choice%name /= 'crank_lever_rod') law%mean = value_of(choice, 'mean')
     law%ratio = value_of(choice, 'ratio')
+    law%frequency = value_of(choice, 'frequency')
     call advance_angle(law, value_of(choice, 'angle'))
   end function drive_of
 

@@ -14,6 +14,7 @@ module oscillator
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
   use law_table, only: effect_family, law_choice_t, motor_family, own_law, path_of, value_of
+  use law_texts, only: is_own
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
   implicit none
@@ -139,6 +140,11 @@ contains
     end if
     machine%drive_frequency = machine%natural_frequency
     if (machine%drive%ratio > 0) machine%drive_frequency = machine%drive%ratio*machine%natural_frequency
+    if (machine%drive%frequency > 0) then
+      machine%drive_frequency = machine%drive%frequency
+      machine%drive%ratio = 1
+      if (machine%natural_frequency > 0) machine%drive%ratio = machine%drive_frequency/machine%natural_frequency
+    end if
     if (machine%drive_frequency > 0) then
       machine%period = two_pi/machine%drive_frequency
     else if (machine%drive%ratio > 0) then
@@ -198,6 +204,10 @@ contains
       if (choices(i)%family == motor_family) then
         call fail(error, exit_bad_case, 'motor.law: found "'//trim(choices(i)%name)//'", allowed in the commands trajectory, '// &
                   'basin and sweep')
+        return
+      end if
+      if (choices(i)%name /= own_law .and. is_own(choices(i))) then
+        call fail(error, exit_bad_case, path_of(choices(i))//'.load: allowed in the commands trajectory, basin and sweep')
         return
       end if
       select case (choices(i)%name)
