@@ -9,6 +9,7 @@ module multibody
   use contact_law, only: contact_t
   use friction_law, only: friction_t
   use kinds, only: wp
+  use tape, only: tape_t
   implicit none
   private
 
@@ -16,6 +17,9 @@ module multibody
 
   !> One joint more than a machine may have: the section of a motion without a clock.
   integer, parameter, public :: most_degrees = 16, most_joints = 13
+
+  !> Most switching functions of a normal force by an expression.
+  integer, parameter, public :: most_load_switches = 8
 
   !> Kinds of joints: dry friction, spring and slider in series, rigid contact, contact with a force over penetration,
   !> a spring whose force is not linear, and one without force at which the watched coordinate turns round.
@@ -32,6 +36,26 @@ module multibody
     real(wp) :: mean = 0, rate = 0
     complex(wp), allocatable :: harmonic(:)
   end type wave_t
+
+  !> What a normal force depends on: a coordinate w'q + offset(t), or the force of the soft contact of that coordinate.
+  type, public :: source_t
+    real(wp), allocatable :: row(:)
+    type(wave_t) :: offset
+    !> Name and number of the contact; '' and 0 without one.
+    character(len=name_length) :: contact = ''
+    integer :: joint = 0
+  end type source_t
+
+  !> Normal force of friction [N], an expression. Its variables are the time since the section [s], the phase [rad], and of each
+  !> source its value and its first three derivatives by the time.
+  type, public :: load_t
+    type(tape_t) :: tape
+    integer :: node = 0
+    !> Node of the rate of each variable.
+    integer, allocatable :: rates(:)
+    real(wp), allocatable :: parameters(:)
+    type(source_t), allocatable :: sources(:)
+  end type load_t
 
   type, public :: joint_t
     character(len=name_length) :: name = ''
@@ -50,6 +74,8 @@ module multibody
     real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0, attraction = 0, gap = 1
     !> What the force of a spring is multiplied by, a function of the time; without one, by 1.
     type(wave_t), allocatable :: strength
+    !> Normal force, by which the forces of friction, then coefficients, are multiplied.
+    type(load_t), allocatable :: load
   end type joint_t
 
   !> A controller that moves a position s = row'q after a reference, its force u = P e + I (integral of e) + D e' acting along the

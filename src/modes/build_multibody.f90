@@ -5,6 +5,7 @@
 module build_multibody
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
   use build_control, only: add_controllers, add_impulses
+  use build_load, only: set_normal_force
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
@@ -64,6 +65,8 @@ contains
       case default
         if (index(choices(i)%name, 'spring:') == 1) call add_spring(machine, choices(i), row_of(rows, choices(i)), error)
         if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
+        if (choices(i)%name == 'friction:coulomb_load' .and. .not. allocated(error)) call set_normal_force(choices, i, rows, &
+          machine, machine%joints(size(machine%joints)), error)
         if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices(i), row_of(rows, choices(i)), &
                                                                       given_of(choices, coordinate), error)
       end select
@@ -216,8 +219,13 @@ contains
     joint%row = row
     joint%friction = friction_of_part(choice)
     if (joint%friction%break_away < joint%friction%kinetic) then
-      call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(joint%friction%break_away)// &
-                ' N, allowed at least the force '//number(joint%friction%kinetic)//' N')
+      if (choice%name == 'friction:coulomb_load') then
+        call fail(error, exit_bad_case, path_of(choice)//'.static_coefficient: found '//number(joint%friction%break_away)// &
+                  ', allowed at least the kinetic_coefficient '//number(joint%friction%kinetic))
+      else
+        call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(joint%friction%break_away)// &
+                  ' N, allowed at least the force '//number(joint%friction%kinetic)//' N')
+      end if
       return
     end if
     if (choice%name == 'friction:elastic_coulomb') then

@@ -14,6 +14,7 @@ module own_friction
   use own_names, only: add_known, names_t, read_own
   use tape, only: constant
   use tape_algebra, only: choice
+  use tape_sign, only: positive_part
   use text, only: to_text
   implicit none
   private
@@ -67,14 +68,15 @@ contains
     type(motor_system_t), intent(inout) :: system
     type(names_t), intent(in) :: names
     type(error_t), allocatable, intent(out) :: error
-    integer :: node
+    integer :: node, load
     associate (sheet => system%sheet)
       if (is_own(choices(at))) then
         system%friction = friction_of(choices(at), 1.0_wp)
         call read_own(names, choices, at, 'load', sheet, node, error)
         if (allocated(error)) return
         call add_node(sheet, 'given_load', node)
-        call define(sheet, 'load', 'max(0, given_load)')
+        call positive_part(sheet%tape, sheet%parameters, node, load)
+        call add_node(sheet, 'load', load)
       else
         system%friction = friction_of(choices(at), system%mass*value_of(choices(number_of_family(choices, 'body')), 'gravity'))
         call define(sheet, 'load', '1')
