@@ -6,7 +6,6 @@
 module case_echo
   use axis, only: axis_t, linear_values
   use case_type, only: case_t, sample_t, sweep_t
-  use drive_law, only: is_speed, moves_foot
   use grid, only: sample_axis
   use kinds, only: wp
   use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, rows_of, part_family, &
@@ -135,9 +134,7 @@ contains
     end if
     do i = 1, size(rows)
       if (law%family == part_family .and. is_hidden(rows(i))) cycle
-      if (moves_foot(law%name) .and. is_speed(rows(i)%name)) then
-        if (has_motor(laws) .or. .not. law%parameters(i)%values(1) > 0) cycle
-      end if
+      if (rows(i)%name == 'ratio' .and. has_motor(laws)) cycle
       associate (values => law%parameters(i)%values)
         if (rows(i)%list) then
           if (size(values) > 0 .or. law%family /= part_family) text = text//line(trim(rows(i)%name), reals(values))

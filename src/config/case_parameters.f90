@@ -5,12 +5,12 @@
 module case_parameters
   use angle_units, only: unit_of
   use case_values, only: allowed_range, any_number, between, bounds_t
-  use drive_law, only: is_speed, moves_foot
+  use drive_law, only: is_given, is_speed, moves_foot
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, rows_of, &
-    part_family, path_of, split_element, value_of
+    part_family, path_of, split_element
   use motor_choices, only: has_motor
   use part_angles, only: is_of_angle
   use restoring_law, only: position_is_angle
@@ -72,7 +72,7 @@ contains
     character(len=*), intent(in) :: name
     is_left_out = .false.
     if (.not. (moves_foot(laws(i)%name) .and. is_speed(name))) return
-    is_left_out = has_motor(laws) .or. .not. value_of(laws(i), name) > 0
+    is_left_out = has_motor(laws) .or. .not. is_given(laws(i), name)
   end function is_left_out
 
   !> Bounds and unit of a row of the law table, where a position is an angle or not.

@@ -8,7 +8,7 @@ module law_check
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
-  use drive_law, only: ends_with_its_first, moves_foot
+  use drive_law, only: ends_with_its_first, is_given, moves_foot
   use effect_check, only: refuse_effects
   use errors, only: error_t
   use motor_choices, only: has_motor
@@ -57,7 +57,7 @@ contains
     if (.not. good(3)) return
     if (is_good(source, ['restoring']) .and. moves_foot(trim(laws(drive_position)%name)) .and. .not. has_motor(laws) .and. &
         laws(restoring_law)%name /= 'linear') then
-      call report(source, trim(merge('drive.ratio    ', 'drive.frequency', value_of(laws(drive_position), 'ratio') > 0)), &
+      call report(source, trim(merge('drive.ratio    ', 'drive.frequency', is_given(laws(drive_position), 'ratio'))), &
                   'found with restoring.law = "'//trim(laws(restoring_law)%name)//'", allowed with "linear": the drive '// &
                   'moves the foot of that spring')
     end if

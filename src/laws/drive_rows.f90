@@ -4,7 +4,7 @@
 !> Catalogue rows of the drives of one body.
 module drive_rows
   use kinds, only: wp
-  use law_row, only: any_value, law_row_t, not_negative, parameter_row_t, positive, range_t, zero_to_one
+  use law_row, only: any_value, law_row_t, none_above, not_negative, parameter_row_t, positive, range_t, zero_to_one
   implicit none
   private
 
@@ -25,18 +25,20 @@ module drive_rows
 
   type(parameter_row_t), parameter, public :: drive_parameters(*) = [ &
     parameter_row_t('drive', 'harmonic', 'ratio', '1', positive, &
-                    'drive angular frequency over the natural angular frequency sqrt(c/m)', optional=.true.), &
+                    'drive angular frequency over the natural angular frequency sqrt(c/m)', optional=.true., &
+                    default=none_above), &
     parameter_row_t('drive', 'harmonic', 'frequency', 'rad/s', positive, 'angular frequency, in place of the ratio', &
-                    optional=.true.), &
+                    optional=.true., default=none_above), &
     parameter_row_t('drive', 'harmonic', 'mean', 'm', any_value, 'mean position of the foot of the spring', &
                     optional=.true.), &
     parameter_row_t('drive', 'harmonic', 'amplitude', 'm', not_negative, 'amplitude of the foot'), &
     parameter_row_t('drive', 'harmonic', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
                     'offset added to the crank angle', optional=.true.), &
     parameter_row_t('drive', 'fourier', 'ratio', '1', positive, &
-                    'drive angular frequency over the natural angular frequency sqrt(c/m)', optional=.true.), &
+                    'drive angular frequency over the natural angular frequency sqrt(c/m)', optional=.true., &
+                    default=none_above), &
     parameter_row_t('drive', 'fourier', 'frequency', 'rad/s', positive, 'angular frequency, in place of the ratio', &
-                    optional=.true.), &
+                    optional=.true., default=none_above), &
     parameter_row_t('drive', 'fourier', 'mean', 'm', any_value, 'mean position of the foot of the spring', &
                     optional=.true.), &
     parameter_row_t('drive', 'fourier', 'cosine', 'm', any_value, 'a_1, a_2, ...', list=.true.), &
@@ -44,9 +46,10 @@ module drive_rows
     parameter_row_t('drive', 'fourier', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
                     'offset added to the crank angle', optional=.true.), &
     parameter_row_t('drive', 'crank_lever_rod', 'ratio', '1', positive, &
-                    'drive angular frequency over the natural angular frequency sqrt(c/m)', optional=.true.), &
+                    'drive angular frequency over the natural angular frequency sqrt(c/m)', optional=.true., &
+                    default=none_above), &
     parameter_row_t('drive', 'crank_lever_rod', 'frequency', 'rad/s', positive, 'angular frequency, in place of the ratio', &
-                    optional=.true.), &
+                    optional=.true., default=none_above), &
     parameter_row_t('drive', 'crank_lever_rod', 'crank', 'm', positive, 'r = OD'), &
     parameter_row_t('drive', 'crank_lever_rod', 'pivot_distance', 'm', positive, 'l1 = OC, longer than the crank'), &
     parameter_row_t('drive', 'crank_lever_rod', 'lever', 'm', positive, 'l2 = CE'), &

@@ -57,8 +57,8 @@ contains
       allocate (names%names(0), names%nodes(0), names%of_variables(0), names%of_parameters(0), load%sources(0), load%parameters(0))
       allocate (load%rates(0))
       call add_clock(machine, load, names)
-      call add_parameters(choices, i, load, names)
       call add_coordinates(choices, text, rows, load, names)
+      call add_parameters(choices, i, load, names)
       call add_springs(choices, text, rows, load, names)
       call add_contacts(choices, text, rows, load, names, error)
       if (allocated(error)) then
@@ -176,7 +176,12 @@ contains
       if (.not. is_reference_point(choices(i))) cycle
       k = k + 1
       label = trim(choices(i)%label)
-      if (.not. (has_name(text, label//'.x') .or. has_name(text, label//'.v'))) cycle
+      if (.not. (has_name(text, label//'.x') .or. has_name(text, label//'.v'))) then
+        ! Messages list it; the text does not refer to it.
+        call add_name(names, label//'.x', 1)
+        call add_name(names, label//'.v', 1)
+        cycle
+      end if
       source%row = rows(:, k)
       call add_source(source, ['m  ', 'm/s'], load, names, nodes)
       call add_name(names, label//'.x', nodes(1))
