@@ -83,6 +83,8 @@ contains
     case ('stribeck_exponent')
       matters = .not. (laws(i)%family == part_family .and. part_law(laws(i)%name) == 'coulomb_load')
       if (.not. matters) matters = value_of(laws(i), 'stribeck_velocity') > 0
+      if (laws(i)%family == part_family .and. part_law(laws(i)%name) == 'lugre') matters = value_of(laws(i), 'static_force') > &
+        value_of(laws(i), 'force')
     case ('tension')
       ! Without damping a barrier does not pull.
       matters = index(laws(i)%name, 'restitution') > 0

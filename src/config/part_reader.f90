@@ -203,7 +203,7 @@ contains
       call read_own_law(source, choice)
       if (value_of(choice, 'static_coefficient') < 0) call set_value(choice, 'static_coefficient', &
                                                                       [value_of(choice, 'kinetic_coefficient')])
-    else if (kind == 'friction') then
+    else if (kind == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.
       if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then
         call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))// &

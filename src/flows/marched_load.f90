@@ -12,7 +12,7 @@ module marched_load
   implicit none
   private
 
-  public :: set_load, choose_branches, load_at, switch_at, sizes_of_switch, move_origin
+  public :: set_load, choose_branches, load_at, switch_at, sizes_of_switch, move_origin, set_rows
 
   !> A normal force, and what its sources are made of: rows over displacements and speeds since the start, 1, the time since the
   !> start, cosines and sines of the drive.

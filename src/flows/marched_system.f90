@@ -8,8 +8,8 @@ module marched_system
   use elementary, only: sine_cosine
   use flight_path, only: path_t
   use guarded_march, only: watched_system_t
-  use multibody, only: joint_soft, joint_spring, joint_t, multibody_t, most_joints
-  use marched_load, only: choose_branches, load_at, marched_load_t, set_load, switch_at
+  use multibody, only: joint_soft, joint_spring, joint_t, memory_t, multibody_t, most_joints
+  use marched_load, only: choose_branches, load_at, marched_load_t, set_load, set_rows, switch_at
   use multibody_state, only: factor_now, is_curved, joint_force, joint_motion, multibody_state_t, spring_terms
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
@@ -89,9 +89,25 @@ contains
       if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop) &
           <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop
       system%position(one, k) = s - stop
+      if (allocated(machine%joints(j)%memory)) call set_memory(machine, state, machine%joints(j)%memory, system%position(:, k), &
+                                                               system%speed(:, k))
     end do
     call set_loads(machine, state, path, system)
   end subroutine set_system
+
+  !> The rows of the deflection and the sliding speed of friction with memory, in the place of a coordinate and its speed.
+  pure subroutine set_memory(machine, state, memory, position, speed)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
+    type(memory_t), intent(in) :: memory
+    real(wp), intent(inout) :: position(:), speed(:)
+    real(wp) :: place(size(position))
+    place = 0
+    speed = 0
+    call set_rows(machine, state, memory%slide%row, memory%slide%offset, place, speed)
+    position = 0
+    position(machine%n + 1:2*machine%n) = memory%deflection
+  end subroutine set_memory
 
   !> Normal forces of friction; their branches follow from the motion that begins.
   pure subroutine set_loads(machine, state, path, system)
@@ -256,6 +272,10 @@ contains
                        by_position, by_speed)
       term = abs(force)
       if (self%joints(k)%kind == joint_spring) term = spring_terms(self%joints(k), s, strength)
+      if (allocated(self%joints(k)%memory)) then
+        sizes = sizes + abs(self%push(:, k))*(term + abs(by_position*s) + abs(by_speed)*sum(abs(self%speed(:, k)*z)))
+        cycle
+      end if
       term = term + abs(by_position)*(abs(s) + sum(abs(self%joints(k)%row)*(abs(origin) + abs(y(:self%n))))) &
              + abs(by_speed)*sum(abs(self%speed(:, k)*z))
       sizes = sizes + abs(self%push(:, k))*term
@@ -304,7 +324,9 @@ contains
       call factor_now(machine, j, state, turning, factor)
       call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r, by_position, &
                        by_speed)
-      sizes(k) = abs(by_position)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:machine%n))))
+      sizes(k) = abs(by_position*s)
+      if (.not. allocated(machine%joints(j)%memory)) sizes(k) = abs(by_position)*(abs(s) + sum(abs(machine%joints(j)%row &
+                                                                                               *state%q(:machine%n))))
     end do
   end function digits_of_forces
 

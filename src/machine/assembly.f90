@@ -264,6 +264,12 @@ contains
     end do
     do i = 1, size(machine%joints)
       call take_out_of_row(machine%joints(i)%row, machine%joints(i)%offset, at, rest, wave)
+      if (allocated(machine%joints(i)%memory)) then
+        associate (memory => machine%joints(i)%memory)
+          call take_out_of_row(memory%slide%row, memory%slide%offset, at, rest, wave)
+          memory%deflection = memory%deflection(rest)
+        end associate
+      end if
       if (.not. allocated(machine%joints(i)%load)) cycle
       associate (sources => machine%joints(i)%load%sources)
         do m = 1, size(sources)

@@ -3,11 +3,13 @@
 
 !> Forces and energies of the joints of a multibody structure, each from its own coordinate, speed and phase.
 module joint_forces
+  use bristle_law, only: bristle_force, bristle_rate
   use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
   use elementary, only: sine_cosine
   use friction_law, only: falls, sliding_friction, sliding_slope
   use kinds, only: wp
-  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, wave_value
+  use multibody, only: joint_bristle, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, memory_t, &
+    wave_value
   implicit none
   private
 
@@ -40,7 +42,7 @@ contains
       is_curved = allocated(joint%load) .or. (phase /= 0 .and. falls(joint%friction))
     case (joint_soft)
       is_curved = abs(phase) == 1 .and. joint%contact%kind /= contact_kelvin_voigt
-    case (joint_spring)
+    case (joint_spring, joint_bristle)
       is_curved = .true.
     end select
   end function is_curved
@@ -84,8 +86,28 @@ contains
       end if
     case (joint_spring)
       call spring_force(joint, s, strength, force, by_position)
+    case (joint_bristle)
+      call memory_force(joint%memory, s, u, force, by_position, by_speed)
     end select
   end subroutine joint_force
+
+  !> Force of friction with memory at the deflection `z` and the sliding speed `u`, or of its bristles on the deflection.
+  pure subroutine memory_force(memory, z, u, force, by_deflection, by_speed)
+    type(memory_t), intent(in) :: memory
+    real(wp), intent(in) :: z, u
+    real(wp), intent(out) :: force
+    real(wp), intent(out), optional :: by_deflection, by_speed
+    real(wp) :: slopes(2)
+    if (memory%on_deflection) then
+      call bristle_rate(memory%law, z, u, force, slopes(1), slopes(2))
+      force = memory%law%stiffness*force
+      slopes = memory%law%stiffness*slopes
+    else
+      call bristle_force(memory%law, z, u, force, slopes(1), slopes(2))
+    end if
+    if (present(by_deflection)) by_deflection = slopes(1)
+    if (present(by_speed)) by_speed = slopes(2)
+  end subroutine memory_force
 
   !> Force of a spring [N] and its derivative with respect to s.
   pure subroutine spring_force(joint, s, strength, force, by_position)

@@ -69,6 +69,11 @@ contains
       call wave_value(joint%offset, machine%frequency, time, turning, value, rate, given)
       s = sum(joint%row*q(:machine%n)) + value
       u = sum(joint%row*v(:machine%n)) + rate
+      if (.not. allocated(joint%memory)) return
+      ! Deflection and sliding speed are what the forces of friction with memory depend on.
+      call wave_value(joint%memory%slide%offset, machine%frequency, time, turning, value, rate, given)
+      s = sum(joint%memory%deflection*v(:machine%n))
+      u = sum(joint%memory%slide%row*v(:machine%n)) + rate
     end associate
   end subroutine joint_motion
 
@@ -230,6 +235,10 @@ contains
         call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r, by_position, by_speed)
         force = force + r*joint%row
         if (.not. present(rate)) cycle
+        if (allocated(joint%memory)) then
+          rate = rate + (by_position*sum(joint%memory%deflection*a) + by_speed*(sum(joint%memory%slide%row*a) + given))*joint%row
+          cycle
+        end if
         rate = rate + (by_position*u + by_speed*(sum(joint%row*a) + given))*joint%row
         if (.not. (allocated(joint%strength) .or. allocated(joint%load))) cycle
         call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(1), gained)

@@ -6,6 +6,7 @@ module build_multibody
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
   use build_control, only: add_controllers, add_impulses
   use build_load, only: set_normal_force
+  use build_memory, only: add_bristles, add_deflections, add_elements, has_bristles
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
@@ -57,6 +58,7 @@ contains
     if (.not. allocated(error)) call set_frequency(choices, machine, error)
     if (.not. allocated(error)) call name_coordinates(choices, machine, rows, coordinate, error)
     if (allocated(error)) return
+    call add_deflections(choices, machine, rows)
     do i = 1, size(choices)
       select case (choices(i)%name)
       case ('drive:force')
@@ -64,9 +66,7 @@ contains
         call add_force(machine, rows(:, reference_point_of(choices(i))), wave%mean, wave%harmonic)
       case default
         if (index(choices(i)%name, 'spring:') == 1) call add_spring(machine, choices(i), row_of(rows, choices(i)), error)
-        if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
-        if (choices(i)%name == 'friction:coulomb_load' .and. .not. allocated(error)) call set_normal_force(choices, i, rows, &
-          machine, machine%joints(size(machine%joints)), error)
+        if (index(choices(i)%name, 'friction:') == 1) call add_any_friction(machine, choices, i, rows, error)
         if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices(i), row_of(rows, choices(i)), &
                                                                       given_of(choices, coordinate), error)
       end select
@@ -206,6 +206,24 @@ contains
     joint%strength = modulation
     call add_joint(machine, joint)
   end subroutine add_spring
+
+  !> Friction of any law: dry, with a normal force of its own, or with memory.
+  pure subroutine add_any_friction(machine, choices, i, rows, error)
+    type(multibody_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: rows(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    if (has_bristles(choices(i))) then
+      call add_bristles(machine, choices(i), row_of(rows, choices(i)), error)
+    else if (choices(i)%name == 'friction:maxwell_slip') then
+      call add_elements(machine, choices(i), row_of(rows, choices(i)), error)
+    else
+      call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
+      if (choices(i)%name /= 'friction:coulomb_load' .or. allocated(error)) return
+      call set_normal_force(choices, i, rows, machine, machine%joints(size(machine%joints)), error)
+    end if
+  end subroutine add_any_friction
 
   pure subroutine add_friction(machine, choice, row, error)
     type(multibody_t), intent(inout) :: machine

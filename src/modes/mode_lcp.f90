@@ -187,6 +187,10 @@ contains
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
         call factor_now(machine, j, state, turning, factor, a, jerk)
         call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r, by_position, by_speed)
+        if (allocated(joint%memory)) then
+          rate = rate + (by_position*sum(joint%memory%deflection*jerk) + by_speed*sum(joint%memory%slide%row*jerk))*joint%row
+          cycle
+        end if
         rate = rate + (by_position*(sum(joint%row*a) + surface(machine, j, state, turning, 2)) &
                        + by_speed*(sum(joint%row*jerk) + surface(machine, j, state, turning, 3)))*joint%row
         if (.not. (allocated(joint%strength) .or. allocated(joint%load))) cycle

@@ -6,7 +6,8 @@ module multibody_log
   use control, only: active_force, bodies_of
   use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
-  use multibody, only: joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, multibody_t, most_joints, wave_value
+  use multibody, only: joint_bristle, joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, multibody_t, most_joints, &
+    wave_value
   use multibody_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, multibody_state_t, &
     factor_now, turning_at
   use kinds, only: wp
@@ -293,7 +294,9 @@ contains
         call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r)
         work = work - r*rate
         if (allocated(joint%strength)) work = work + r*u
-        if (joint%kind == joint_soft) then
+        if (joint%kind == joint_bristle) then
+          friction = friction - r*merge(s, u, joint%memory%on_deflection)
+        else if (joint%kind == joint_soft) then
           if (allocated(machine%driver)) then
             contact = contact - r*u
           else if (abs(state%phase(j)) == 1) then
