@@ -95,16 +95,16 @@ contains
     call set_loads(machine, state, path, system)
   end subroutine set_system
 
-  !> The rows of the deflection and the sliding speed of friction with memory, in the place of a coordinate and its speed.
+  !> The rows of the deflection and the sliding speed of friction with memory, in the unused of a coordinate and its speed.
   pure subroutine set_memory(machine, state, memory, position, speed)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
     type(memory_t), intent(in) :: memory
     real(wp), intent(inout) :: position(:), speed(:)
-    real(wp) :: place(size(position))
-    place = 0
+    real(wp) :: unused(size(position))
+    unused = 0
     speed = 0
-    call set_rows(machine, state, memory%slide%row, memory%slide%offset, place, speed)
+    call set_rows(machine, state, memory%slide%row, memory%slide%offset, unused, speed)
     position = 0
     position(machine%n + 1:2*machine%n) = memory%deflection
   end subroutine set_memory
