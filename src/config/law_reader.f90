@@ -156,7 +156,7 @@ contains
     end if
     of_two = any(pair_laws%family == family .and. pair_laws%name == law)
     if (body == 'point_mass') then
-      goes_with = .not. of_two
+      goes_with = .not. of_two .or. (family == 'drive' .and. law == 'force')
     else if (family == 'drive') then
       goes_with = of_two
     else if (family == 'friction') then
@@ -252,7 +252,7 @@ contains
     if (index(path, '/') /= 1) path = source%name(:index(source%name, '/', back=.true.))//path
     call know(source, 'drive.force')
     call know(source, 'drive.interval')
-    call read_force(path, interval, force, problem)
+    call read_force(path, 'force', interval, force, problem)
     if (allocated(problem)) then
       call report(source, 'drive.force', problem)
     else if (find(source, 'drive.interval') > 0) then

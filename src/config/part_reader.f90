@@ -192,7 +192,7 @@ contains
     choice%label = name
     if (kind == 'drive') call read_body(source, path, bodies, choice)
     from_record = .false.
-    if (choice%name == 'drive:force') call read_record(source, path, choice, from_record)
+    if (choice%name == 'drive:force' .or. choice%name == 'drive:motion') call read_record(source, path, choice, from_record)
     if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)

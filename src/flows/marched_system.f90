@@ -95,7 +95,7 @@ contains
     call set_loads(machine, state, path, system)
   end subroutine set_system
 
-  !> The rows of the deflection and the sliding speed of friction with memory, in the unused of a coordinate and its speed.
+  !> The rows of the deflection and the sliding speed of friction with memory, instead of a coordinate and its speed.
   pure subroutine set_memory(machine, state, memory, position, speed)
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state

@@ -177,6 +177,7 @@ contains
       drive = drive_of(choices(at))
       if (drive%ratio > 0 .and. spring%stiffness > 0) system%period = two_pi/(drive%ratio*sqrt(spring%stiffness/system%mass))
       if (drive%frequency > 0) system%period = two_pi/drive%frequency
+      if (choices(at)%name == 'force') system%period = two_pi/value_of(choices(at), 'frequency')
     end if
     associate (sheet => system%sheet)
       if (system%period > 0) then
@@ -314,6 +315,15 @@ contains
         call add_node(sheet, 'force'//to_text(forces), node)
         call define(sheet, 'total'//to_text(forces), 'total'//to_text(forces - 1)//' + force'//to_text(forces))
       end do
+      associate (drive => choices(number_of_family(choices, 'drive')))
+        if (drive%name == 'force') then
+          call add_optional(sheet, 'drive_mean', value_of(drive, 'mean'))
+          call add_optional(sheet, 'drive_amplitude', value_of(drive, 'amplitude'))
+          call define(sheet, 'force'//to_text(forces + 1), 'drive_mean + drive_amplitude*cos(phase)')
+          call define(sheet, 'total'//to_text(forces + 1), 'total'//to_text(forces)//' + force'//to_text(forces + 1))
+          forces = forces + 1
+        end if
+      end associate
       call define(sheet, 'forces', 'total'//to_text(forces))
       call define(sheet, 'hold', 'spring + forces')
       system%forces = [node_of(sheet, 'spring'), (node_of(sheet, 'force'//to_text(i)), i=1, forces)]

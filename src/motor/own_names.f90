@@ -39,6 +39,9 @@ contains
   pure logical function has_own(choices)
     type(law_choice_t), intent(in) :: choices(:)
     has_own = any(is_own(choices) .and. choices%family /= part_family)
+    ! The same equations: a force that is not on the foot of a spring has no closed form in the flights of one body.
+    if (.not. has_own) has_own = any(choices%family == 'drive' .and. choices%name == 'force') .and. &
+      any(choices%family == 'body' .and. choices%name == 'point_mass')
   end function has_own
 
   !> No names.

@@ -216,7 +216,14 @@ contains
                   'basin and sweep')
       case ('friction_pair', 'backlash_pair')
         call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
-      case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')
+      case ('force')
+        if (any(choices%family == 'body' .and. choices%name == 'point_mass')) then
+          call fail(error, exit_bad_case, 'drive.law: found "force", allowed in the commands trajectory, basin and sweep')
+        else
+          call fail(error, exit_bad_case, 'drive.law: found "force", allowed with two bodies '// &
+                    '(body.law = "friction_pair" or "backlash_pair")')
+        end if
+      case ('velocity', 'sine', 'pid_velocity', 'pid_sine')
         call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with two bodies '// &
                   '(body.law = "friction_pair" or "backlash_pair")')
       case ('slider_crank', 'unbalance')
