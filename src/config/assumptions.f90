@@ -7,7 +7,8 @@ module assumptions
   use case_source, only: case_source_t, find
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, parameter_row_t, rows_of, part_family, part_kind, &
-    path_of, value_of
+    part_law, path_of, value_of
+  use law_texts, only: is_own
   use text, only: to_text
   implicit none
   private
@@ -76,8 +77,14 @@ contains
     select case (name)
     case ('gravity')
       ! The normal force of dry friction, and nothing else.
-      matters = parameter_value(laws, 'friction.kinetic_coefficient', 0.0_wp) > 0 .or. &
+      matters = .not. any(is_own(laws) .and. laws%family == 'friction')
+      if (matters) matters = parameter_value(laws, 'friction.kinetic_coefficient', 0.0_wp) > 0 .or. &
                 parameter_value(laws, 'friction.static_coefficient', 0.0_wp) > 0
+    case ('stribeck_exponent')
+      matters = .not. (laws(i)%family == part_family .and. part_law(laws(i)%name) == 'coulomb_load')
+      if (.not. matters) matters = value_of(laws(i), 'stribeck_velocity') > 0
+      if (laws(i)%family == part_family .and. part_law(laws(i)%name) == 'lugre') matters = value_of(laws(i), 'static_force') > &
+        value_of(laws(i), 'force')
     case ('tension')
       ! Without damping a barrier does not pull.
       matters = index(laws(i)%name, 'restitution') > 0

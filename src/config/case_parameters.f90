@@ -5,6 +5,7 @@
 module case_parameters
   use angle_units, only: unit_of
   use case_values, only: allowed_range, any_number, between, bounds_t
+  use drive_law, only: is_given, is_speed, moves_foot
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use kinds, only: wp
@@ -55,8 +56,7 @@ contains
       rows = rows_of(laws(i))
       do j = 1, size(rows)
         if (path_of(laws(i))//'.'//trim(rows(j)%name) /= name .or. is_hidden(rows(j))) cycle
-        ! A motor sets the speed of the crank.
-        if (name == 'drive.ratio' .and. has_motor(laws)) cycle
+        if (is_left_out(laws, i, trim(rows(j)%name))) cycle
         if (rows(j)%list .neqv. number > 0) cycle
         if (number > size(laws(i)%parameters(j)%values)) cycle
         law = i
@@ -64,6 +64,16 @@ contains
       end do
     end do
   end subroutine find_parameter
+
+  !> Whether law number `i` goes without the parameter: a drive has a ratio or a frequency, and a motor sets the speed of its crank.
+  pure logical function is_left_out(laws, i, name)
+    type(law_choice_t), intent(in) :: laws(:)
+    integer, intent(in) :: i
+    character(len=*), intent(in) :: name
+    is_left_out = .false.
+    if (.not. (moves_foot(laws(i)%name) .and. is_speed(name))) return
+    is_left_out = has_motor(laws) .or. .not. is_given(laws(i), name)
+  end function is_left_out
 
   !> Bounds and unit of a row of the law table, where a position is an angle or not.
   pure type(bounds_t) function row_bounds(row, is_angle)
@@ -119,7 +129,7 @@ contains
       rows = rows_of(laws(i))
       do j = 1, size(rows)
         if (is_hidden(rows(j)) .or. size(laws(i)%parameters(j)%values) == 0) cycle
-        if (rows(j)%name == 'ratio' .and. has_motor(laws)) cycle
+        if (is_left_out(laws, i, trim(rows(j)%name))) cycle
         if (len(names) > 0) names = names//', '
         names = names//path_of(laws(i))//'.'//trim(rows(j)%name)
         if (rows(j)%list) names = names//'[1]'

@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A measured force on a body of several: record = "FILE.csv" of a [drive.NAME], instead of its frequency and series. The record is
-!> one period, by the rule of one body: a last sample that is the first once more begins the next.
+!> A measured force on a body of several, or its measured motion: record = "FILE.csv" of a [drive.NAME], instead of its frequency
+!> and series. The record is one period, by the rule of one body: a last sample that is the first once more begins the next.
 module drive_record
   use case_source, only: assume, case_source_t, find, know, report
   use case_values, only: take_integer, take_text
@@ -51,7 +51,7 @@ contains
     end do
     if (len(file) == 0) return
     if (index(file, '/') /= 1) file = source%name(:index(source%name, '/', back=.true.))//file
-    call read_force(file, interval, force, problem)
+    call read_force(file, merge('x    ', 'force', choice%name == 'drive:motion'), interval, force, problem)
     if (allocated(problem)) then
       call report(source, path//'.record', problem)
       return
@@ -89,7 +89,7 @@ contains
     periodic = merge(0, 1, closed)
     call take_integer(source, path//'.periodic', 0, periodic, highest=1)
     if (periodic == 1 .and. closed) call report(source, path//'.periodic', 'found 1 with the first sample, '// &
-      to_text(force(1))//' N, once more at the end of the record; allowed without it, or 0')
+      to_text(force(1))//', once more at the end of the record; allowed without it, or 0')
     if (periodic == 1) return
     force(1) = (force(1) + force(size(force)))/2
     force = force(:size(force) - 1)

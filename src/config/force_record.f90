@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> A measured force out of a record: a CSV table with comment lines, a header row, and columns t [s] and force [N] among
-!> others.
+!> A measured force or motion out of a record: a CSV table with comment lines, a header row, and among others columns t [s] and
+!> force [N] or x [m].
 module force_record
   use errors, only: error_t
   use kinds, only: int64, wp
@@ -18,10 +18,10 @@ module force_record
 
 contains
 
-  !> Time between samples [s] and samples [N] of the record `path`; `problem` is allocated if there is one, and names the
-  !> line, what was found and what is allowed.
-  subroutine read_force(path, interval, force, problem)
-    character(len=*), intent(in) :: path
+  !> Time between samples [s] and samples of the column `name` of the record `path`; `problem` is allocated if there is one, and
+  !> names the line, what was found and what is allowed.
+  subroutine read_force(path, name, interval, force, problem)
+    character(len=*), intent(in) :: path, name
     real(wp), intent(out) :: interval
     real(wp), allocatable, intent(out) :: force(:)
     character(len=:), allocatable, intent(out) :: problem
@@ -52,9 +52,9 @@ contains
       number = number + 1
       if (len(line) == 0 .or. starts_with(line, '#')) cycle
       if (columns(1) == 0) then
-        columns = [column_of(line, 't'), column_of(line, 'force')]
+        columns = [column_of(line, 't'), column_of(line, trim(name))]
         width = 1 + commas(line)
-        if (any(columns == 0)) problem = 'found the header '''//line//''', allowed one with columns t and force'
+        if (any(columns == 0)) problem = 'found the header '''//line//''', allowed one with columns t and '//trim(name)
       else if (1 + commas(line) /= width) then
         problem = 'found '//to_text(1 + commas(line))//' values in '''//line//''', allowed '//to_text(width)// &
                   ' like the header, with decimal points'

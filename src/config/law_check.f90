@@ -8,7 +8,7 @@ module law_check
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
-  use drive_law, only: ends_with_its_first
+  use drive_law, only: ends_with_its_first, is_given, moves_foot
   use effect_check, only: refuse_effects
   use errors, only: error_t
   use motor_choices, only: has_motor
@@ -55,10 +55,11 @@ contains
     if (good(2)) call check_barriers(source, laws, at)
     if (whole) call check_bodies(source, laws, at)
     if (.not. good(3)) return
-    if (is_good(source, ['restoring']) .and. needs_spring(laws(drive_position)%name) .and. .not. has_motor(laws) .and. &
+    if (is_good(source, ['restoring']) .and. moves_foot(trim(laws(drive_position)%name)) .and. .not. has_motor(laws) .and. &
         laws(restoring_law)%name /= 'linear') then
-      call report(source, 'drive.ratio', 'found with restoring.law = "'//trim(laws(restoring_law)%name)// &
-                  '", allowed with "linear": the ratio refers to its natural frequency')
+      call report(source, trim(merge('drive.ratio    ', 'drive.frequency', is_given(laws(drive_position), 'ratio'))), &
+                  'found with restoring.law = "'//trim(laws(restoring_law)%name)//'", allowed with "linear": the drive '// &
+                  'moves the foot of that spring')
     end if
     select case (laws(drive_position)%name)
     case ('fourier')
@@ -176,10 +177,5 @@ contains
       if (len(problem) > 0) call report(source, 'drive.rod', problem//at)
     end if
   end subroutine check_lever
-
-  pure logical function needs_spring(drive)
-    character(len=*), intent(in) :: drive
-    needs_spring = drive == 'harmonic' .or. drive == 'fourier' .or. drive == 'crank_lever_rod'
-  end function needs_spring
 
 end module law_check

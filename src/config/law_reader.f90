@@ -6,7 +6,7 @@ module law_reader
   use case_parameters, only: find_parameter
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_text
-  use drive_law, only: ends_with_its_first
+  use drive_law, only: ends_with_its_first, moves_foot
   use force_record, only: read_force
   use kinds, only: wp
   use own_reader, only: read_own_law, read_own_tables
@@ -131,9 +131,18 @@ contains
     else
       choice = law_choice(family, name)
       call read_parameters(source, is_angle, choice)
-      if (name == own_law) call read_own_law(source, choice)
+      if (name == own_law .or. has_load(source, choice)) call read_own_law(source, choice)
     end if
   end subroutine read_law
+
+  !> Whether friction by a coefficient has a normal force of its own, an expression.
+  pure logical function has_load(source, choice)
+    type(case_source_t), intent(in) :: source
+    type(law_choice_t), intent(in) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    rows = parameters_of(choice%family, choice%name)
+    has_load = choice%family == 'friction' .and. any(rows%name == 'kinetic_coefficient') .and. find(source, 'friction.load') > 0
+  end function has_load
 
   !> Whether a body can have a law of another family.
   pure logical function goes_with(family, law, body)
@@ -147,7 +156,7 @@ contains
     end if
     of_two = any(pair_laws%family == family .and. pair_laws%name == law)
     if (body == 'point_mass') then
-      goes_with = .not. of_two
+      goes_with = .not. of_two .or. (family == 'drive' .and. law == 'force')
     else if (family == 'drive') then
       goes_with = of_two
     else if (family == 'friction') then
@@ -191,8 +200,7 @@ contains
     rows = parameters_of(choice%family, choice%name)
     from_file = .false.
     if (choice%name == 'measured_force') call read_force_file(source, choice, from_file)
-    if (any(rows%name == 'ratio')) call refuse_frequency(source, choice%name, rows)
-    if (any(rows%name == 'ratio') .and. is_table(source, motor_family)) call refuse_ratio(source, rows)
+    if (choice%family == 'drive' .and. moves_foot(choice%name)) call choose_speed(source, rows)
     do i = 1, size(rows)
       if (from_file .and. (rows(i)%name == 'interval' .or. rows(i)%name == 'force')) cycle
       call take_row(source, table_of(rows(i)%family, rows(i)%law), rows(i), is_angle, choice%parameters(i)%values)
@@ -202,27 +210,30 @@ contains
     end if
   end subroutine read_parameters
 
-  !> A drive of the foot has a ratio: a frequency is refused in its stead, and the ratio is then not missing.
-  subroutine refuse_frequency(source, law, rows)
+  !> A drive of the foot has a ratio or a frequency, with a motor neither.
+  subroutine choose_speed(source, rows)
     type(case_source_t), intent(inout) :: source
-    character(len=*), intent(in) :: law
     type(parameter_row_t), intent(inout) :: rows(:)
-    if (find(source, 'drive.frequency') == 0) return
-    call know(source, 'drive.frequency')
-    call report(source, 'drive.frequency', 'found with drive.law = "'//trim(law)//'", allowed drive.ratio instead: the '// &
-                'angular frequency over sqrt(restoring.stiffness/body.mass)')
-    where (rows%name == 'ratio') rows%optional = .true.
-  end subroutine refuse_frequency
+    logical :: found(2)
+    found = [find(source, 'drive.ratio') > 0, find(source, 'drive.frequency') > 0]
+    if (is_table(source, motor_family)) then
+      call refuse_speed(source, 'drive.ratio')
+      call refuse_speed(source, 'drive.frequency')
+    else if (all(found)) then
+      call report(source, 'drive.frequency', 'found beside drive.ratio, allowed one of them')
+    else if (.not. any(found)) then
+      where (rows%name == 'ratio') rows%optional = .false.
+    end if
+  end subroutine choose_speed
 
   !> A motor sets the speed of its crank itself.
-  subroutine refuse_ratio(source, rows)
+  subroutine refuse_speed(source, path)
     type(case_source_t), intent(inout) :: source
-    type(parameter_row_t), intent(inout) :: rows(:)
-    where (rows%name == 'ratio') rows%optional = .true.
-    if (find(source, 'drive.ratio') == 0) return
-    call know(source, 'drive.ratio')
-    call report(source, 'drive.ratio', 'found with a table [motor], allowed without: the motor sets the speed of the crank')
-  end subroutine refuse_ratio
+    character(len=*), intent(in) :: path
+    if (find(source, path) == 0) return
+    call know(source, path)
+    call report(source, path, 'found with a table [motor], allowed without: the motor sets the speed of the crank')
+  end subroutine refuse_speed
 
   !> A measured force that is the name of a file, relative to the folder of the case; `found` is false if it is not.
   subroutine read_force_file(source, choice, found)
@@ -241,7 +252,7 @@ contains
     if (index(path, '/') /= 1) path = source%name(:index(source%name, '/', back=.true.))//path
     call know(source, 'drive.force')
     call know(source, 'drive.interval')
-    call read_force(path, interval, force, problem)
+    call read_force(path, 'force', interval, force, problem)
     if (allocated(problem)) then
       call report(source, 'drive.force', problem)
     else if (find(source, 'drive.interval') > 0) then

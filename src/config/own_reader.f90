@@ -9,7 +9,7 @@ module own_reader
   use kinds, only: wp
   use law_row, only: any_value, unit_length
   use law_table, only: force_family, label_length, law_choice, law_choice_t, law_text_t, own_law, parameter_row_t, &
-    parameter_value_t, parameters_of, path_of, state_family
+    parameter_value_t, parameters_of, part_family, path_of, state_family, text_of
   use part_names, only: names_of
   use text, only: number_length, read_number, starts_with, to_text
   use toml_bindings, only: toml_float, toml_integer, toml_string
@@ -66,11 +66,30 @@ contains
       call read_text(source, 'position', .false., choice)
       call read_period(source, choice)
     case default
-      call read_text(source, 'force', .true., choice)
+      call read_text(source, merge('load ', 'force', has_load(choice)), .true., choice)
     end select
     call read_parameters(source, choice)
+    if (has_load(choice)) call refuse_unnamed(source, choice)
     if (choice%family == state_family .and. all(choice%own%name /= 'start')) call add_own(choice, 'start', '1', 0.0_wp)
   end subroutine read_own_law
+
+  !> Whether a law is friction of the catalogue, whose normal force is an expression.
+  pure logical function has_load(choice)
+    type(law_choice_t), intent(in) :: choice
+    has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%family == part_family
+  end function has_load
+
+  !> Beside keys of the catalogue a parameter that no expression names is a misspelt key.
+  subroutine refuse_unnamed(source, choice)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: choice
+    integer :: i
+    do i = 1, size(choice%own)
+      if (index(text_of(choice, 'load'), trim(choice%own(i)%name)) > 0) cycle
+      call report(source, path_of(choice)//'.'//trim(choice%own(i)%name), 'unknown; allowed keys of the law, and parameters '// &
+                  'that load names')
+    end do
+  end subroutine refuse_unnamed
 
   !> An expression; a number is one, too.
   subroutine read_text(source, key, required, choice)
@@ -81,7 +100,7 @@ contains
     type(law_text_t) :: new
     character(len=:), allocatable :: path, text
     integer :: at
-    path = path_of(choice)//'.'//key
+    path = path_of(choice)//'.'//trim(key)
     at = find(source, path)
     if (at > 0) then
       if (any(source%entries(at)%entry%kind == [toml_integer, toml_float])) then
@@ -92,7 +111,7 @@ contains
     end if
     text = ''
     call take_text(source, path, text, required=required)
-    new = law_text_t(key, text)
+    new = law_text_t(trim(key), text)
     if (len(text) > 0) choice%texts = [choice%texts, new]
   end subroutine read_text
 
@@ -137,8 +156,8 @@ contains
       if (name == 'law' .or. any(choice%texts%key == name) .or. any(rows%name == name)) cycle
       if (any(choice%own%name == name) .or. (choice%family == 'drive' .and. (name == 'period' .or. name == 'position'))) cycle
       ! A text that should be there and is not one has been reported.
-      if (any(name == [character(len=11) :: 'force', 'rate', 'restitution']) .and. choice%family /= 'drive') cycle
-      if (scan(name, '.["') > 0) cycle
+      if (any(name == [character(len=11) :: 'force', 'load', 'rate', 'restitution']) .and. choice%family /= 'drive') cycle
+      if (scan(name, '.["') > 0 .or. name == 'between') cycle
       call read_parameter(source, i, name, choice)
     end do
   end subroutine read_parameters

@@ -12,6 +12,7 @@ module part_reader
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, path_of, set_value, value_of
   use part_angles, only: is_of_angle
+  use own_reader, only: read_own_law
   use part_names, only: check_columns, check_names, ground, names_of
   use row_reader, only: take_row
   use structure_reader, only: read_structure
@@ -191,14 +192,18 @@ contains
     choice%label = name
     if (kind == 'drive') call read_body(source, path, bodies, choice)
     from_record = .false.
-    if (choice%name == 'drive:force') call read_record(source, path, choice, from_record)
+    if (choice%name == 'drive:force' .or. choice%name == 'drive:motion') call read_record(source, path, choice, from_record)
     if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
       if (is_hidden(rows(i)) .or. from_record .or. is_of_position(rows(i))) cycle
       call take_row(source, path, rows(i), .false., choice%parameters(i)%values)
     end do
-    if (kind == 'friction') then
+    if (choice%name == 'friction:coulomb_load') then
+      call read_own_law(source, choice)
+      if (value_of(choice, 'static_coefficient') < 0) call set_value(choice, 'static_coefficient', &
+                                                                      [value_of(choice, 'kinetic_coefficient')])
+    else if (kind == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.
       if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then
         call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))// &

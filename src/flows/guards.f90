@@ -5,7 +5,8 @@
 !> of one form, constant + position s + speed u + force lambda of a joint.
 module guards
   use contact_law, only: contact_kelvin_voigt
-  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, multibody_t, most_joints
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, most_joints, most_load_switches, &
+    multibody_t
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
@@ -14,19 +15,22 @@ module guards
 
   public :: guards_of
 
-  integer, parameter, public :: most_guards = 3*most_joints
+  integer, parameter, public :: most_guards = 3*most_joints + most_load_switches
 
   !> What a triggered guard means: a slide ends; friction gives way upwards or downwards; the upper or lower stop is reached; a
   !> closed contact is let go; a pressed one is without force; one without force pushes again; a soft stop is left; the watched
-  !> coordinate turns round.
+  !> coordinate turns round; the expression of a normal force changes its branch.
   integer, parameter, public :: slide_ends = 1, slides_up = 2, slides_down = 3, meets_upper = 4, meets_lower = 5, &
-    lets_go = 6, force_ends = 7, force_returns = 8, leaves = 9, turns_round = 10
+    lets_go = 6, force_ends = 7, force_returns = 8, leaves = 9, turns_round = 10, changes_branch = 11
 
   type, public :: joint_guard_t
     integer :: joint = 0, meaning = 0
     real(wp) :: constant = 0, position = 0, speed = 0, force = 0
     !> Number of the joint among the constraints of the mode.
     integer :: held = 0
+    !> By what the normal force of the joint is multiplied in it; number of a switching function of that, 0 for other guards.
+    real(wp) :: level = 0
+    integer :: switch = 0
     !> It is zero now and rises.
     logical :: from_zero = .false.
     !> Size of the terms that its value and first three derivatives are sums of, beyond what the motion shows: large coordinates
@@ -56,7 +60,11 @@ contains
         level = joint%friction%break_away
         select case (joint%kind)
         case (joint_friction)
-          if (phase == 0) then
+          if (allocated(joint%load)) call switch_guards(machine, j, list, count_guards)
+          if (phase == 0 .and. allocated(joint%load)) then
+            call put(list, count_guards, joint_guard_t(j, slides_up, level=level, force=1.0_wp, held=held))
+            call put(list, count_guards, joint_guard_t(j, slides_down, level=level, force=-1.0_wp, held=held))
+          else if (phase == 0) then
             call put(list, count_guards, joint_guard_t(j, slides_up, constant=level, force=1.0_wp, held=held))
             call put(list, count_guards, joint_guard_t(j, slides_down, constant=level, force=-1.0_wp, held=held))
           else if (.not. flow%still(j)) then
@@ -135,6 +143,21 @@ contains
     count_guards = count_guards + 1
     list(count_guards) = guard
   end subroutine put
+
+  !> The switching functions of a normal force that vary.
+  pure subroutine switch_guards(machine, j, list, count_guards)
+    type(multibody_t), intent(in) :: machine
+    integer, intent(in) :: j
+    type(joint_guard_t), intent(inout) :: list(:)
+    integer, intent(inout) :: count_guards
+    integer :: i
+    associate (tape => machine%joints(j)%load%tape)
+      do i = 1, size(tape%switches)
+        if (.not. tape%nodes(tape%switches(i)%argument)%is_steady) call put(list, count_guards, &
+          joint_guard_t(j, changes_branch, switch=i))
+      end do
+    end associate
+  end subroutine switch_guards
 
   !> The gaps to both stops.
   pure subroutine gap_guards(machine, state, j, list, count_guards)

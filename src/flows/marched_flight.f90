@@ -12,6 +12,7 @@ module marched_flight
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use linear_flight, only: watch_t
+  use marched_load, only: load_at, move_origin, sizes_of_switch
   use marched_system, only: digits_of_forces, forces_at, marched_t, position_now, set_system, sizes_of_guards, sizes_of_terms, &
     unknowns
   use mode_flow, only: harmonics_of, mode_flow_t
@@ -104,6 +105,8 @@ contains
       allocate (system%guard(size(path%unknowns), flight%count_guards), system%size_of_guard(size(path%unknowns), &
                 flight%count_guards), system%lean(system%count_joints, flight%count_guards), &
                 system%size_of_lean(system%count_joints, flight%count_guards), source=0.0_wp)
+      allocate (system%guard_load(flight%count_guards), system%switch(flight%count_guards), source=0)
+      allocate (system%level(flight%count_guards), source=0.0_wp)
       do g = 1, flight%count_guards
         associate (guard => flight%list(g))
           row = guard_row(machine, flow, path, guard)
@@ -111,6 +114,7 @@ contains
           flight%size_of_guard(g) = sum(sizes*abs(path%unknowns)) + guard%blur(0)
           row(one) = row(one) + sum(row(:n)*state%q(:n))
           system%guard(:, g) = row
+          call set_load_guard(machine, state, unknowns(system, 0.0_wp, y), g, flight)
           k = 0
           do j = 1, size(machine%joints)
             if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
@@ -129,6 +133,7 @@ contains
           if (flight%guards(g)%from_zero) flight%guards(g)%constant = -start
           rate = sum(abs(row(:n)*state%v(:n))) + sum(abs(row(n + 1:2*n))*accelerations)
           if (guard%held > 0) rate = rate + guard%blur(1)
+          if (system%guard_load(g) > 0) rate = rate + machine%frequency*flight%size_of_guard(g)
           associate (taken => flight%guards(g))
             taken%noise = noise_share*flight%size_of_guard(g)
             taken%noise_rate = noise_share*rate
@@ -142,13 +147,37 @@ contains
     end associate
   end subroutine set_guards
 
+  !> The part of guard `g` that is a normal force, or one of its switching functions, and its size.
+  pure subroutine set_load_guard(machine, state, z, g, flight)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
+    real(wp), intent(in) :: z(:)
+    integer, intent(in) :: g
+    type(marched_flight_t), intent(inout) :: flight
+    integer :: j, k
+    associate (guard => flight%list(g), system => flight%system)
+      if (.not. (guard%switch > 0 .or. abs(guard%level) > 0)) return
+      k = count([(is_curved(machine%joints(j), state%phase(j)), j=1, guard%joint)])
+      system%guard_load(g) = system%load_of(k)
+      system%level(g) = guard%level
+      system%switch(g) = guard%switch
+      associate (load => system%loads(system%guard_load(g)))
+        if (guard%switch > 0) then
+          flight%size_of_guard(g) = sizes_of_switch(load, guard%switch, system%start, z)
+        else
+          flight%size_of_guard(g) = flight%size_of_guard(g) + guard%level*load_at(load, system%start, z)
+        end if
+      end associate
+    end associate
+  end subroutine set_load_guard
+
   !> A margin that depends on displacements and speeds alone is a linear guard.
   pure subroutine take_as_linear(system, g, guard)
     type(marched_t), intent(in) :: system
     integer, intent(in) :: g
     type(guard_t), intent(inout) :: guard
     associate (one => 2*system%n + 1)
-      if (any(abs(system%guard(one + 1:, g)) > 0) .or. any(abs(system%lean(:, g)) > 0)) return
+      if (any(abs(system%guard(one + 1:, g)) > 0) .or. any(abs(system%lean(:, g)) > 0) .or. system%guard_load(g) > 0) return
       guard%margin = 0
       guard%constant = guard%constant + system%guard(one, g)
       guard%coefficients(:one - 1) = system%guard(:one - 1, g)
@@ -287,6 +316,9 @@ contains
       y(:n) = y(:n) - z(:n)
       do k = 1, system%count_joints
         system%position(c - 1, k) = position_now(system, k, z)
+      end do
+      do k = 1, size(system%loads)
+        call move_origin(system%loads(k), n, z)
       end do
       do k = 1, n
         system%acceleration(c - 1, k) = system%acceleration(c - 1, k) + behind(system%acceleration(:, k))

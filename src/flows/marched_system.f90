@@ -8,8 +8,9 @@ module marched_system
   use elementary, only: sine_cosine
   use flight_path, only: path_t
   use guarded_march, only: watched_system_t
-  use multibody, only: joint_soft, joint_spring, joint_t, multibody_t, most_joints
-  use multibody_state, only: is_curved, joint_force, joint_motion, multibody_state_t, spring_terms, strength_now
+  use multibody, only: joint_soft, joint_spring, joint_t, memory_t, multibody_t, most_joints
+  use marched_load, only: choose_branches, load_at, marched_load_t, set_load, set_rows, switch_at
+  use multibody_state, only: factor_now, is_curved, joint_force, joint_motion, multibody_state_t, spring_terms
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
@@ -29,6 +30,12 @@ module marched_system
     integer :: phase(most_joints) = 0
     real(wp) :: touch_speed(most_joints) = 0
     real(wp), allocatable :: position(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
+    !> Normal forces of friction, and which of them a joint has, 0 for none.
+    type(marched_load_t), allocatable :: loads(:)
+    integer :: load_of(most_joints) = 0
+    !> Of a guard: which normal force is part of it, by what it is multiplied, which of its switching functions the guard is.
+    integer, allocatable :: guard_load(:), switch(:)
+    real(wp), allocatable :: level(:)
     !> Sizes of what the forces of constraints are sums of, as `guard` and `lean`; 0 for other guards.
     real(wp), allocatable :: size_of_guard(:, :), size_of_lean(:, :)
   contains
@@ -82,8 +89,69 @@ contains
       if (machine%joints(j)%kind == joint_soft .and. state%left(j) /= 0 .and. abs(s - stop) &
           <= 64*epsilon(1.0_wp)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:n))))) s = stop
       system%position(one, k) = s - stop
+      if (allocated(machine%joints(j)%memory)) call set_memory(machine, state, machine%joints(j)%memory, system%position(:, k), &
+                                                               system%speed(:, k))
     end do
+    call set_loads(machine, state, path, system)
   end subroutine set_system
+
+  !> The rows of the deflection and the sliding speed of friction with memory, instead of a coordinate and its speed.
+  pure subroutine set_memory(machine, state, memory, position, speed)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
+    type(memory_t), intent(in) :: memory
+    real(wp), intent(inout) :: position(:), speed(:)
+    real(wp) :: unused(size(position))
+    unused = 0
+    speed = 0
+    call set_rows(machine, state, memory%slide%row, memory%slide%offset, unused, speed)
+    position = 0
+    position(machine%n + 1:2*machine%n) = memory%deflection
+  end subroutine set_memory
+
+  !> Normal forces of friction; their branches follow from the motion that begins.
+  pure subroutine set_loads(machine, state, path, system)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
+    type(path_t), intent(in) :: path
+    type(marched_t), intent(inout) :: system
+    real(wp) :: y(2*machine%n), slope(2*machine%n)
+    integer :: j, k, loads, round
+    allocate (system%loads(count([(allocated(machine%joints(j)%load), j=1, size(machine%joints))])))
+    if (size(system%loads) == 0) return
+    k = 0
+    loads = 0
+    do j = 1, size(machine%joints)
+      if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
+      k = k + 1
+      if (.not. allocated(machine%joints(j)%load)) cycle
+      loads = loads + 1
+      system%load_of(k) = loads
+      call set_load(machine, j, state, size(path%unknowns), system%loads(loads))
+    end do
+    slope = 0
+    y(:machine%n) = 0
+    y(machine%n + 1:) = state%v(:machine%n)
+    ! The accelerations need branches themselves: those of the values first.
+    do round = 1, 2
+      do k = 1, loads
+        call choose_branches(machine, system%loads(k), state, path%turning, slope(machine%n + 1:))
+      end do
+      slope = system%slope(0.0_wp, y)
+    end do
+  end subroutine set_loads
+
+  !> What the force of joint number `k` of the system is multiplied by.
+  pure real(wp) function factor_at(self, k, z) result(factor)
+    class(marched_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(wp), intent(in) :: z(:)
+    if (self%load_of(k) > 0) then
+      factor = load_at(self%loads(self%load_of(k)), self%start + z(2*self%n + 2), z)
+    else
+      factor = sum(self%strength(:, k)*z)
+    end if
+  end function factor_at
 
   !> What the force of a spring is multiplied by, as a row; the unknown number `one` is 1.
   pure subroutine set_strength(joint, one, row)
@@ -144,7 +212,7 @@ contains
     integer :: k
     do k = 1, self%count_joints
       call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), position_now(self, k, z), &
-                       sum(self%speed(:, k)*z), sum(self%strength(:, k)*z), force(k))
+                       sum(self%speed(:, k)*z), factor_at(self, k, z), force(k))
     end do
   end function forces_at
 
@@ -199,11 +267,15 @@ contains
     end do
     do k = 1, self%count_joints
       s = position_now(self, k, z)
-      strength = sum(self%strength(:, k)*z)
+      strength = factor_at(self, k, z)
       call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), s, sum(self%speed(:, k)*z), strength, force, &
                        by_position, by_speed)
       term = abs(force)
       if (self%joints(k)%kind == joint_spring) term = spring_terms(self%joints(k), s, strength)
+      if (allocated(self%joints(k)%memory)) then
+        sizes = sizes + abs(self%push(:, k))*(term + abs(by_position*s) + abs(by_speed)*sum(abs(self%speed(:, k)*z)))
+        cycle
+      end if
       term = term + abs(by_position)*(abs(s) + sum(abs(self%joints(k)%row)*(abs(origin) + abs(y(:self%n))))) &
              + abs(by_speed)*sum(abs(self%speed(:, k)*z))
       sizes = sizes + abs(self%push(:, k))*term
@@ -217,7 +289,13 @@ contains
     real(wp), intent(in) :: time, y(:)
     real(wp) :: z(2*self%n + 2 + 2*self%harmonics)
     z = unknowns(self, time, y)
+    if (self%switch(number) > 0) then
+      margin = switch_at(self%loads(self%guard_load(number)), self%switch(number), self%start + time, z)
+      return
+    end if
     margin = sum(self%guard(:, number)*z)
+    if (self%guard_load(number) > 0) margin = margin + self%level(number)*load_at(self%loads(self%guard_load(number)), &
+                                                                                  self%start + time, z)
     if (any(abs(self%lean(:, number)) > 0)) margin = margin + sum(self%lean(:, number)*forces_at(self, z))
   end function marched_margin
 
@@ -236,17 +314,19 @@ contains
     type(marched_t), intent(in) :: system
     type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
-    real(wp) :: sizes(system%count_joints), s, u, strength, r, by_position, by_speed
+    real(wp) :: sizes(system%count_joints), s, u, factor(0:2), r, by_position, by_speed
     integer :: j, k
     k = 0
     do j = 1, size(machine%joints)
       if (.not. is_curved(machine%joints(j), state%phase(j))) cycle
       k = k + 1
       call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-      call strength_now(machine%joints(j), machine%frequency, turning, strength)
-      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, &
+      call factor_now(machine, j, state, turning, factor)
+      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r, by_position, &
                        by_speed)
-      sizes(k) = abs(by_position)*(abs(s) + sum(abs(machine%joints(j)%row*state%q(:machine%n))))
+      sizes(k) = abs(by_position*s)
+      if (.not. allocated(machine%joints(j)%memory)) sizes(k) = abs(by_position)*(abs(s) + sum(abs(machine%joints(j)%row &
+                                                                                               *state%q(:machine%n))))
     end do
   end function digits_of_forces
 

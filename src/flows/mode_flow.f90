@@ -30,12 +30,16 @@ contains
   !> Number of harmonics that a machine knows.
   pure integer function harmonics_of(machine) result(harmonics)
     type(multibody_t), intent(in) :: machine
-    integer :: j
+    integer :: i, j
     harmonics = size(machine%force, 2)
     do j = 1, size(machine%joints)
       associate (joint => machine%joints(j))
         harmonics = max(harmonics, harmonics_in(joint%offset))
         if (allocated(joint%strength)) harmonics = max(harmonics, harmonics_in(joint%strength))
+        if (.not. allocated(joint%load)) cycle
+        do i = 1, size(joint%load%sources)
+          harmonics = max(harmonics, harmonics_in(joint%load%sources(i)%offset))
+        end do
       end associate
     end do
   end function harmonics_of

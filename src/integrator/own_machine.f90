@@ -272,13 +272,12 @@ contains
     call self%advance(section, self%period, tally, reason, log)
     if (reason /= 0) return
     section%state%time = 0
-    call check_hold(self%motor%system, section%state, section%motor, log)
     if (self%motor%system%aperiodic) section%motor%phi = section%motor%phi + self%period
+    if (present(log)) log%origin = log%origin + self%period
+    call check_hold(self%motor%system, section%state, section%motor, log)
     call append_word(tally, word_period)
-    if (present(log)) then
-      log%origin = log%origin + self%period
-      if (.not. allocated(log%instants)) log%next_sample = 0
-    end if
+    if (.not. present(log)) return
+    if (.not. allocated(log%instants)) log%next_sample = 0
   end subroutine advance_to_section
 
   !> Moves to where the body turns round and starts the clock anew.

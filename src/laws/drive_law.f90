@@ -8,7 +8,7 @@
 module drive_law
   use constants, only: two_pi
   use elementary, only: sine_cosine
-  use kinds, only: wp
+  use kinds, only: real64, wp
   use law_table, only: law_choice_t, list_of, value_of
   implicit none
   private
@@ -17,7 +17,7 @@ module drive_law
   real(wp), parameter :: same_force = 1e-9_wp
 
   public :: drive_of, add_harmonics, add_ripple, foot_motion, measured_force, ends_with_its_first, next_sample, lever_foot, &
-    lever_assembles
+    lever_assembles, moves_foot, is_speed, is_given
 
   !> A mechanism whose series needs more harmonics is too close to a dead point.
   integer, parameter :: max_harmonics = 1024
@@ -25,6 +25,8 @@ module drive_law
   type, public :: drive_t
     !> Drive angular frequency over the natural one; 0 without a drive.
     real(wp) :: ratio = 0
+    !> Angular frequency [rad/s] where that is given, not the ratio; else 0.
+    real(wp) :: frequency = 0
     real(wp) :: mean = 0
     !> Fourier coefficients [m], index = harmonic.
     real(wp), allocatable :: cosine(:), sine(:)
@@ -44,6 +46,25 @@ module drive_law
   end type lever_t
 
 contains
+
+  !> Whether a drive of one body moves the foot of its spring.
+  pure logical function moves_foot(name)
+    character(len=*), intent(in) :: name
+    moves_foot = name == 'harmonic' .or. name == 'fourier' .or. name == 'crank_lever_rod'
+  end function moves_foot
+
+  !> Whether a parameter of such a drive is its speed, as a ratio or a frequency.
+  pure logical function is_speed(name)
+    character(len=*), intent(in) :: name
+    is_speed = name == 'ratio' .or. name == 'frequency'
+  end function is_speed
+
+  !> Whether such a drive has the one or the other. None is the largest double, which other kinds exceed.
+  pure logical function is_given(choice, speed)
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: speed
+    is_given = value_of(choice, speed) < huge(1.0_real64)
+  end function is_given
 
   !> The law that a choice of the family `drive` names.
   pure function drive_of(choice) result(law)
@@ -71,7 +92,8 @@ contains
       return
     end select
     if (choice%name /= 'crank_lever_rod') law%mean = value_of(choice, 'mean')
-    law%ratio = value_of(choice, 'ratio')
+    if (is_given(choice, 'ratio')) law%ratio = value_of(choice, 'ratio')
+    if (is_given(choice, 'frequency')) law%frequency = value_of(choice, 'frequency')
     call advance_angle(law, value_of(choice, 'angle'))
   end function drive_of
 

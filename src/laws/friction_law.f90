@@ -64,25 +64,35 @@ contains
       law%excess = law%break_away - law%kinetic
       law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+      law%damping = value_of(choice, 'damping')
       if (law%excess > 0) law%layer_speed = edge_of_layer(law%stribeck_velocity, law%stribeck_exponent)
     case default
       law%kinetic = no_force()
     end select
   end function friction_of
 
-  !> The law that a part of a machine of several bodies names: forces, no normal force. A static force below that of sliding is
-  !> as given.
+  !> The law that a part of a machine of several bodies names: forces, or coefficients of a normal force of its own. A static force
+  !> below that of sliding is as given.
   pure function friction_of_part(choice) result(law)
     type(law_choice_t), intent(in) :: choice
     type(friction_t) :: law
-    law%kinetic = value_of(choice, 'force')
-    law%break_away = value_of(choice, 'static_force')
+    logical :: by_load
+    by_load = choice%name == 'friction:coulomb_load'
+    law%kinetic = value_of(choice, merge('kinetic_coefficient', 'force              ', by_load))
+    law%break_away = value_of(choice, merge('static_coefficient', 'static_force      ', by_load))
     if (law%break_away < 0) law%break_away = law%kinetic
     select case (choice%name)
     case ('friction:coulomb', 'friction:elastic_coulomb')
     case ('friction:coulomb_viscous')
       law%damping = value_of(choice, 'damping')
     case ('friction:coulomb_stribeck')
+      law%excess = law%break_away - law%kinetic
+      law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
+      law%stribeck_exponent = value_of(choice, 'stribeck_exponent')
+      law%damping = value_of(choice, 'damping')
+    case ('friction:coulomb_load')
+      law%damping = value_of(choice, 'damping')
+      if (.not. value_of(choice, 'stribeck_velocity') > 0) return
       law%excess = law%break_away - law%kinetic
       law%stribeck_velocity = value_of(choice, 'stribeck_velocity')
       law%stribeck_exponent = value_of(choice, 'stribeck_exponent')

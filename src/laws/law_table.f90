@@ -6,11 +6,11 @@
 !> pure procedure, rows here and a test.
 module law_table
   use contact_rows, only: contact_laws, contact_parameters
+  use drive_rows, only: drive_laws, drive_parameters, largest_angle, lemes
   use effect_rows, only: effect_laws, effect_parameters
   use expression_rows, only: expression_laws, expression_parameters
   use kinds, only: wp
-  use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive, range_t, &
-    zero_to_one
+  use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive
   use motor_rows, only: motor_laws, motor_parameters
   use pair_rows, only: pair_laws, pair_parameters
   use part_rows, only: part_laws, part_parameters
@@ -19,7 +19,8 @@ module law_table
   private
 
   public :: law_row_t, parameter_row_t, find_law, law_names, parameters_of, rows_of, text_of, table_of, path_of, part_kind, &
-    part_law, is_hidden, law_choice, value_of, list_of, set_value, change_parameter, split_element, is_start_parameter
+    part_law, is_hidden, law_choice, value_of, list_of, set_value, change_parameter, split_element, is_start_parameter, &
+    largest_angle
 
   !> The parts that a machine is composed of, one law each.
   character(len=*), parameter, public :: families(5) = [character(len=family_length) :: &
@@ -38,9 +39,6 @@ module law_table
   !> 'table:law'.
   character(len=*), parameter, public :: part_family = 'part'
   integer, parameter, public :: label_length = 48
-
-  !> Largest |angle| [rad]: beyond it the rounding of the angle shows in its sine.
-  real(wp), parameter, public :: largest_angle = 1e4_wp
 
   !> The values of one parameter: one number, or a list.
   type, public :: parameter_value_t
@@ -65,8 +63,6 @@ module law_table
     type(parameter_row_t), allocatable :: own(:)
   end type law_choice_t
 
-  character(len=*), parameter :: lemes = 'Lemes et al., vibro-impact system with ideal excitation'
-
   type(law_row_t), parameter :: other_laws(*) = [ &
     law_row_t('body', 'point_mass', 'one body on a horizontal guide', lemes), &
     law_row_t('restoring', 'linear', 'force c (l0 + x_A - x)', lemes), &
@@ -78,15 +74,7 @@ module law_table
     law_row_t('friction', 'viscous', '-b v', lemes), &
     law_row_t('friction', 'coulomb_viscous', '-mu m g sgn v - b v; sticks up to mu_s m g', 'sum of the two laws'), &
     law_row_t('friction', 'coulomb_stribeck', &
-              '-(mu + (mu_s - mu) exp(-|v/v_s|^delta)) m g sgn v; sticks up to mu_s m g', lemes), &
-    law_row_t('drive', 'none', 'the foot of the spring is at rest at x_A = 0', ''), &
-    law_row_t('drive', 'harmonic', 'x_A = mean + amplitude cos(phi + angle)', 'Den Hartog, Trans. ASME 53 (1931)'), &
-    law_row_t('drive', 'fourier', 'x_A = mean + sum a_n cos n(phi + angle) + b_n sin n(phi + angle)', &
-              'calibrated stand-in for the drive of Lemes et al.'), &
-    law_row_t('drive', 'crank_lever_rod', 'crank OD turns the slotted lever CE, rod EA pushes the foot along a guide', &
-              'geometry derived from '//lemes), &
-    law_row_t('drive', 'measured_force', 'force of a record on the body, linear between samples; repeats as `periodic` sets', &
-              'Janot, Gautier, Brunot, Data Set and Reference Models of EMPS (2019)')]
+              '-(mu + (mu_s - mu) exp(-|v/v_s|^delta)) m g sgn v - b v; sticks up to mu_s m g', lemes)]
 
   type(parameter_row_t), parameter :: other_parameters(*) = [ &
     parameter_row_t('body', 'point_mass', 'mass', 'kg', positive, 'm'), &
@@ -113,54 +101,18 @@ module law_table
     parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_velocity', 'm/s', positive, 'v_s'), &
     parameter_row_t('friction', 'coulomb_stribeck', 'stribeck_exponent', '1', positive, 'delta', optional=.true., &
                     default=1.0_wp), &
-    parameter_row_t('drive', 'harmonic', 'ratio', '1', positive, &
-                    'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
-    parameter_row_t('drive', 'harmonic', 'mean', 'm', any_value, 'mean position of the foot of the spring', &
-                    optional=.true.), &
-    parameter_row_t('drive', 'harmonic', 'amplitude', 'm', not_negative, 'amplitude of the foot'), &
-    parameter_row_t('drive', 'harmonic', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
-                    'offset added to the crank angle', optional=.true.), &
-    parameter_row_t('drive', 'fourier', 'ratio', '1', positive, &
-                    'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
-    parameter_row_t('drive', 'fourier', 'mean', 'm', any_value, 'mean position of the foot of the spring', &
-                    optional=.true.), &
-    parameter_row_t('drive', 'fourier', 'cosine', 'm', any_value, 'a_1, a_2, ...', list=.true.), &
-    parameter_row_t('drive', 'fourier', 'sine', 'm', any_value, 'b_1, b_2, ..., as many as cosine has', list=.true.), &
-    parameter_row_t('drive', 'fourier', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
-                    'offset added to the crank angle', optional=.true.), &
-    parameter_row_t('drive', 'crank_lever_rod', 'ratio', '1', positive, &
-                    'drive angular frequency over the natural angular frequency sqrt(c/m)'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'crank', 'm', positive, 'r = OD'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'pivot_distance', 'm', positive, 'l1 = OC, longer than the crank'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'lever', 'm', positive, 'l2 = CE'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'rod', 'm', positive, 'l3 = EA'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'pivot_angle', 'rad', range_t(-largest_angle, largest_angle), &
-                    'B, direction of O seen from C against the guide'), &
-    parameter_row_t('drive', 'crank_lever_rod', 'guide_height', 'm', any_value, &
-                    'h, distance of the guide of A from C', optional=.true.), &
-    parameter_row_t('drive', 'crank_lever_rod', 'side', '1', range_t(-1.0_wp, 1.0_wp), &
-                    'sigma, +1 or -1: A is ahead of E or behind it', optional=.true., default=1.0_wp), &
-    parameter_row_t('drive', 'crank_lever_rod', 'shift', 'm', any_value, 's, position of C on the axis of x', &
-                    optional=.true.), &
-    parameter_row_t('drive', 'crank_lever_rod', 'angle', 'rad', range_t(-largest_angle, largest_angle), &
-                    'offset added to the crank angle', optional=.true.), &
-    parameter_row_t('drive', 'measured_force', 'interval', 's', positive, &
-                    'time between samples; from the file if the force is one'), &
-    parameter_row_t('drive', 'measured_force', 'force', 'N', any_value, &
-                    'samples from the start on, or the name of a CSV file with columns t and force', list=.true.), &
-    parameter_row_t('drive', 'measured_force', 'periodic', '1', zero_to_one, &
-                    '1: samples of one period, a last step leads back to the first; 0: up to the last', &
+    parameter_row_t('friction', 'coulomb_stribeck', 'damping', 'N s/m', not_negative, 'b of a force -b v beside it', &
                     optional=.true.)]
 
   type(law_row_t), parameter, public :: laws( &
-    size(other_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws) + &
-    size(motor_laws) + size(expression_laws)) = [other_laws, contact_laws, pair_laws, part_laws, effect_laws, motor_laws, &
-                                                 expression_laws]
+    size(other_laws) + size(drive_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws) + &
+    size(motor_laws) + size(expression_laws)) = [other_laws, drive_laws, contact_laws, pair_laws, part_laws, effect_laws, &
+                                                 motor_laws, expression_laws]
   type(parameter_row_t), parameter, public :: parameters( &
-    size(other_parameters) + size(contact_parameters) + size(pair_parameters) + size(part_parameters) + &
-    size(effect_parameters) + size(motor_parameters) + size(expression_parameters)) = &
-    [other_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters, motor_parameters, &
-     expression_parameters]
+    size(other_parameters) + size(drive_parameters) + size(contact_parameters) + size(pair_parameters) + &
+    size(part_parameters) + size(effect_parameters) + size(motor_parameters) + size(expression_parameters)) = &
+    [other_parameters, drive_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters, &
+     motor_parameters, expression_parameters]
 
 contains
 

@@ -8,12 +8,18 @@ module law_texts
   implicit none
   private
 
-  public :: pack_texts, unpack_texts
+  public :: is_own, pack_texts, unpack_texts
 
   !> Ends of a field and of a law: no text of a case has them.
   character(len=1), parameter :: field = achar(1), law_end = achar(2)
 
 contains
+
+  !> Whether a law has expressions: one by expressions, or of the catalogue with a part by expressions.
+  pure elemental logical function is_own(choice)
+    type(law_choice_t), intent(in) :: choice
+    is_own = choice%name == own_law .or. allocated(choice%texts)
+  end function is_own
 
   !> Labels, expressions, and names of the parameters of expressions.
   pure function pack_texts(choices) result(text)
@@ -22,7 +28,7 @@ contains
     integer :: i, k
     text = ''
     do i = 1, size(choices)
-      if (choices(i)%name == own_law .and. allocated(choices(i)%texts)) then
+      if (allocated(choices(i)%texts)) then
         text = text//trim(choices(i)%label)//field
         do k = 1, size(choices(i)%texts)
           text = text//trim(choices(i)%texts(k)%key)//field//choices(i)%texts(k)%text//field
@@ -31,6 +37,8 @@ contains
         do k = 1, size(choices(i)%own)
           text = text//trim(choices(i)%own(k)%name)//field
         end do
+      else if (len_trim(choices(i)%label) > 0) then
+        text = text//trim(choices(i)%label)//field
       end if
       text = text//law_end
     end do
@@ -48,9 +56,11 @@ contains
     at = 1
     zero%values = [0]
     do i = 1, size(choices)
-      if (choices(i)%name == own_law) then
+      if (text(at:at) /= law_end) then
         call take(text, at, word)
         choices(i)%label = word
+      end if
+      if (text(at:at) /= law_end) then
         allocate (choices(i)%texts(0), choices(i)%own(0))
         do
           call take(text, at, word)
@@ -61,7 +71,7 @@ contains
         end do
         do while (text(at:at) /= law_end)
           call take(text, at, word)
-          row = parameter_row_t(choices(i)%family, own_law, word, '1', any_value, '')
+          row = parameter_row_t(choices(i)%family, choices(i)%name, word, '1', any_value, '')
           choices(i)%own = [choices(i)%own, row]
           choices(i)%parameters = [choices(i)%parameters, zero]
         end do

@@ -21,7 +21,7 @@ module pair_rows
   type(law_row_t), parameter, public :: pair_laws(*) = [ &
     law_row_t('body', 'friction_pair', 'two bodies coupled by b sgn(v1 - v2) alone; barriers bound x2', source), &
     law_row_t('body', 'backlash_pair', 'the same; barriers carried by the driving body bound x2 - x1', source), &
-    law_row_t('drive', 'force', 'two bodies: force mean + amplitude cos(frequency t) on the driving one', source), &
+    law_row_t('drive', 'force', 'force mean + amplitude cos(frequency t) on the body, of two on the driving one', source), &
     law_row_t('drive', 'velocity', 'two bodies: the driving one moves at a constant velocity', experiments), &
     law_row_t('drive', 'sine', 'two bodies: the driving one moves as amplitude sin(frequency t)', source), &
     law_row_t('drive', 'pid_velocity', 'two bodies: a controller moves the driving one along velocity t', experiments), &

@@ -16,12 +16,13 @@ module part_rows
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
   character(len=law_length), parameter :: springs(4) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
     'spring:pendulum', 'spring:electrostatic']
-  character(len=law_length), parameter :: frictions(6) = [character(len=law_length) :: 'friction:coulomb', &
+  character(len=law_length), parameter :: frictions(11) = [character(len=law_length) :: 'friction:coulomb', &
     'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic', &
-    'friction:coulomb_quadratic']
+    'friction:coulomb_quadratic', 'friction:coulomb_load', 'friction:maxwell_slip', 'friction:dahl', 'friction:bouc_wen', &
+    'friction:lugre']
   character(len=law_length), parameter :: contacts(3) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt', &
     'contact:massless']
-  character(len=law_length), parameter :: joints(13) = [springs, frictions, contacts]
+  character(len=law_length), parameter :: joints(18) = [springs, frictions, contacts]
   !> Contacts with the laws of one body, which keep their parameters.
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
@@ -55,6 +56,15 @@ module part_rows
     law_row_t('part', frictions(5), 'force + (static_force - force)/(1 + |u|/v_f)', &
               'Galvanetto, Bishop, Chaos Solitons Fractals 5 (1995)'), &
     law_row_t('part', frictions(6), 'dry friction and d u|u|: drag of a fluid, a damper with an orifice', ''), &
+    law_row_t('part', frictions(7), 'a coefficient times the normal force, an expression `load` [N]; none where that is negative', &
+              'Amontons, Mem. Acad. R. Sci. (1699)'), &
+    law_row_t('part', frictions(8), 'elements of spring and slider in parallel', 'Iwan, J. Appl. Mech. 33 (1966)'), &
+    law_row_t('part', frictions(9), 'a deflection z with z'' = u |1 - sgn(u) z/z_m|^n, force stiffness z, z_m = force/stiffness', &
+              'Dahl, AIAA J. 14 (1976)'), &
+    law_row_t('part', frictions(10), 'a deflection z with z'' = u (1 - (a sgn(u z) + 1 - a) |z/z_m|^n), a the shape', &
+              'Wen, J. Eng. Mech. Div. 102 (1976)'), &
+    law_row_t('part', frictions(11), 'bristles: z'' = u - |u| s0 z/g(u), force s0 z + s1 z'' + s2 u', &
+              'Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)'), &
     law_row_t('part', contacts(1), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
               'Glocker, Set-Valued Force Laws (2001)'), &
     law_row_t('part', contacts(2), 'stops with spring K and damper D', ''), &
@@ -97,9 +107,9 @@ module part_rows
     (parameter_row_t('part', points(i), 'row', '1', any_value, 'its displacement for one of each coordinate', &
                      optional=.true., list=.true.), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first_end', '1', not_negative, 'number of the first body between', &
-                     optional=.true.), i=1, 13), &
+                     optional=.true.), i=1, 18), &
     (parameter_row_t('part', joints(i), 'second_end', '1', not_negative, 'number of the second body between', &
-                     optional=.true.), i=1, 13), &
+                     optional=.true.), i=1, 18), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', not_negative, &
                      'number of the first body between', optional=.true.), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', not_negative, &
@@ -130,14 +140,37 @@ module part_rows
                      'friction at break-away; that of sliding if absent, never below it', optional=.true., &
                      default=-1.0_wp), i=1, 6), &
     (parameter_row_t('part', frictions(i), 'velocity', 'm/s', any_value, &
-                     'velocity of the surface of the first body or the ground: a belt', optional=.true.), i=1, 6), &
+                     'velocity of the surface of the first body or the ground: a belt', optional=.true.), i=1, 11), &
     parameter_row_t('part', frictions(2), 'stiffness', 'N/m', positive, 'of the spring'), &
     parameter_row_t('part', frictions(3), 'damping', 'N s/m', not_negative, 'b'), &
     parameter_row_t('part', frictions(4), 'stribeck_velocity', 'm/s', positive, 'v_s'), &
     parameter_row_t('part', frictions(4), 'stribeck_exponent', '1', positive, 'delta', optional=.true., &
                     default=1.0_wp), &
+    parameter_row_t('part', frictions(4), 'damping', 'N s/m', not_negative, 'b of a force b u beside it', optional=.true.), &
     parameter_row_t('part', frictions(5), 'fading_velocity', 'm/s', positive, 'v_f'), &
     parameter_row_t('part', frictions(6), 'drag', 'N s^2/m^2', not_negative, 'd'), &
+    parameter_row_t('part', frictions(7), 'kinetic_coefficient', '1', not_negative, 'mu while sliding; at high speed'), &
+    parameter_row_t('part', frictions(7), 'static_coefficient', '1', range_t(-1.0_wp, none_above), &
+                    'mu_s at break-away; the kinetic coefficient if absent, never below it', optional=.true., default=-1.0_wp), &
+    parameter_row_t('part', frictions(7), 'stribeck_velocity', 'm/s', not_negative, &
+                    'v_s of mu + (mu_s - mu) exp(-|u/v_s|^delta); 0: mu at every speed', optional=.true.), &
+    parameter_row_t('part', frictions(7), 'stribeck_exponent', '1', positive, 'delta', optional=.true., default=1.0_wp), &
+    parameter_row_t('part', frictions(7), 'damping', 'N s/m', not_negative, 'b of a force b u beside it', optional=.true.), &
+    parameter_row_t('part', frictions(8), 'stiffness', 'N/m', positive, 'of the spring of each element', list=.true.), &
+    parameter_row_t('part', frictions(8), 'force', 'N', positive, 'of the slider of each element', list=.true.), &
+    (parameter_row_t('part', frictions(i), 'stiffness', 'N/m', positive, 's0, before sliding'), i=9, 11), &
+    (parameter_row_t('part', frictions(i), 'force', 'N', positive, 'friction while sliding on; at high speed'), i=9, 11), &
+    (parameter_row_t('part', frictions(i), 'exponent', '1', range_t(1.0_wp, 100.0_wp), 'n', optional=.true., &
+                     default=1.0_wp), i=9, 10), &
+    parameter_row_t('part', frictions(10), 'shape', '1', zero_to_one, 'a; 1: unloading along the stiffness', optional=.true., &
+                    default=0.5_wp), &
+    parameter_row_t('part', frictions(11), 'static_force', 'N', range_t(-1.0_wp, none_above), &
+                    'F_s of g; the force if absent, never below it', optional=.true., default=-1.0_wp), &
+    parameter_row_t('part', frictions(11), 'stribeck_velocity', 'm/s', positive, 'v_s of g = F + (F_s - F) exp(-|u/v_s|^delta)', &
+                    optional=.true., default=1.0_wp), &
+    parameter_row_t('part', frictions(11), 'stribeck_exponent', '1', positive, 'delta', optional=.true., default=2.0_wp), &
+    parameter_row_t('part', frictions(11), 'bristle_damping', 'N s/m', not_negative, 's1', optional=.true.), &
+    parameter_row_t('part', frictions(11), 'damping', 'N s/m', not_negative, 's2', optional=.true.), &
     parameter_row_t('part', contacts(1), 'restitution', '1', zero_to_one, 'e'), &
     parameter_row_t('part', contacts(2), 'stiffness', 'N/m', positive, 'K'), &
     parameter_row_t('part', contacts(2), 'damping', 'N s/m', not_negative, 'D', optional=.true.), &

@@ -9,7 +9,8 @@ module assembly
   use errors, only: error_t, fail
   use multibody, only: is_stop, joint_elastic, joint_friction, joint_t, multibody_t, most_degrees, &
     most_joints, name_length, wave_t
-  use multibody_state, only: is_curved
+  use joint_forces, only: is_curved
+  use normal_force, only: number_contacts, size_of_load
   use kinds, only: wp
   use matrices, only: solve
   use shared_friction, only: merge_friction
@@ -202,6 +203,7 @@ contains
                          trim(machine%joints(i)%name)//' that does not add up to one law with it, allowed the same law, or '// &
                          'the sum in one of them')
     if (allocated(error)) return
+    call number_contacts(machine)
     call check(machine, error)
     if (allocated(error)) return
     allocate (squares(machine%n), shapes(machine%n, machine%n), machine%mobility(machine%n, machine%n))
@@ -261,14 +263,18 @@ contains
         - (machine%stiffness(rest, at) + iw*machine%damping(rest, at) - w**2*machine%mass(rest, at))*wave%harmonic(m)
     end do
     do i = 1, size(machine%joints)
-      associate (joint => machine%joints(i))
-        joint%offset%mean = joint%offset%mean + joint%row(at)*wave%mean
-        joint%offset%rate = joint%offset%rate + joint%row(at)*wave%rate
-        if (harmonics > 0 .and. abs(joint%row(at)) > 0) then
-          call widen_wave(joint%offset, harmonics)
-          joint%offset%harmonic(:harmonics) = joint%offset%harmonic(:harmonics) + joint%row(at)*wave%harmonic
-        end if
-        joint%row = joint%row(rest)
+      call take_out_of_row(machine%joints(i)%row, machine%joints(i)%offset, at, rest, wave)
+      if (allocated(machine%joints(i)%memory)) then
+        associate (memory => machine%joints(i)%memory)
+          call take_out_of_row(memory%slide%row, memory%slide%offset, at, rest, wave)
+          memory%deflection = memory%deflection(rest)
+        end associate
+      end if
+      if (.not. allocated(machine%joints(i)%load)) cycle
+      associate (sources => machine%joints(i)%load%sources)
+        do m = 1, size(sources)
+          call take_out_of_row(sources(m)%row, sources(m)%offset, at, rest, wave)
+        end do
       end associate
     end do
     if (machine%watched == at) then
@@ -287,6 +293,24 @@ contains
     machine%start_shape = machine%start_shape(rest, :)
     machine%n = size(rest)
   end subroutine take_out
+
+  !> A coordinate w'q + offset(t) without the body number `at`, which moves as `wave`.
+  pure subroutine take_out_of_row(row, offset, at, rest, wave)
+    real(wp), allocatable, intent(inout) :: row(:)
+    type(wave_t), intent(inout) :: offset
+    integer, intent(in) :: at, rest(:)
+    type(wave_t), intent(in) :: wave
+    integer :: harmonics
+    harmonics = 0
+    if (allocated(wave%harmonic)) harmonics = size(wave%harmonic)
+    offset%mean = offset%mean + row(at)*wave%mean
+    offset%rate = offset%rate + row(at)*wave%rate
+    if (harmonics > 0 .and. abs(row(at)) > 0) then
+      call widen_wave(offset, harmonics)
+      offset%harmonic(:harmonics) = offset%harmonic(:harmonics) + row(at)*wave%harmonic
+    end if
+    row = row(rest)
+  end subroutine take_out_of_row
 
   !> What a machine must be. The mass matrix is positive definite, every joint has a row of its own kind.
   pure subroutine check(machine, error)
@@ -349,7 +373,9 @@ contains
     largest = inertia + sum(abs(machine%load)) + sum(abs(machine%force))
     do i = 1, size(machine%joints)
       associate (joint => machine%joints(i))
-        if (joint%kind == joint_friction .or. joint%kind == joint_elastic) largest = largest + joint%friction%break_away
+        if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
+          largest = largest + joint%friction%break_away*size_of_load(joint, machine%frequency)
+        end if
         if (is_stop(joint%kind)) then
           if (joint%upper < huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%upper))
           if (joint%lower > -huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%lower))

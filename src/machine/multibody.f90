@@ -6,9 +6,11 @@
 !> whose joints act along rows w: the joint coordinate is s = w'q + offset(t), the force of the joint is r.
 !> Friction slides at u = s'; a contact bounds s from above, below or both.
 module multibody
+  use bristle_law, only: bristle_t
   use contact_law, only: contact_t
   use friction_law, only: friction_t
   use kinds, only: wp
+  use tape, only: tape_t
   implicit none
   private
 
@@ -17,10 +19,13 @@ module multibody
   !> One joint more than a machine may have: the section of a motion without a clock.
   integer, parameter, public :: most_degrees = 16, most_joints = 13
 
+  !> Most switching functions of a normal force by an expression.
+  integer, parameter, public :: most_load_switches = 8
+
   !> Kinds of joints: dry friction, spring and slider in series, rigid contact, contact with a force over penetration,
-  !> a spring whose force is not linear, and one without force at which the watched coordinate turns round.
+  !> a spring whose force is not linear, one without force at which the watched coordinate turns round, and friction with memory.
   integer, parameter, public :: joint_friction = 1, joint_elastic = 2, joint_contact = 3, joint_soft = 4, joint_spring = 5, &
-    joint_section = 6
+    joint_section = 6, joint_bristle = 7
 
   !> How the speeds after an impact of several contacts at once are found.
   integer, parameter, public :: together_newton = 0, together_sequence = 1
@@ -32,6 +37,37 @@ module multibody
     real(wp) :: mean = 0, rate = 0
     complex(wp), allocatable :: harmonic(:)
   end type wave_t
+
+  !> What a normal force depends on: a coordinate w'q + offset(t), or the force of the soft contact of that coordinate.
+  type, public :: source_t
+    real(wp), allocatable :: row(:)
+    type(wave_t) :: offset
+    !> Name and number of the contact; '' and 0 without one.
+    character(len=name_length) :: contact = ''
+    integer :: joint = 0
+  end type source_t
+
+  !> Normal force of friction [N], an expression. Its variables are the time since the section [s], the phase [rad], and of each
+  !> source its value and its first three derivatives by the time.
+  type, public :: load_t
+    type(tape_t) :: tape
+    integer :: node = 0
+    !> Node of the rate of each variable.
+    integer, allocatable :: rates(:)
+    real(wp), allocatable :: parameters(:)
+    type(source_t), allocatable :: sources(:)
+  end type load_t
+
+  !> Friction with memory. The deflection z [m] is the velocity of a coordinate of its own, of the mass s0, whose kinetic energy
+  !> is that of the bristles. One joint acts along the surfaces with the force r, and one on the coordinate with s0 z'.
+  type, public :: memory_t
+    type(bristle_t) :: law
+    !> The joint acts on the deflection.
+    logical :: on_deflection = .false.
+    !> Sliding speed, and the row of the deflection.
+    type(source_t) :: slide
+    real(wp), allocatable :: deflection(:)
+  end type memory_t
 
   type, public :: joint_t
     character(len=name_length) :: name = ''
@@ -50,6 +86,9 @@ module multibody
     real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0, attraction = 0, gap = 1
     !> What the force of a spring is multiplied by, a function of the time; without one, by 1.
     type(wave_t), allocatable :: strength
+    !> Normal force, by which the forces of friction, then coefficients, are multiplied.
+    type(load_t), allocatable :: load
+    type(memory_t), allocatable :: memory
   end type joint_t
 
   !> A controller that moves a position s = row'q after a reference, its force u = P e + I (integral of e) + D e' acting along the

@@ -3,17 +3,19 @@
 
 !> State of a multibody structure and of each of its joints, and the forces of the joints that follow from the state.
 module multibody_state
-  use contact_law, only: contact_at_speed, contact_energy, contact_force, contact_force_slopes, contact_kelvin_voigt, contact_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use elementary, only: sine_cosine
-  use friction_law, only: falls, sliding_friction, sliding_slope
-  use multibody, only: controller_t, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, joint_t, multibody_t, &
-    most_degrees, most_joints, wave_value
+  use joint_forces, only: acts_as_spring, is_curved, is_held, joint_energy, joint_force, spring_force, spring_terms, strength_now
+  use multibody, only: controller_t, joint_contact, load_t, multibody_t, most_degrees, most_joints, source_t, wave_value
   use kinds, only: wp
+  use tape_series, only: expand, prepare_series, series_t
+  use tape_value, only: evaluate
   implicit none
   private
 
   public :: turning_at, joint_motion, joint_force, spring_force, spring_terms, strength_now, joint_energy, free_force, &
-    running_control, rounding_of_speed, key_of, is_held, acts_as_spring, is_curved, is_marched
+    running_control, rounding_of_speed, key_of, is_held, acts_as_spring, is_curved, is_marched, factor_now, load_branches, &
+    load_variables
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not
@@ -67,6 +69,11 @@ contains
       call wave_value(joint%offset, machine%frequency, time, turning, value, rate, given)
       s = sum(joint%row*q(:machine%n)) + value
       u = sum(joint%row*v(:machine%n)) + rate
+      if (.not. allocated(joint%memory)) return
+      ! Deflection and sliding speed are what the forces of friction with memory depend on.
+      call wave_value(joint%memory%slide%offset, machine%frequency, time, turning, value, rate, given)
+      s = sum(joint%memory%deflection*v(:machine%n))
+      u = sum(joint%memory%slide%row*v(:machine%n)) + rate
     end associate
   end subroutine joint_motion
 
@@ -79,36 +86,6 @@ contains
       negligible = 64*epsilon(1.0_wp)*(sum(abs(joint%row*state%v(:n))) + abs(joint%offset%rate))
     end associate
   end function rounding_of_speed
-
-  !> Whether a joint is a constraint: friction that sticks, a contact that is closed.
-  pure logical function is_held(joint, phase)
-    type(joint_t), intent(in) :: joint
-    integer, intent(in) :: phase
-    is_held = (joint%kind == joint_friction .and. phase == 0) .or. (joint%kind == joint_contact .and. phase /= 0)
-  end function is_held
-
-  !> Whether a joint is a linear spring: elastic friction that sticks, a pressed contact with a linear law.
-  pure logical function acts_as_spring(joint, phase)
-    type(joint_t), intent(in) :: joint
-    integer, intent(in) :: phase
-    acts_as_spring = (joint%kind == joint_elastic .and. phase == 0) .or. &
-      (joint%kind == joint_soft .and. abs(phase) == 1 .and. joint%contact%kind == contact_kelvin_voigt)
-  end function acts_as_spring
-
-  !> Whether the force of a joint is not linear in its coordinate and speed.
-  pure logical function is_curved(joint, phase)
-    type(joint_t), intent(in) :: joint
-    integer, intent(in) :: phase
-    is_curved = .false.
-    select case (joint%kind)
-    case (joint_friction)
-      is_curved = phase /= 0 .and. falls(joint%friction)
-    case (joint_soft)
-      is_curved = abs(phase) == 1 .and. joint%contact%kind /= contact_kelvin_voigt
-    case (joint_spring)
-      is_curved = .true.
-    end select
-  end function is_curved
 
   !> Whether a mode has a joint whose force is not linear.
   pure logical function is_marched(machine, phase)
@@ -133,127 +110,99 @@ contains
     end do
   end function key_of
 
-  !> Force of a joint along its row [N], that of a constraint excepted, and its derivatives with respect to s and u; the force of a
-  !> spring is multiplied by `strength`.
-  pure subroutine joint_force(joint, phase, slider, touch_speed, s, u, strength, force, by_position, by_speed)
-    type(joint_t), intent(in) :: joint
-    integer, intent(in) :: phase
-    real(wp), intent(in) :: slider, touch_speed, s, u, strength
-    real(wp), intent(out) :: force
-    real(wp), intent(out), optional :: by_position, by_speed
-    real(wp) :: direction, p, rate
-    force = 0
-    if (present(by_position)) by_position = 0
-    if (present(by_speed)) by_speed = 0
-    select case (joint%kind)
-    case (joint_friction)
-      if (phase == 0) return
-      direction = phase
-      force = sliding_friction(joint%friction, u, direction)
-      if (present(by_speed)) by_speed = sliding_slope(joint%friction, u, direction)
-    case (joint_elastic)
-      if (phase == 0) then
-        force = -joint%stiffness*(s - slider)
-        if (present(by_position)) by_position = -joint%stiffness
-      else
-        direction = phase
-        force = sliding_friction(joint%friction, u, direction)
-        if (present(by_speed)) by_speed = sliding_slope(joint%friction, u, direction)
-      end if
-    case (joint_soft)
-      if (abs(phase) /= 1) return
-      direction = phase
-      p = merge(s - joint%upper, joint%lower - s, phase > 0)
-      rate = direction*u
-      if (joint%contact%by_impact) then
-        call press(contact_at_speed(joint%contact, touch_speed), direction, p, rate, force, by_position, by_speed)
-      else
-        call press(joint%contact, direction, p, rate, force, by_position, by_speed)
-      end if
-    case (joint_spring)
-      call spring_force(joint, s, strength, force, by_position)
-    end select
-  end subroutine joint_force
-
-  !> Force of a spring [N] and its derivative with respect to s.
-  pure subroutine spring_force(joint, s, strength, force, by_position)
-    type(joint_t), intent(in) :: joint
-    real(wp), intent(in) :: s, strength
-    real(wp), intent(out) :: force
-    real(wp), intent(out), optional :: by_position
-    real(wp) :: sine, cosine, pull
-    call sine_cosine(s, sine, cosine)
-    pull = 0
-    if (abs(joint%attraction) > 0) pull = joint%attraction/(joint%gap - s)**2
-    force = strength*(pull - s*(joint%stiffness + s*(joint%quadratic + s*joint%cubic)) - joint%moment*sine)
-    if (.not. present(by_position)) return
-    by_position = -joint%stiffness - s*(2*joint%quadratic + 3*s*joint%cubic) - joint%moment*cosine
-    if (abs(joint%attraction) > 0) by_position = by_position + 2*pull/(joint%gap - s)
-    by_position = strength*by_position
-  end subroutine spring_force
-
-  !> The terms of the force of a spring without their signs, of which rounding takes a share [N].
-  pure real(wp) function spring_terms(joint, s, strength) result(terms)
-    type(joint_t), intent(in) :: joint
-    real(wp), intent(in) :: s, strength
-    real(wp) :: sine, cosine
-    call sine_cosine(s, sine, cosine)
-    terms = abs(s)*(abs(joint%stiffness) + abs(s)*(abs(joint%quadratic) + abs(s*joint%cubic))) + abs(joint%moment*sine)
-    if (abs(joint%attraction) > 0) terms = terms + abs(joint%attraction)/(joint%gap - s)**2
-    terms = abs(strength)*terms
-  end function spring_terms
-
-  !> What the force of a spring is multiplied by, with its first two derivatives by the time.
-  pure subroutine strength_now(joint, frequency, turning, strength, rate, curvature)
-    type(joint_t), intent(in) :: joint
-    real(wp), intent(in) :: frequency
+  !> What the force of joint `j` is multiplied by, and its first two derivatives by the time: that of a spring by its strength,
+  !> friction by its normal force [N], whose derivatives need the accelerations `a` and their rates.
+  pure subroutine factor_now(machine, j, state, turning, factor, a, jerk)
+    type(multibody_t), intent(in) :: machine
+    integer, intent(in) :: j
+    type(multibody_state_t), intent(in) :: state
     complex(wp), intent(in) :: turning(:)
-    real(wp), intent(out) :: strength
-    real(wp), intent(out), optional :: rate, curvature
-    real(wp) :: change
-    strength = 1
-    change = 0
-    if (present(curvature)) curvature = 0
-    if (allocated(joint%strength)) call wave_value(joint%strength, frequency, 0.0_wp, turning, strength, change, curvature)
-    if (present(rate)) rate = change
-  end subroutine strength_now
+    real(wp), intent(out) :: factor(0:2)
+    real(wp), intent(in), optional :: a(:), jerk(:)
+    if (.not. allocated(machine%joints(j)%load)) then
+      call strength_now(machine%joints(j), machine%frequency, turning, factor(0), factor(1), factor(2))
+      return
+    end if
+    associate (load => machine%joints(j)%load)
+      block
+        type(series_t) :: series
+        integer :: branches(size(load%tape%switches)), fault
+        real(wp) :: variables(size(load%rates))
+        call load_variables(machine, load, state, turning, variables, a, jerk)
+        call load_branches(load, variables, branches)
+        call prepare_series(load%tape, 2, load%rates, [load%node], branches, series)
+        call expand(load%tape, variables, load%parameters, series, fault)
+        factor = series%c(:, load%node)*[1, 1, 2]
+        if (fault /= 0) factor = ieee_value(factor, ieee_quiet_nan)
+      end block
+    end associate
+  end subroutine factor_now
 
-  !> Force of a pressed contact and its derivatives.
-  pure subroutine press(law, direction, p, rate, force, by_position, by_speed)
-    type(contact_t), intent(in) :: law
-    real(wp), intent(in) :: direction, p, rate
-    real(wp), intent(out) :: force
-    real(wp), intent(out), optional :: by_position, by_speed
-    real(wp) :: slopes(2)
-    force = -direction*contact_force(law, p, rate)
-    if (.not. (present(by_position) .and. present(by_speed))) return
-    slopes = contact_force_slopes(law, p, rate)
-    by_position = -slopes(1)
-    by_speed = -slopes(2)
-  end subroutine press
+  !> The variables of a normal force: the time, the phase, and of each source its value and three derivatives by the time.
+  pure subroutine load_variables(machine, load, state, turning, variables, a, jerk)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(in) :: load
+    type(multibody_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(out) :: variables(:)
+    real(wp), intent(in), optional :: a(:), jerk(:)
+    real(wp) :: motion(0:3)
+    integer :: i, n
+    n = machine%n
+    variables(:2) = [state%time, machine%frequency*state%time]
+    do i = 1, size(load%sources)
+      associate (source => load%sources(i))
+        call wave_value(source%offset, machine%frequency, state%time, turning, motion(0), motion(1), motion(2))
+        motion(3) = 0
+        motion(0) = motion(0) + sum(source%row*state%q(:n))
+        motion(1) = motion(1) + sum(source%row*state%v(:n))
+        if (present(a)) motion(2) = motion(2) + sum(source%row*a)
+        if (present(jerk)) motion(3) = sum(source%row*jerk)
+        if (source%joint > 0) call press_by(machine, source, state, motion)
+        variables(4*i - 1:4*i + 2) = motion
+      end associate
+    end do
+  end subroutine load_variables
 
-  !> Energy that a joint holds as a spring [J]: that of elastic friction and of soft contacts, too.
-  pure real(wp) function joint_energy(joint, phase, slider, s) result(energy)
-    type(joint_t), intent(in) :: joint
-    integer, intent(in) :: phase
-    real(wp), intent(in) :: slider, s
-    real(wp) :: sine, cosine
-    energy = 0
-    select case (joint%kind)
-    case (joint_elastic)
-      ! While it slides the spring is stretched by the friction.
-      if (phase == 0) energy = 0.5_wp*joint%stiffness*(s - slider)**2
-      if (phase /= 0) energy = 0.5_wp*joint%friction%kinetic**2/joint%stiffness
-    case (joint_soft)
-      if (abs(phase) == 1) energy = contact_energy(joint%contact, merge(s - joint%upper, joint%lower - s, phase > 0))
-    case (joint_spring)
-      ! Where the strength is given, all its work is the drive's.
-      if (allocated(joint%strength)) return
-      call sine_cosine(s/2, sine, cosine)
-      energy = s**2*(joint%stiffness/2 + s*(joint%quadratic/3 + s*joint%cubic/4)) + 2*joint%moment*sine**2
-      if (abs(joint%attraction) > 0) energy = energy - joint%attraction/(joint%gap - s)
-    end select
-  end function joint_energy
+  !> Makes the force of a contact [N] and its first two derivatives, the law taken as linear, of the `motion` of its coordinate.
+  pure subroutine press_by(machine, source, state, motion)
+    type(multibody_t), intent(in) :: machine
+    type(source_t), intent(in) :: source
+    type(multibody_state_t), intent(in) :: state
+    real(wp), intent(inout) :: motion(0:3)
+    real(wp) :: force, by_position, by_speed
+    associate (j => source%joint)
+      call joint_force(machine%joints(j), state%phase(j), state%slider(j), state%touch_speed(j), motion(0), motion(1), 1.0_wp, &
+                       force, by_position, by_speed)
+      motion = [force, by_position*motion(1) + by_speed*motion(2), by_position*motion(2) + by_speed*motion(3), 0.0_wp]
+      motion = -sign(1, state%phase(j))*motion
+    end associate
+  end subroutine press_by
+
+  !> Branches of the switching functions of a normal force: where one is zero to rounding, its derivatives decide.
+  pure subroutine load_branches(load, variables, branches)
+    type(load_t), intent(in) :: load
+    real(wp), intent(in) :: variables(:)
+    integer, intent(out) :: branches(:)
+    type(series_t) :: series
+    real(wp) :: value(load%tape%count), size_of
+    integer :: faults(load%tape%count), i, k, fault
+    call evaluate(load%tape, variables, load%parameters, value, faults)
+    associate (nodes => load%tape%switches%argument)
+      branches = merge(1, -1, value(nodes) >= 0)
+      do i = 1, size(branches)
+        associate (node => load%tape%nodes(nodes(i)))
+          size_of = maxval(abs(value([nodes(i), max(node%first, 1), max(node%second, 1)])))
+        end associate
+        if (abs(value(nodes(i))) > 16*epsilon(1.0_wp)*size_of) cycle
+        call prepare_series(load%tape, 3, load%rates, nodes, branches, series)
+        call expand(load%tape, variables, load%parameters, series, fault)
+        if (fault /= 0) return
+        k = findloc(abs(series%c(1:, nodes(i))) > 0, .true., 1)
+        if (k > 0) branches(i) = merge(1, -1, series%c(k, nodes(i)) > 0)
+      end do
+    end associate
+  end subroutine load_branches
 
   !> All forces on the coordinates but those of constraints [N]; with `rate` their rates of change for the accelerations
   !> `a` [N/s].
@@ -264,7 +213,7 @@ contains
     real(wp), intent(out) :: force(:)
     real(wp), intent(in), optional :: a(:)
     real(wp), intent(out), optional :: rate(:)
-    real(wp) :: s, u, given, r, by_position, by_speed, strength, growth, gained
+    real(wp) :: s, u, given, r, by_position, by_speed, factor(0:2), gained
     integer :: j, m, n
     n = machine%n
     force = machine%load - matmul(machine%damping, state%v(:n)) - matmul(machine%stiffness, state%q(:n))
@@ -282,13 +231,17 @@ contains
       associate (joint => machine%joints(j))
         if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u, given)
-        call strength_now(joint, machine%frequency, turning, strength, growth)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, by_speed)
+        call factor_now(machine, j, state, turning, factor, a)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r, by_position, by_speed)
         force = force + r*joint%row
         if (.not. present(rate)) cycle
+        if (allocated(joint%memory)) then
+          rate = rate + (by_position*sum(joint%memory%deflection*a) + by_speed*(sum(joint%memory%slide%row*a) + given))*joint%row
+          cycle
+        end if
         rate = rate + (by_position*u + by_speed*(sum(joint%row*a) + given))*joint%row
-        if (.not. allocated(joint%strength)) cycle
-        call spring_force(joint, s, growth, gained)
+        if (.not. (allocated(joint%strength) .or. allocated(joint%load))) cycle
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(1), gained)
         rate = rate + gained*joint%row
       end associate
     end do

@@ -27,7 +27,8 @@ contains
     do i = 1, size(machine%joints)
       do k = 1, i - 1
         if (.not. kept(i) .or. .not. kept(k) .or. .not. alike(machine%joints(i), machine%joints(k))) cycle
-        if (adds_up(machine%joints(k)%friction, machine%joints(i)%friction)) then
+        if (adds_up(machine%joints(k)%friction, machine%joints(i)%friction) .and. .not. &
+            (allocated(machine%joints(k)%load) .or. allocated(machine%joints(i)%load))) then
           machine%joints(k)%friction = total(machine%joints(k)%friction, machine%joints(i)%friction)
           kept(i) = .false.
         else

@@ -5,6 +5,8 @@
 module build_multibody
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
   use build_control, only: add_controllers, add_impulses
+  use build_load, only: set_normal_force
+  use build_memory, only: add_bristles, add_deflections, add_elements, has_bristles
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
@@ -56,6 +58,7 @@ contains
     if (.not. allocated(error)) call set_frequency(choices, machine, error)
     if (.not. allocated(error)) call name_coordinates(choices, machine, rows, coordinate, error)
     if (allocated(error)) return
+    call add_deflections(choices, machine, rows)
     do i = 1, size(choices)
       select case (choices(i)%name)
       case ('drive:force')
@@ -63,7 +66,7 @@ contains
         call add_force(machine, rows(:, reference_point_of(choices(i))), wave%mean, wave%harmonic)
       case default
         if (index(choices(i)%name, 'spring:') == 1) call add_spring(machine, choices(i), row_of(rows, choices(i)), error)
-        if (index(choices(i)%name, 'friction:') == 1) call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
+        if (index(choices(i)%name, 'friction:') == 1) call add_any_friction(machine, choices, i, rows, error)
         if (index(choices(i)%name, 'contact:') == 1) call add_contact(machine, choices(i), row_of(rows, choices(i)), &
                                                                       given_of(choices, coordinate), error)
       end select
@@ -204,6 +207,24 @@ contains
     call add_joint(machine, joint)
   end subroutine add_spring
 
+  !> Friction of any law: dry, with a normal force of its own, or with memory.
+  pure subroutine add_any_friction(machine, choices, i, rows, error)
+    type(multibody_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: rows(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    if (has_bristles(choices(i))) then
+      call add_bristles(machine, choices(i), row_of(rows, choices(i)), error)
+    else if (choices(i)%name == 'friction:maxwell_slip') then
+      call add_elements(machine, choices(i), row_of(rows, choices(i)), error)
+    else
+      call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
+      if (choices(i)%name /= 'friction:coulomb_load' .or. allocated(error)) return
+      call set_normal_force(choices, i, rows, machine, machine%joints(size(machine%joints)), error)
+    end if
+  end subroutine add_any_friction
+
   pure subroutine add_friction(machine, choice, row, error)
     type(multibody_t), intent(inout) :: machine
     type(law_choice_t), intent(in) :: choice
@@ -216,8 +237,13 @@ contains
     joint%row = row
     joint%friction = friction_of_part(choice)
     if (joint%friction%break_away < joint%friction%kinetic) then
-      call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(joint%friction%break_away)// &
-                ' N, allowed at least the force '//number(joint%friction%kinetic)//' N')
+      if (choice%name == 'friction:coulomb_load') then
+        call fail(error, exit_bad_case, path_of(choice)//'.static_coefficient: found '//number(joint%friction%break_away)// &
+                  ', allowed at least the kinetic_coefficient '//number(joint%friction%kinetic))
+      else
+        call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(joint%friction%break_away)// &
+                  ' N, allowed at least the force '//number(joint%friction%kinetic)//' N')
+      end if
       return
     end if
     if (choice%name == 'friction:elastic_coulomb') then

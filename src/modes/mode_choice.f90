@@ -8,7 +8,7 @@
 !> its guard has just triggered.
 module mode_choice
   use multibody, only: joint_contact, multibody_t, most_joints
-  use multibody_state, only: free_force, is_held, joint_force, joint_motion, multibody_state_t
+  use multibody_state, only: factor_now, free_force, is_held, joint_force, joint_motion, multibody_state_t
   use kinds, only: wp
   use mode_lcp, only: add_constraint, drift_of, is_degenerate, keep_loaded, restrict_bounds, mode_lcp_t, second_rate, &
     set_mobility, resolve_degeneracy, &
@@ -181,6 +181,7 @@ contains
     type(multibody_state_t) :: trial
     real(wp), dimension(machine%n) :: force, rate, a, jerk, next
     real(wp), dimension(most_joints) :: r, y, drift, size_of_y, blur
+    real(wp) :: level_rate(most_joints, 2)
     integer :: side(most_joints)
     verdict = 0
     trial = state
@@ -188,6 +189,7 @@ contains
     ok = .true.
     if (lcp%count == 0) return
     call set_mobility(machine, lcp)
+    call press_joints(machine, trial, turning, lcp)
     call free_force(machine, trial, turning, force)
     associate (n => lcp%count)
       call drift_of(machine, lcp, trial, turning, 2, force, drift)
@@ -204,7 +206,9 @@ contains
       call add_forces(machine, lcp, r, next)
       a = matmul(machine%mobility, next)
       call free_force(machine, trial, turning, force, a, rate)
-      call restrict_bounds(lcp, r, y, side, blur)
+      level_rate = rates_of_levels(machine, lcp, trial, turning, a)
+      call restrict_bounds(lcp, r, y, side, blur, level_rate(:, 1))
+      call add_forces(machine, lcp, side*merge(level_rate(:, 1), 0.0_wp, lcp%fixed), rate)
       call drift_of(machine, lcp, trial, turning, 3, rate, drift)
       size_of_y = sizes(machine, lcp, trial, turning, 3, abs(force)*machine%frequency + abs(rate))
       call solve(lcp, drift, rounding*maxval(size_of_y(:n)), side, r, y, ok)
@@ -216,7 +220,9 @@ contains
       call add_forces(machine, lcp, r, next)
       jerk = matmul(machine%mobility, next)
       call second_rate(machine, trial, turning, a, jerk, rate)
-      call restrict_bounds(lcp, r, y, side, 64*rounding*size_of_y)
+      level_rate = rates_of_levels(machine, lcp, trial, turning, a, jerk)
+      call restrict_bounds(lcp, r, y, side, 64*rounding*size_of_y, level_rate(:, 2))
+      call add_forces(machine, lcp, side*merge(level_rate(:, 2), 0.0_wp, lcp%fixed), rate)
       call drift_of(machine, lcp, trial, turning, 4, rate, drift)
       size_of_y = sizes(machine, lcp, trial, turning, 4, abs(force)*machine%frequency**2 + abs(rate))
       call solve(lcp, drift, 4096*rounding*maxval(size_of_y(:n)), side, r, y, ok)
@@ -226,6 +232,42 @@ contains
       call classify(machine, lcp, side, verdict)
     end associate
   end subroutine answer
+
+  !> Multiplies the limits of friction by its normal forces.
+  pure subroutine press_joints(machine, state, turning, lcp)
+    type(multibody_t), intent(in) :: machine
+    type(multibody_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    type(mode_lcp_t), intent(inout) :: lcp
+    real(wp) :: factor(0:2)
+    integer :: i
+    do i = 1, lcp%count
+      if (.not. allocated(machine%joints(lcp%joint(i))%load)) cycle
+      call factor_now(machine, lcp%joint(i), state, turning, factor)
+      lcp%lower(i) = lcp%lower(i)*factor(0)
+      lcp%upper(i) = lcp%upper(i)*factor(0)
+    end do
+  end subroutine press_joints
+
+  !> First two rates of the limits of friction [N/s, N/s^2], 0 where the normal force is part of the law.
+  pure function rates_of_levels(machine, lcp, state, turning, a, jerk) result(rates)
+    type(multibody_t), intent(in) :: machine
+    type(mode_lcp_t), intent(in) :: lcp
+    type(multibody_state_t), intent(in) :: state
+    complex(wp), intent(in) :: turning(:)
+    real(wp), intent(in) :: a(:)
+    real(wp), intent(in), optional :: jerk(:)
+    real(wp) :: rates(most_joints, 2), factor(0:2)
+    integer :: i
+    rates = 0
+    do i = 1, lcp%count
+      associate (joint => machine%joints(lcp%joint(i)))
+        if (.not. allocated(joint%load)) cycle
+        call factor_now(machine, lcp%joint(i), state, turning, factor, a, jerk)
+        rates(i, :) = joint%friction%break_away*factor(1:2)
+      end associate
+    end do
+  end function rates_of_levels
 
   !> Asks for the forces of all joints at rest and of all contacts that touch, which are held in `phase`; `side` is where the
   !> search for the answer begins: friction that slid before is first tried at the limit that it came from.

@@ -6,7 +6,7 @@
 module mode_lcp
   use bounded_lcp, only: depends_on, solve_bounded_lcp
   use multibody, only: joint_contact, joint_friction, joint_spring, multibody_t, most_joints
-  use multibody_state, only: is_held, joint_force, joint_motion, multibody_state_t, running_control, spring_force, strength_now
+  use multibody_state, only: factor_now, is_held, joint_force, joint_motion, multibody_state_t, running_control
   use kinds, only: wp
   implicit none
   private
@@ -95,7 +95,7 @@ contains
     complex(wp), intent(in) :: turning(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: force(:)
-    real(wp) :: size_of_y(most_joints), parts(machine%n), positions(machine%n), s, u, r, by_position, by_speed, strength, &
+    real(wp) :: size_of_y(most_joints), parts(machine%n), positions(machine%n), s, u, r, by_position, by_speed, factor(0:2), &
       energy
     integer :: i, n
     n = machine%n
@@ -112,12 +112,12 @@ contains
                                                      + abs(aimag(machine%force(:, i)))*abs(aimag(turning(i)))
     end do
     do i = 1, size(machine%joints)
+      call factor_now(machine, i, state, turning, factor)
       if (machine%joints(i)%kind == joint_friction) parts = parts &
-        + abs(machine%joints(i)%row)*machine%joints(i)%friction%break_away
+        + abs(machine%joints(i)%row)*(factor(0)*machine%joints(i)%friction%break_away)
       ! The force of a stiff joint is the small difference of large ones.
       call joint_motion(machine, i, state%q, state%v, state%time, turning, s, u)
-      call strength_now(machine%joints(i), machine%frequency, turning, strength)
-      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, strength, r, by_position, &
+      call joint_force(machine%joints(i), state%phase(i), state%slider(i), state%touch_speed(i), s, u, factor(0), r, by_position, &
                        by_speed)
       associate (row => abs(machine%joints(i)%row))
         parts = parts + row*(abs(by_position)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
@@ -175,7 +175,7 @@ contains
     complex(wp), intent(in) :: turning(:)
     real(wp), intent(in) :: a(:), jerk(:)
     real(wp), intent(out) :: rate(:)
-    real(wp) :: s, u, r, by_position, by_speed, strength, growth, curvature
+    real(wp) :: s, u, r, by_position, by_speed, factor(0:2)
     integer :: m, j
     rate = -matmul(machine%damping, jerk) - matmul(machine%stiffness, a)
     do m = 1, size(machine%force, 2)
@@ -185,14 +185,18 @@ contains
       associate (joint => machine%joints(j))
         if (is_held(joint, state%phase(j)) .or. joint%kind == joint_contact) cycle
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        call strength_now(joint, machine%frequency, turning, strength, growth, curvature)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r, by_position, by_speed)
+        call factor_now(machine, j, state, turning, factor, a, jerk)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r, by_position, by_speed)
+        if (allocated(joint%memory)) then
+          rate = rate + (by_position*sum(joint%memory%deflection*jerk) + by_speed*sum(joint%memory%slide%row*jerk))*joint%row
+          cycle
+        end if
         rate = rate + (by_position*(sum(joint%row*a) + surface(machine, j, state, turning, 2)) &
                        + by_speed*(sum(joint%row*jerk) + surface(machine, j, state, turning, 3)))*joint%row
-        if (.not. allocated(joint%strength)) cycle
-        call spring_force(joint, s, growth, r, by_position)
-        rate = rate + 2*by_position*u*joint%row
-        call spring_force(joint, s, curvature, r)
+        if (.not. (allocated(joint%strength) .or. allocated(joint%load))) cycle
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(1), r, by_position, by_speed)
+        rate = rate + 2*(by_position*u + by_speed*(sum(joint%row*a) + surface(machine, j, state, turning, 2)))*joint%row
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(2), r)
         rate = rate + r*joint%row
       end associate
     end do
@@ -275,19 +279,20 @@ contains
     end if
   end function degenerate_at
 
-  !> Limits of the rates of the forces: none for what holds, nothing for what slides or is open, one for what is degenerate.
-  pure subroutine restrict_bounds(lcp, r, y, side, tolerance)
+  !> Limits of the rates of the forces: none for what holds, nothing for what slides or is open, one for what is degenerate, at the
+  !> `rate` of the limit.
+  pure subroutine restrict_bounds(lcp, r, y, side, tolerance, rate)
     type(mode_lcp_t), intent(inout) :: lcp
-    real(wp), intent(in) :: r(:), y(:), tolerance(:)
+    real(wp), intent(in) :: r(:), y(:), tolerance(:), rate(:)
     integer, intent(in) :: side(:)
     integer :: i, limit
     do i = 1, lcp%count
       limit = degenerate_at(lcp, i, r, y, side, tolerance(i))
       if (limit > 0) then
         lcp%lower(i) = -huge(1.0_wp)
-        lcp%upper(i) = 0
+        lcp%upper(i) = rate(i)
       else if (limit < 0) then
-        lcp%lower(i) = 0
+        lcp%lower(i) = 0 - rate(i)
         lcp%upper(i) = huge(1.0_wp)
       else if (side(i) == 0) then
         lcp%lower(i) = -huge(1.0_wp)

@@ -6,9 +6,10 @@ module multibody_log
   use control, only: active_force, bodies_of
   use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
-  use multibody, only: joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, multibody_t, most_joints, wave_value
-  use multibody_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, multibody_state_t, strength_now, &
-    turning_at
+  use multibody, only: joint_bristle, joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, multibody_t, most_joints, &
+    wave_value
+  use multibody_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, multibody_state_t, &
+    factor_now, turning_at
   use kinds, only: wp
   use matrices, only: solve
   use mode_flow, only: harmonics_of, mode_flow_t
@@ -255,7 +256,8 @@ contains
     type(multibody_state_t), intent(in) :: state
     real(wp), intent(out) :: friction, damping, contact, work
     complex(wp) :: turning(harmonics_of(machine))
-    real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate, strength
+    real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate, &
+      factor(0:2)
     type(multibody_state_t) :: bodies
     integer :: i, j, m
     turning = turning_at(machine%frequency, state%time, size(turning))
@@ -288,11 +290,13 @@ contains
           cycle
         end if
         call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        call strength_now(joint, machine%frequency, turning, strength)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, strength, r)
+        call factor_now(machine, j, state, turning, factor)
+        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r)
         work = work - r*rate
         if (allocated(joint%strength)) work = work + r*u
-        if (joint%kind == joint_soft) then
+        if (joint%kind == joint_bristle) then
+          friction = friction - r*merge(s, u, joint%memory%on_deflection)
+        else if (joint%kind == joint_soft) then
           if (allocated(machine%driver)) then
             contact = contact - r*u
           else if (abs(state%phase(j)) == 1) then

@@ -6,7 +6,8 @@ module multibody_motion
   use constants, only: two_pi
   use control, only: error_of
   use guards, only: joint_guard_t, most_guards, turns_round
-  use multibody, only: integral_of, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, most_joints
+  use multibody, only: integral_of, joint_bristle, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, &
+    most_joints
   use multibody_flight, only: fly
   use multibody_flows, only: multibody_motion_t, prepare_multibody, ready, with_matrix
   use multibody_state, only: joint_motion, multibody_state_t, key_of, rounding_of_speed, turning_at
@@ -72,7 +73,7 @@ contains
             ! One that is pressed already has no guard at zero.
             if (touching(j) /= 0 .and. min(abs(s - joint%upper), abs(s - joint%lower)) <= near) state%left(j) = touching(j)
             touching(j) = 0
-          case (joint_spring)
+          case (joint_spring, joint_bristle)
             state%phase(j) = 1
           end select
         end associate

@@ -5,7 +5,7 @@
 !> anywhere, and looks the same from a frame that moves along.
 module section_directions
   use eigen, only: symmetric_eigen
-  use multibody, only: integral_of, is_stop, joint_friction, joint_section, multibody_t, most_degrees
+  use multibody, only: integral_of, is_stop, joint_bristle, joint_friction, joint_section, multibody_t, most_degrees
   use kinds, only: wp
   implicit none
   private
@@ -64,14 +64,27 @@ contains
     n = machine%n
     depends = without_signs(machine%stiffness)
     do j = 1, size(machine%joints)
-      if (any(machine%joints(j)%kind == [joint_friction, joint_section])) cycle
+      if (allocated(machine%joints(j)%load)) then
+        do i = 1, size(machine%joints(j)%load%sources)
+          call add_row(machine%joints(j)%load%sources(i)%row, depends)
+        end do
+      end if
+      if (any(machine%joints(j)%kind == [joint_friction, joint_section, joint_bristle])) cycle
       if (.not. stops .and. is_stop(machine%joints(j)%kind)) cycle
-      do i = 1, n
-        depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
-      end do
+      call add_row(machine%joints(j)%row, depends)
     end do
     call span_of(depends, directions, count_directions)
   end subroutine directions_with
+
+  !> Adds the square of a row, on which something depends.
+  pure subroutine add_row(row, depends)
+    real(wp), intent(in) :: row(:)
+    real(wp), intent(inout) :: depends(:, :)
+    integer :: i
+    do i = 1, size(row)
+      depends(:, i) = depends(:, i) + row*row(i)
+    end do
+  end subroutine add_row
 
   !> Directions of the velocities on which anything depends, likewise: all of them, unless the whole may move along at any speed. A
   !> motion without a clock is looked at where a body turns: there its own velocity counts.

@@ -8,6 +8,7 @@ module motor_choices
   use errors, only: error_t, fail
   use kinds, only: real64, wp
   use law_table, only: effect_family, law_choice_t, list_of, motor_family, own_law, path_of, value_of
+  use law_texts, only: is_own
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
@@ -134,6 +135,9 @@ contains
         return
       else if (choices(i)%name == own_law) then
         call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "expression", allowed without a table [motor]')
+        return
+      else if (is_own(choices(i))) then
+        call fail(error, exit_bad_case, path_of(choices(i))//'.load: found with a table [motor], allowed without')
         return
       end if
     end do

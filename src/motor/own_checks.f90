@@ -8,6 +8,7 @@ module own_checks
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: force_family, law_choice_t, own_law, path_of, state_family
+  use law_texts, only: is_own
   use motor_system, only: motor_system_t, phi_at, w_at, x_at
   use own_names, only: depends_on
   use status, only: exit_bad_case
@@ -56,6 +57,12 @@ contains
         if (fault(rest) > 0 .or. value(rest) < 0) call fail(error, exit_bad_case, 'friction.force: found '// &
           shown(value(rest))//' N at rest, allowed at least 0: friction acts against the motion')
       end if
+      if (choices(at(3))%name /= own_law .and. is_own(choices(at(3)))) then
+        associate (load => node_of(system%sheet, 'given_load'))
+          if (nodes(load)%is_steady .and. (fault(load) > 0 .or. value(load) < 0)) call fail(error, exit_bad_case, &
+            'friction.load: found '//shown(value(load))//' N, allowed at least 0')
+        end associate
+      end if
       if (restitution == 0 .or. allocated(error)) return
       if (fault(restitution) > 0 .or. abs(value(restitution) - 0.5_wp) > 0.5_wp) then
         if (nodes(restitution)%is_steady) call fail(error, exit_bad_case, 'contact.restitution: found '// &
@@ -76,7 +83,7 @@ contains
     force = 0
     state = 0
     do i = 1, size(choices)
-      if (choices(i)%name /= own_law) cycle
+      if (.not. is_own(choices(i))) cycle
       node = 0
       select case (choices(i)%family)
       case ('restoring', force_family)

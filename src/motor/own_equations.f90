@@ -176,6 +176,8 @@ contains
     else
       drive = drive_of(choices(at))
       if (drive%ratio > 0 .and. spring%stiffness > 0) system%period = two_pi/(drive%ratio*sqrt(spring%stiffness/system%mass))
+      if (drive%frequency > 0) system%period = two_pi/drive%frequency
+      if (choices(at)%name == 'force') system%period = two_pi/value_of(choices(at), 'frequency')
     end if
     associate (sheet => system%sheet)
       if (system%period > 0) then
@@ -281,7 +283,7 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: at
     type(motor_system_t), intent(inout) :: system
-    type(names_t), intent(in) :: names
+    type(names_t), intent(inout) :: names
     type(error_t), allocatable, intent(out) :: error
     type(restoring_t) :: spring
     integer :: i, node, forces
@@ -313,11 +315,37 @@ contains
         call add_node(sheet, 'force'//to_text(forces), node)
         call define(sheet, 'total'//to_text(forces), 'total'//to_text(forces - 1)//' + force'//to_text(forces))
       end do
+      associate (drive => choices(number_of_family(choices, 'drive')))
+        if (drive%name == 'force') then
+          call add_optional(sheet, 'drive_mean', value_of(drive, 'mean'))
+          call add_optional(sheet, 'drive_amplitude', value_of(drive, 'amplitude'))
+          call define(sheet, 'force'//to_text(forces + 1), 'drive_mean + drive_amplitude*cos(phase)')
+          call define(sheet, 'total'//to_text(forces + 1), 'total'//to_text(forces)//' + force'//to_text(forces + 1))
+          forces = forces + 1
+        end if
+      end associate
       call define(sheet, 'forces', 'total'//to_text(forces))
       call define(sheet, 'hold', 'spring + forces')
       system%forces = [node_of(sheet, 'spring'), (node_of(sheet, 'force'//to_text(i)), i=1, forces)]
     end associate
+    call name_forces(choices, at, system, names)
   end subroutine add_forces
+
+  !> Makes forces known to friction and restitution: `force.NAME`, and `restoring` of the spring.
+  pure subroutine name_forces(choices, at, system, names)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: at
+    type(motor_system_t), intent(in) :: system
+    type(names_t), intent(inout) :: names
+    integer :: i, forces
+    forces = 1
+    if (choices(at)%name /= own_law) call add_known(names, 'restoring', system%forces(1))
+    do i = 1, size(choices)
+      if (choices(i)%family /= force_family .and. .not. (i == at .and. choices(i)%name == own_law)) cycle
+      forces = forces + 1
+      call add_known(names, path_of(choices(i)), system%forces(forces))
+    end do
+  end subroutine name_forces
 
   !> Accelerations, powers and energies, and what they depend on.
   pure subroutine add_motion(system)

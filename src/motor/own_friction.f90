@@ -8,11 +8,13 @@ module own_friction
   use friction_law, only: friction_of
   use kinds, only: wp
   use law_table, only: law_choice_t, own_law, value_of
+  use law_texts, only: is_own
   use motor_choices, only: number_of_family
   use motor_system, only: motor_system_t
   use own_names, only: add_known, names_t, read_own
   use tape, only: constant
   use tape_algebra, only: choice
+  use tape_sign, only: positive_part
   use text, only: to_text
   implicit none
   private
@@ -48,7 +50,8 @@ contains
         call add_node(sheet, 'rest', held)
         call define(sheet, 'viscous', '0')
       else
-        system%friction = friction_of(choices(at), system%mass*value_of(choices(number_of_family(choices, 'body')), 'gravity'))
+        call add_load(choices, at, system, names, error)
+        if (allocated(error)) return
         call add_catalogue_friction(system)
       end if
       call define(sheet, 'dry', 'slip*resistance')
@@ -58,6 +61,29 @@ contains
     end associate
   end subroutine add_friction
 
+  !> The normal force: that of an expression, none where it is negative, or the weight, which is then part of the law.
+  pure subroutine add_load(choices, at, system, names, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: at
+    type(motor_system_t), intent(inout) :: system
+    type(names_t), intent(in) :: names
+    type(error_t), allocatable, intent(out) :: error
+    integer :: node, load
+    associate (sheet => system%sheet)
+      if (is_own(choices(at))) then
+        system%friction = friction_of(choices(at), 1.0_wp)
+        call read_own(names, choices, at, 'load', sheet, node, error)
+        if (allocated(error)) return
+        call add_node(sheet, 'given_load', node)
+        call positive_part(sheet%tape, sheet%parameters, node, load)
+        call add_node(sheet, 'load', load)
+      else
+        system%friction = friction_of(choices(at), system%mass*value_of(choices(number_of_family(choices, 'body')), 'gravity'))
+        call define(sheet, 'load', '1')
+      end if
+    end associate
+  end subroutine add_load
+
   pure subroutine add_catalogue_friction(system)
     type(motor_system_t), intent(inout) :: system
     associate (sheet => system%sheet, law => system%friction)
@@ -65,12 +91,13 @@ contains
       call add_parameter(sheet, 'excess', law%excess)
       call add_parameter(sheet, 'stribeck_velocity', law%stribeck_velocity)
       call add_optional(sheet, 'viscous', law%damping)
-      call add_optional(sheet, 'rest', law%break_away)
+      call add_optional(sheet, 'break_away', law%break_away)
+      call define(sheet, 'rest', 'load*break_away')
       if (law%excess > 0) then
-        call define(sheet, 'resistance', 'kinetic + excess*exp(-(speed/stribeck_velocity)^'// &
-                    to_text(nint(law%stribeck_exponent))//')')
+        call define(sheet, 'resistance', 'load*(kinetic + excess*exp(-(speed/stribeck_velocity)^'// &
+                    to_text(nint(law%stribeck_exponent))//'))')
       else
-        call define(sheet, 'resistance', 'kinetic')
+        call define(sheet, 'resistance', 'load*kinetic')
       end if
     end associate
   end subroutine add_catalogue_friction

@@ -8,7 +8,8 @@ module own_names
   use errors, only: error_t, fail
   use expression_text, only: read_expression
   use kinds, only: wp
-  use law_table, only: law_choice_t, own_law, parameter_row_t, path_of, rows_of, text_of
+  use law_table, only: law_choice_t, parameter_row_t, part_family, path_of, rows_of, text_of
+  use law_texts, only: is_own
   use motor_system, only: far
   use operations, only: op_select, op_variable, operation_table
   use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
@@ -34,10 +35,13 @@ module own_names
 
 contains
 
-  !> Whether any law is one by expressions.
+  !> Whether any law of one body has expressions.
   pure logical function has_own(choices)
     type(law_choice_t), intent(in) :: choices(:)
-    has_own = any(choices%name == own_law)
+    has_own = any(is_own(choices) .and. choices%family /= part_family)
+    ! The same equations: a force that is not on the foot of a spring has no closed form in the flights of one body.
+    if (.not. has_own) has_own = any(choices%family == 'drive' .and. choices%name == 'force') .and. &
+      any(choices%family == 'body' .and. choices%name == 'point_mass')
   end function has_own
 
   !> No names.
@@ -75,7 +79,7 @@ contains
         sheet%parameters = [sheet%parameters, choices(i)%parameters(k)%values(1)]
         call parameter_node(sheet%tape, size(sheet%parameters), node)
         call add_known(names, path_of(choices(i))//'.'//trim(rows(k)%name), node)
-        if (choices(i)%name == own_law) call add_known(names, trim(rows(k)%name), node, i)
+        if (is_own(choices(i))) call add_known(names, trim(rows(k)%name), node, i)
         call set_unit(names, size(sheet%parameters), parameter_unit(trim(rows(k)%unit)))
       end do
     end do
@@ -138,7 +142,7 @@ contains
       unit = '1'
     case ('period')
       unit = 's'
-    case ('force')
+    case ('force', 'load')
       if (.not. names%is_angle) unit = 'N'
     case ('position')
       if (.not. names%is_angle) unit = 'm'

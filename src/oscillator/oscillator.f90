@@ -14,6 +14,7 @@ module oscillator
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
   use law_table, only: effect_family, law_choice_t, motor_family, own_law, path_of, value_of
+  use law_texts, only: is_own
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
   implicit none
@@ -139,6 +140,11 @@ contains
     end if
     machine%drive_frequency = machine%natural_frequency
     if (machine%drive%ratio > 0) machine%drive_frequency = machine%drive%ratio*machine%natural_frequency
+    if (machine%drive%frequency > 0) then
+      machine%drive_frequency = machine%drive%frequency
+      machine%drive%ratio = 1
+      if (machine%natural_frequency > 0) machine%drive%ratio = machine%drive_frequency/machine%natural_frequency
+    end if
     if (machine%drive_frequency > 0) then
       machine%period = two_pi/machine%drive_frequency
     else if (machine%drive%ratio > 0) then
@@ -200,13 +206,24 @@ contains
                   'basin and sweep')
         return
       end if
+      if (choices(i)%name /= own_law .and. is_own(choices(i))) then
+        call fail(error, exit_bad_case, path_of(choices(i))//'.load: allowed in the commands trajectory, basin and sweep')
+        return
+      end if
       select case (choices(i)%name)
       case (own_law)
         call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "expression", allowed in the commands trajectory, '// &
                   'basin and sweep')
       case ('friction_pair', 'backlash_pair')
         call fail(error, exit_bad_case, 'body.law: found "'//trim(choices(i)%name)//'", allowed here point_mass')
-      case ('force', 'velocity', 'sine', 'pid_velocity', 'pid_sine')
+      case ('force')
+        if (any(choices%family == 'body' .and. choices%name == 'point_mass')) then
+          call fail(error, exit_bad_case, 'drive.law: found "force", allowed in the commands trajectory, basin and sweep')
+        else
+          call fail(error, exit_bad_case, 'drive.law: found "force", allowed with two bodies '// &
+                    '(body.law = "friction_pair" or "backlash_pair")')
+        end if
+      case ('velocity', 'sine', 'pid_velocity', 'pid_sine')
         call fail(error, exit_bad_case, 'drive.law: found "'//trim(choices(i)%name)//'", allowed with two bodies '// &
                   '(body.law = "friction_pair" or "backlash_pair")')
       case ('slider_crank', 'unbalance')

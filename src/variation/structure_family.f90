@@ -52,6 +52,8 @@ contains
         if (abs(joint%offset%rate) > 0 .and. (is_stop(joint%kind) .or. joint%kind == joint_spring)) then
           why = 'a stop or a spring runs on with its surface'
         end if
+        if (allocated(joint%memory)) why = 'friction has a memory'
+        if (allocated(joint%load)) why = 'the normal force of friction is an expression'
         if (joint%kind /= joint_friction) cycle
         if (joint%friction%excess > 0 .and. joint%friction%stribeck_exponent < 1) why = 'a Stribeck law is vertical at rest'
         if (joint%friction%second_excess > 0 .and. joint%friction%second_exponent < 1) why = 'a Stribeck law is vertical at rest'

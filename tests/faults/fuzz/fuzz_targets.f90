@@ -117,7 +117,7 @@ contains
     real(wp) :: interval
     real(wp), allocatable :: force(:)
     character(len=:), allocatable :: problem
-    call read_force(path, interval, force, problem)
+    call read_force(path, 'force', interval, force, problem)
     if (allocated(problem)) call fail(error, exit_bad_case, problem)
   end subroutine read_forces
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured forces on bodies of several: a record is one period, by its harmonics."""
+"""Measured forces on bodies of several, and measured motions: a record is one period, by its harmonics."""
 
 import h5py
 import numpy as np
@@ -57,6 +57,30 @@ def test_a_record_is_its_harmonics(separatrix, tmp_path):
     assert len(motions[0][0]) > 5
     assert motions[0][0] == pytest.approx(motions[1][0], abs=1e-9)
     assert motions[0][1] == pytest.approx(motions[1][1], abs=1e-9)
+
+
+def test_a_motion_is_recorded(separatrix, tmp_path):
+    """A foot that moves as recorded moves a body as one that moves by the series; a force is no motion."""
+    angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    motion = 0.2 + np.cos(angle) - 0.5 * np.sin(2 * angle)
+    rows = "".join(f"{float(k * STEP)!r},{float(value)!r}\n" for k, value in enumerate(motion))
+    (tmp_path / "foot.csv").write_text("t,x\n" + rows)
+    _write(tmp_path, motion)
+    case = "[body.ball]\nmass = 1\n[body.foot]\nmass = 1\n[spring.s]\n"
+    case += 'between = ["foot", "ball"]\nstiffness = 4\ndamping = 0.3\n'
+    case += '[drive.f]\nlaw = "motion"\nbody = "foot"\n'
+    series = f"frequency = {2 * np.pi / (STEP * SAMPLES)!r}\nmean = 0.2\ncosine = [1]\nsine = [0, -0.5]\n"
+    motions = []
+    for drive in ('record = "foot.csv"\n', series):
+        (tmp_path / "case.toml").write_text(case + drive)
+        succeed(separatrix, "trajectory", "case.toml", "--force", "-o", "motion.h5", folder=tmp_path)
+        with h5py.File(tmp_path / "motion.h5") as file:
+            motions.append(file["x"][:])
+    assert motions[0] == pytest.approx(motions[1], abs=1e-9)
+    (tmp_path / "case.toml").write_text(case + 'record = "force.csv"\n')
+    outcome = run(separatrix, "trajectory", "case.toml", "--force", folder=tmp_path)
+    assert outcome.code == 65
+    assert "allowed one with columns t and x" in outcome.err
 
 
 def test_one_file_has_one_period(separatrix, tmp_path):

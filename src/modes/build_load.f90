@@ -1,0 +1,321 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The normal force of friction between parts, from its expression. It may name the time and the phase of a drive; NAME.x and NAME.v
+!> of bodies and points; spring.NAME, the force by which a spring presses its ends apart; contact.NAME, that of a soft contact; the
+!> parameters of its own table by their names, and those of every table by their paths.
+module build_load
+  use errors, only: error_t, fail
+  use expression_text, only: read_expression
+  use kinds, only: wp
+  use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_kind, part_law, path_of, rows_of, text_of, &
+    value_of
+  use multibody, only: joint_t, load_t, most_load_switches, multibody_t, source_t
+  use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
+  use reference_points, only: is_reference_point, row_of
+  use status, only: exit_bad_case
+  use tape, only: constant, new_tape, parameter_node, variable
+  use tape_sign, only: positive_part
+  use tape_value, only: evaluate
+  use text, only: to_text
+  implicit none
+  private
+
+  public :: set_normal_force
+
+  integer, parameter :: name_length = 64
+  character(len=*), parameter :: name_letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.'
+  !> Points of a period at which a normal force is compared with that a period later, and the share that rounding may change.
+  integer, parameter :: points = 24
+  real(wp), parameter :: same = 1e-9_wp
+
+  !> Names of an expression and their nodes, with the units of variables and parameters.
+  type :: names_t
+    character(len=name_length), allocatable :: names(:)
+    integer, allocatable :: nodes(:)
+    type(quantity_t), allocatable :: of_variables(:), of_parameters(:)
+  end type names_t
+
+contains
+
+  !> Sets the normal force of joint `joint`, choice number `i`; `rows` are those of the reference points. Errors name the key.
+  pure subroutine set_normal_force(choices, i, rows, machine, joint, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: rows(:, :)
+    type(multibody_t), intent(in) :: machine
+    type(joint_t), intent(inout) :: joint
+    type(error_t), allocatable, intent(out) :: error
+    type(names_t) :: names
+    character(len=:), allocatable :: key, text
+    integer :: node
+    key = path_of(choices(i))//'.load'
+    text = text_of(choices(i), 'load')
+    allocate (joint%load)
+    associate (load => joint%load)
+      call new_tape(load%tape)
+      allocate (names%names(0), names%nodes(0), names%of_variables(0), names%of_parameters(0), load%sources(0), load%parameters(0))
+      allocate (load%rates(0))
+      call add_clock(machine, load, names)
+      call add_coordinates(choices, text, rows, load, names)
+      call add_parameters(choices, i, load, names)
+      call add_springs(choices, text, rows, load, names)
+      call add_contacts(choices, text, rows, load, names, error)
+      if (allocated(error)) then
+        error%message = key//': '//error%message
+        return
+      end if
+      call read_expression(text, names%names, names%nodes, load%tape, node, error)
+      if (.not. allocated(error)) call check_unit(machine, load, names, node, error)
+      if (.not. allocated(error)) call check_values(machine, load, node, error)
+      if (allocated(error)) then
+        error%message = key//': '//error%message
+        return
+      end if
+      call positive_part(load%tape, load%parameters, node, load%node)
+    end associate
+  end subroutine set_normal_force
+
+  pure subroutine add_name(names, name, node)
+    type(names_t), intent(inout) :: names
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: node
+    character(len=name_length) :: padded
+    padded = name
+    names%names = [names%names, padded]
+    names%nodes = [names%nodes, node]
+  end subroutine add_name
+
+  !> The next variable, with the node of its rate and its unit.
+  pure subroutine add_variable(load, names, rate, unit, node)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    integer, intent(in) :: rate
+    character(len=*), intent(in) :: unit
+    integer, intent(out) :: node
+    type(quantity_t) :: quantity
+    quantity = parameter_unit(trim(unit))
+    quantity%is_stated = .false.
+    call variable(load%tape, size(load%rates) + 1, node)
+    load%rates = [load%rates, rate]
+    names%of_variables = [names%of_variables, quantity]
+  end subroutine add_variable
+
+  !> Time and phase, which have names where there is a drive.
+  pure subroutine add_clock(machine, load, names)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    integer :: one, speed, node
+    call constant(load%tape, 1.0_wp, one)
+    call constant(load%tape, machine%frequency, speed)
+    call add_variable(load, names, one, 's', node)
+    if (machine%frequency > 0) call add_name(names, 't', node)
+    call add_variable(load, names, speed, '1', node)
+    if (machine%frequency > 0) call add_name(names, 'phase', node)
+  end subroutine add_clock
+
+  !> Numbers of the case.
+  pure subroutine add_parameters(choices, i, load, names)
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    type(parameter_row_t), allocatable :: rows(:)
+    integer :: k, r, node
+    do k = 1, size(choices)
+      rows = rows_of(choices(k))
+      do r = 1, size(rows)
+        if (rows(r)%list .or. is_hidden(rows(r))) cycle
+        if (.not. abs(choices(k)%parameters(r)%values(1)) < huge(1.0)) cycle
+        load%parameters = [load%parameters, choices(k)%parameters(r)%values(1)]
+        call parameter_node(load%tape, size(load%parameters), node)
+        call add_name(names, path_of(choices(k))//'.'//trim(rows(r)%name), node)
+        if (k == i) call add_name(names, trim(rows(r)%name), node)
+        names%of_parameters = [names%of_parameters, parameter_unit(trim(rows(r)%unit))]
+      end do
+    end do
+  end subroutine add_parameters
+
+  !> A source and its four variables; `nodes` are those of its value and rate.
+  pure subroutine add_source(source, units, load, names, nodes)
+    type(source_t), intent(in) :: source
+    character(len=*), intent(in) :: units(2)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    integer, intent(out) :: nodes(2)
+    type(source_t), allocatable :: sources(:)
+    integer :: zero, i, made(4), first
+    call constant(load%tape, 0.0_wp, zero)
+    first = size(load%rates)
+    do i = 1, 4
+      call add_variable(load, names, zero, merge(units(min(i, 2)), '1  ', i <= 2), made(i))
+    end do
+    load%rates(first + 1:first + 3) = made(2:4)
+    allocate (sources(size(load%sources) + 1))
+    do i = 1, size(load%sources)
+      sources(i) = load%sources(i)
+    end do
+    sources(size(sources)) = source
+    call move_alloc(sources, load%sources)
+    nodes = made(:2)
+  end subroutine add_source
+
+  !> Positions and velocities of the bodies and points that the text names.
+  pure subroutine add_coordinates(choices, text, rows, load, names)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: text
+    real(wp), intent(in) :: rows(:, :)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    character(len=:), allocatable :: label
+    type(source_t) :: source
+    integer :: i, k, nodes(2)
+    k = 0
+    do i = 1, size(choices)
+      if (.not. is_reference_point(choices(i))) cycle
+      k = k + 1
+      label = trim(choices(i)%label)
+      if (.not. (has_name(text, label//'.x') .or. has_name(text, label//'.v'))) then
+        ! Messages list it; the text does not refer to it.
+        call add_name(names, label//'.x', 1)
+        call add_name(names, label//'.v', 1)
+        cycle
+      end if
+      source%row = rows(:, k)
+      call add_source(source, ['m  ', 'm/s'], load, names, nodes)
+      call add_name(names, label//'.x', nodes(1))
+      call add_name(names, label//'.v', nodes(2))
+    end do
+  end subroutine add_coordinates
+
+  !> Forces of springs, with their dampers, that the text names.
+  pure subroutine add_springs(choices, text, rows, load, names)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: text
+    real(wp), intent(in) :: rows(:, :)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    character(len=2), parameter :: letters(6) = ['s ', 'u ', 'k ', 'k2', 'k3', 'c ']
+    type(source_t) :: source
+    type(error_t), allocatable :: error
+    integer :: i, k, at(6), force
+    real(wp) :: numbers(4)
+    do i = 1, size(choices)
+      if (.not. any(choices(i)%name == [character(len=label_length) :: 'spring:linear', 'spring:polynomial'])) cycle
+      if (.not. has_name(text, path_of(choices(i)))) cycle
+      source%row = row_of(rows, choices(i))
+      source%offset%mean = -value_of(choices(i), 'free_length')
+      call add_source(source, ['m  ', 'm/s'], load, names, at(:2))
+      numbers = [value_of(choices(i), 'stiffness'), 0.0_wp, 0.0_wp, value_of(choices(i), 'damping')]
+      if (part_law(choices(i)%name) == 'polynomial') numbers(2:3) = [value_of(choices(i), 'quadratic'), &
+                                                                     value_of(choices(i), 'cubic')]
+      do k = 1, 4
+        load%parameters = [load%parameters, numbers(k)]
+        call parameter_node(load%tape, size(load%parameters), at(k + 2))
+        names%of_parameters = [names%of_parameters, quantity_t()]
+      end do
+      call read_expression('-(s*(k + s*(k2 + s*k3)) + c*u)', letters, at, load%tape, force, error)
+      call add_name(names, path_of(choices(i)), force)
+    end do
+  end subroutine add_springs
+
+  !> Forces of soft contacts that the text names.
+  pure subroutine add_contacts(choices, text, rows, load, names, error)
+    type(law_choice_t), intent(in) :: choices(:)
+    character(len=*), intent(in) :: text
+    real(wp), intent(in) :: rows(:, :)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    type(error_t), allocatable, intent(out) :: error
+    type(source_t) :: source
+    integer :: i, nodes(2)
+    do i = 1, size(choices)
+      if (index(choices(i)%name, 'contact:') /= 1) cycle
+      if (.not. has_name(text, path_of(choices(i)))) cycle
+      if (index(part_law(choices(i)%name), 'newton') == 1) then
+        call fail(error, exit_bad_case, 'found '//path_of(choices(i))//', which is rigid; allowed soft contacts, whose force '// &
+                  'follows from the penetration')
+        return
+      end if
+      source%row = row_of(rows, choices(i))
+      source%contact = path_of(choices(i))
+      call add_source(source, ['N  ', 'N/s'], load, names, nodes)
+      call add_name(names, path_of(choices(i)), nodes(1))
+    end do
+  end subroutine add_contacts
+
+  !> Whether a text has a name, not as a part of another one.
+  pure logical function has_name(text, name)
+    character(len=*), intent(in) :: text, name
+    character(len=len(text) + 2) :: padded
+    integer :: from, at
+    padded = ' '//text
+    has_name = .false.
+    from = 1
+    do
+      at = index(padded(from:), name)
+      if (at == 0) return
+      at = from + at - 1
+      has_name = scan(padded(at - 1:at - 1), name_letters) == 0 .and. scan(padded(at + len(name):at + len(name)), name_letters) == 0
+      if (has_name) return
+      from = at + 1
+    end do
+  end function has_name
+
+  !> The expression is in N, if its parameters have units.
+  pure subroutine check_unit(machine, load, names, node, error)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(in) :: load
+    type(names_t), intent(in) :: names
+    integer, intent(in) :: node
+    type(error_t), allocatable, intent(inout) :: error
+    type(quantity_t) :: quantity(load%tape%count)
+    integer :: fault(load%tape%count)
+    character(len=:), allocatable :: problem
+    if (size(machine%angles) > 0) return
+    call quantities_of(load%tape, names%of_variables, names%of_parameters, quantity, fault)
+    problem = unit_problem(load%tape, node, quantity, fault, 'N')
+    if (len(problem) > 0) call fail(error, exit_bad_case, problem)
+  end subroutine check_unit
+
+  !> A constant is not negative, and what depends on the time repeats with the period of the drive.
+  pure subroutine check_values(machine, load, node, error)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(in) :: load
+    integer, intent(in) :: node
+    type(error_t), allocatable, intent(inout) :: error
+    real(wp), dimension(load%tape%count) :: now, later
+    real(wp) :: z(size(load%rates)), period, largest, change
+    integer, dimension(load%tape%count) :: fault, fault_later
+    integer :: i
+    if (load%tape%is_full .or. size(load%tape%switches) >= most_load_switches) then
+      call fail(error, exit_bad_case, 'found too many operations, allowed at most '//to_text(most_load_switches - 1)// &
+                ' of abs, sign, min, max and if')
+      return
+    end if
+    z = 0
+    call evaluate(load%tape, z, load%parameters, now, fault)
+    if (load%tape%nodes(node)%is_steady .and. (fault(node) > 0 .or. now(node) < 0)) then
+      call fail(error, exit_bad_case, 'found '//to_text(real(now(node), kind(1d0)))//' N, allowed at least 0')
+      return
+    end if
+    if (.not. machine%frequency > 0) return
+    period = 8*atan(1.0_wp)/machine%frequency
+    largest = 0
+    change = 0
+    do i = 0, points - 1
+      z(3:) = modulo(i*0.618_wp, 1.0_wp) - 0.5_wp
+      z(:2) = [period, 8*atan(1.0_wp)]*(i + 0.318_wp)/points
+      call evaluate(load%tape, z, load%parameters, now, fault)
+      z(1) = z(1) + period
+      call evaluate(load%tape, z, load%parameters, later, fault_later)
+      if (max(fault(node), fault_later(node)) > 0) cycle
+      largest = max(largest, abs(now(node)), abs(later(node)))
+      change = max(change, abs(now(node) - later(node)))
+    end do
+    if (change > same*largest) call fail(error, exit_bad_case, 'found a function of t that does not repeat after the period of '// &
+                                         'the drive, '//to_text(real(period, kind(1d0)))//' s, allowed one that does')
+  end subroutine check_values
+
+end module build_load
