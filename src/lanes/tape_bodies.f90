@@ -1,0 +1,84 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> The bodies that fly in lanes of tapes: with a motor, and of equations by expressions.
+module tape_bodies
+  use constants, only: two_pi
+  use equation_sheet, only: node_of
+  use kinds, only: wp
+  use lane_types, only: lane_flow_t
+  use motor_system, only: body_held, both_move, motor_system_t
+  use tape_preparation, only: far, prepare_tape_lanes, tape_body_t
+  implicit none
+  private
+
+  public :: prepare_motor_lanes, prepare_own_lanes
+
+contains
+
+  !> `flow%available` if a body with a motor can fly in lanes; `length` [m] is the size of its motion.
+  pure subroutine prepare_motor_lanes(system, length, flow)
+    type(motor_system_t), intent(in) :: system
+    real(wp), intent(in) :: length
+    type(lane_flow_t), intent(inout) :: flow
+    type(tape_body_t) :: body
+    flow%available = .false.
+    ! Where the equations of a motor change on the way, the event loop goes on.
+    if (system%control%supply > 0 .or. system%control%torque_limit > 0 .or. system%control%curve%count > 0) return
+    call set_equations(system, body)
+    body%parameters(system%turning) = 1
+    body%sizes = [6.28_wp, system%no_load_speed, length, length*system%no_load_speed, system%own_size]
+    body%sizes = body%sizes(:system%variables)
+    body%time = 1/system%no_load_speed
+    body%level = system%body_level
+    body%friction = system%friction%kinetic + system%friction%excess
+    body%damping = system%friction%damping
+    body%stiffness = system%stiffness
+    body%length = length + abs(system%free_length)
+    if (system%moment > 0) then
+      body%throws = node_of(system%sheet, 'cross')
+      body%throw_factor = 1/system%rotor_inertia
+    end if
+    call prepare_tape_lanes(body, flow)
+  end subroutine prepare_motor_lanes
+
+  !> The same of a body by expressions; `scales` are the sizes of position, velocity and states, `frequency` [rad/s] and `period` [s]
+  !> those of its section, `domain` [m] is the farthest position.
+  pure subroutine prepare_own_lanes(system, scales, period, domain, flow)
+    type(motor_system_t), intent(in) :: system
+    real(wp), intent(in) :: scales(:), period, domain
+    type(lane_flow_t), intent(inout) :: flow
+    type(tape_body_t) :: body
+    ! Shortest rest of a chatter sequence that is not completed, as a part of the period.
+    real(wp), parameter :: rest = 1.01e-2_wp
+    call set_equations(system, body)
+    body%clock = .true.
+    body%goes_on = system%aperiodic
+    body%period = period
+    body%domain = domain
+    if (system%period > 0) body%phase_speed = two_pi/system%period
+    body%sizes = [period, two_pi, scales]
+    body%time = period/two_pi
+    body%held_by = node_of(system%sheet, 'static')
+    body%bounce = system%restitution
+    body%longest_rest = rest*merge(system%period, 1.0_wp, system%period > 0)
+    body%length = scales(1)
+    call prepare_tape_lanes(body, flow)
+  end subroutine prepare_own_lanes
+
+  !> What both have.
+  pure subroutine set_equations(system, body)
+    type(motor_system_t), intent(in) :: system
+    type(tape_body_t), intent(inout) :: body
+    body%tape = system%flights(both_move, 0)%tape
+    body%rates = system%flights(both_move, 0)%rates
+    body%parameters = system%sheet%parameters
+    body%hold = system%body_hold(body_held)
+    body%slip = system%slip
+    body%mass = system%mass
+    body%upper = min(far, system%contact%upper)
+    body%lower = max(-far, system%contact%lower)
+    body%restitution = system%contact%restitution
+  end subroutine set_equations
+
+end module tape_bodies
