@@ -8,7 +8,10 @@ module tape_bodies
   use kinds, only: wp
   use lane_types, only: lane_flow_t
   use motor_system, only: body_held, both_move, motor_system_t
+  use operations, only: op_parameter, op_select, op_variable
+  use tape_parts, only: needed
   use tape_preparation, only: far, prepare_tape_lanes, tape_body_t
+  use tape_value, only: evaluate
   implicit none
   private
 
@@ -59,12 +62,53 @@ contains
     if (system%period > 0) body%phase_speed = two_pi/system%period
     body%sizes = [period, two_pi, scales]
     body%time = period/two_pi
+    body%level = system%body_level
     body%held_by = node_of(system%sheet, 'static')
     body%bounce = system%restitution
     body%longest_rest = rest*merge(system%period, 1.0_wp, system%period > 0)
     body%length = scales(1)
+    body%turns_freely = system%period > 0 .and. min(-body%lower, body%upper) >= far .and. .not. depends_on_slip(body)
+    body%passes = system%period > 0
+    if (body%passes) body%passes = repeats(system, body)
     call prepare_tape_lanes(body, flow)
   end subroutine prepare_own_lanes
+
+  !> Whether rates depend on the direction of slip.
+  pure logical function depends_on_slip(body) result(depends)
+    type(tape_body_t), intent(in) :: body
+    logical :: is_used(body%tape%count)
+    integer :: i
+    is_used = needed(body%tape, body%rates)
+    depends = .false.
+    do i = 1, body%tape%count
+      associate (node => body%tape%nodes(i))
+        if (node%operation == op_parameter .and. node%first == body%slip) depends = depends .or. is_used(i)
+        if (node%operation /= op_select .or. .not. is_used(i)) cycle
+        associate (decider => body%tape%nodes(body%tape%switches(node%first)%argument))
+          depends = depends .or. (decider%operation == op_variable .and. decider%first == body%velocity)
+        end associate
+      end associate
+    end do
+  end function depends_on_slip
+
+  !> Whether the rates are the same a period later, without the clock being set back.
+  pure logical function repeats(system, body)
+    type(motor_system_t), intent(in) :: system
+    type(tape_body_t), intent(in) :: body
+    real(wp) :: z(system%variables), now(body%tape%count), later(body%tape%count)
+    integer :: fault(body%tape%count), i, k
+    integer, parameter :: points = 24
+    real(wp), parameter :: same = 1e-9_wp, steps(10) = [(modulo(k*0.618_wp, 1.0_wp) - 0.45_wp, k=1, 10)]
+    repeats = .true.
+    do i = 1, points
+      z(:2) = [body%period, two_pi]*(i - 0.3_wp)/points
+      z(3:) = [(body%sizes(k)*steps(1 + modulo(i + k, 10)), k=3, system%variables)]
+      call evaluate(body%tape, z, body%parameters, now, fault)
+      z(:2) = z(:2) + [body%period, two_pi]
+      call evaluate(body%tape, z, body%parameters, later, fault)
+      repeats = repeats .and. all(abs(now(body%rates) - later(body%rates)) <= same*abs(now(body%rates)))
+    end do
+  end function repeats
 
   !> What both have.
   pure subroutine set_equations(system, body)

@@ -64,8 +64,10 @@ inline interval bounds_of_function(const tape_node &n, interval a, const tape_bo
     inverse = 1.0 / a.low;
     return {logarithm_or_none(a.low), logarithm_or_none(a.high)};
   case tape_sin:
+  case tape_sin_even:
     return circular(false, a, sound);
   case tape_cos:
+  case tape_cos_even:
     return circular(true, a, sound);
   case tape_tan: {
     interval of_cosine = circular(true, a, sound);

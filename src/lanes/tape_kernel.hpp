@@ -31,22 +31,59 @@ inline vec attractors_reached(const tape_machine &m, const tape_batch &batch, co
   return found;
 }
 
-// Lanes `there`, at the time where they are to stop. At the end of a period the clock starts anew, and those
-// that need not stop pass; see `stop_or_pass`.
-[[gnu::noinline]] inline void stop_or_pass_clock(const tape_machine &m, const tape_batch &batch, mask there,
-                                                 vec *end, tape_group &g) {
+// Time and phase of a drive, and the sign of slip where that is no event, of lanes whose state has changed.
+inline void set_clock(const tape_machine &m, mask moved, tape_group &g) {
+  put(g.s.z[0], moved, g.s.origin + g.s.time);
+  put(g.s.z[1], moved, g.s.time * m.phase_speed);
+  if (m.turns_freely)
+    put(g.s.slip, moved, pick(g.s.z[tape_v] < 0.0, -1, 1));
+}
+
+// Lanes that come to the time where they are to stop, with variables `z`. At the end of a period the clock
+// starts anew, and those that need not stop pass; see `stop_or_pass`. Returns the lanes that stop.
+inline mask stop_or_pass_clock(const tape_machine &m, const tape_batch &batch, mask there, const vec *z,
+                               tape_group &g) {
   mask section = there & (g.c.until >= m.period);
-  vec reached = attractors_reached(m, batch, end);
-  mask passing = section & (g.c.sections > 0.5) & (magnitude(end[tape_x]) <= m.domain) &
+  vec reached = attractors_reached(m, batch, z);
+  mask passing = section & (g.c.sections > 0.5) & (magnitude(z[tape_x]) <= m.domain) &
                  ((reached < 0.5) | (g.c.leaves < 0.5));
   passing = batch.complete ? passing : mask{};
-  put(g.s.time, there, pick(section, 0, g.c.until));
+  mask stops = there & ~passing;
   put(g.s.origin, section, g.s.origin + (m.clock == 2 ? m.period : 0));
   put(g.c.elapsed, passing, g.c.elapsed + m.period);
   put(g.c.reached, passing, reached);
   put(g.c.settled, passing, pick(reached < 0.5, -1, pick(g.c.settled < 0.0, g.c.elapsed, g.c.settled)));
   put(g.c.sections, passing, g.c.sections - 1.0);
-  put(g.c.status, there & ~passing, lane_stopped);
+  put(g.c.flights, there, g.c.flights + 1.0);
+  put(g.c.status, stops, lane_stopped);
+  put(g.s.time, stops, pick(section, 0, g.c.until));
+  for (int i = tape_x; i < m.variables; i++)
+    put(g.s.z[i], stops, z[i]);
+  set_clock(m, stops, g);
+  return stops;
+}
+
+// Where the lanes come to the time of their stop before an event, the step ends there. The lanes that go on,
+// at a time `after` the section.
+[[gnu::noinline]] inline mask pass_clock(const tape_machine &m, const tape_batch &batch, mask moves,
+                                         tape_event &e, vec *end, vec &after, tape_group &g) {
+  vec cross = (g.c.until - g.s.time) / g.span, z[most_tape_variables];
+  mask there = moves & (cross <= e.at);
+  after = g.s.time + e.at * g.span;
+  if (!any(there))
+    return moves;
+  mask cut = there & (e.turns | e.hits | e.left | (e.crosses != 0.0));
+  for (int i = 0; i < m.variables; i++) {
+    z[i] = value_at(g.p[i], cross);
+    put(end[i], cut, z[i]);
+  }
+  put(e.at, cut, cross);
+  put(e.crosses, cut, 0);
+  e.turns = e.turns & ~cut;
+  e.hits = e.hits & ~cut;
+  e.left = e.left & ~cut;
+  put(after, there, (e.at - cross) * g.span);
+  return moves & ~stop_or_pass_clock(m, batch, there, z, g);
 }
 
 // Past the section, or up to it where a lane stops there; `cross` is its fraction of whole steps.
@@ -142,7 +179,15 @@ inline mask forces_at_rest(const tape_machine &m, const vec *end, tape_group &g,
 // Length of the next step, in units; `natural`: by the last coefficients.
 inline vec next_length(const tape_machine &m, const tape_group &g, vec natural) {
   vec left_time = (g.c.until - g.s.time) / m.unit;
+  if (m.passes)
+    put(left_time, (g.c.sections > 0.5) & (g.c.until >= m.period), left_time + 0.5 * (m.period / m.unit));
   return smaller(smaller(natural * g.s.proven, left_time), g.s.limit);
+}
+
+// Bodies that come to rest where friction does not hold them: the event loop ends their motion.
+inline mask comes_to_rest(const tape_machine &m, const tape_group &g) {
+  const double slow = 1e5 * m.hold_level / m.mass;
+  return (magnitude(g.t.first[m.rate[tape_v]]) <= slow) & (magnitude(g.s.z[tape_v]) <= slow * m.unit);
 }
 
 // Lanes that fly on through a step, with the state at its end; those that are left, or try a shorter one, go
@@ -161,42 +206,53 @@ inline mask move(const tape_machine &m, const tape_event &e, vec natural, vec *e
   return moves & finite;
 }
 
+// The end of a step of the lanes with a crank.
+inline void end_step(const tape_machine &m, const tape_batch &batch, mask moves, const tape_event &e,
+                     mask to_end, vec *end, tape_group &g) {
+  mask past = moves & (end[tape_phase] >= two_pi);
+  put(g.s.time, moves & ~past, g.s.time + e.at * g.span);
+  if (any(past))
+    pass_section(m, batch, past, e.at, e.section, end, g);
+  mask ends = moves & (g.c.status == lane_flying) & to_end & ~(e.turns | e.hits) & (e.crosses == 0.0);
+  put(g.s.time, ends, g.c.until);
+  put(g.c.status, ends, lane_stopped);
+  put(g.c.flights, ends, g.c.flights + 1.0);
+}
+
 // One step of the lanes that are flying.
 inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tape_group &g) {
   mask flying = g.c.status == lane_flying, left;
   expand(m, fresh, g.s.z, g.s.slip, g.s.crossed, g.t);
-  vec natural = natural_length(m, g), end[most_tape_variables], slip;
+  vec natural = natural_length(m, g), end[most_tape_variables], slip, after;
+  mask rests = m.turns_freely ? comes_to_rest(m, g) : mask{};
   mask open = prove_step(m, natural, next_length(m, g, natural), g);
   mask to_end = flying & (g.span >= g.c.until - g.s.time);
   tape_event e = find_event(m, open, g);
   mask moves = move(m, e, natural, end, left, g);
+  left = left | (moves & rests);
+  moves = moves & ~rests;
   e.turns = e.turns & moves;
   e.hits = e.hits & moves;
   e.left = e.left & moves;
+  if (m.clock)
+    moves = pass_clock(m, batch, moves, e, end, after, g);
   left = left | take_events(m, e, end, slip, g);
   moves = moves & ~left;
   put(g.c.status, flying & left, lane_left);
   put(g.s.limit, moves, 1e300);
   put(g.s.crossed, moves, e.crosses);
-  mask past = moves & (m.clock ? mask{} : end[tape_phase] >= two_pi);
-  put(g.s.time, moves & ~past, g.s.time + e.at * g.span);
-  if (any(past))
-    pass_section(m, batch, past, e.at, e.section, end, g);
-  moves = moves & (g.c.status == lane_flying);
-  mask happens = e.turns | e.hits, ends = moves & to_end & ~happens & (e.crosses == 0.0);
-  put(g.s.time, ends, g.c.until);
-  put(g.c.flights, moves & (ends | happens), g.c.flights + 1.0);
-  put(g.s.slip, moves, slip);
-  if (!m.clock)
-    put(g.c.status, ends, lane_stopped);
-  else if (any(ends))
-    stop_or_pass_clock(m, batch, ends, end, g);
-  if (m.clock) {
-    end[0] = g.s.origin + g.s.time;
-    end[1] = g.s.time * m.phase_speed;
+  put(g.c.flights, moves & (e.turns | e.hits), g.c.flights + 1.0);
+  if (!m.clock) {
+    end_step(m, batch, moves, e, to_end, end, g);
+    moves = moves & (g.c.status != lane_stopped);
   }
+  put(g.s.slip, moves, slip);
   for (int i = 0; i < m.variables; i++)
     put(g.s.z[i], moves, end[i]);
+  if (m.clock) {
+    put(g.s.time, moves, after);
+    set_clock(m, moves, g);
+  }
 }
 
 inline void fly_tape(const tape_machine &m, lane_batch &control, tape_batch &batch) {

@@ -14,8 +14,9 @@ module tape_lane_types
     most_tape_regions = 64
   integer, parameter :: metric_numbers = (most_tape_section*(most_tape_section + 1))/2
   !> Operations beside those of `operations`: products and quotients with a factor that does not vary; the sign of slip, and a branch
-  !> by it.
-  integer, parameter, public :: op_scale = 25, op_divide_steady = 26, op_slip = 27, op_select_slip = 28
+  !> by it; sine and cosine of an argument that grows evenly in time.
+  integer, parameter, public :: op_scale = 25, op_divide_steady = 26, op_slip = 27, op_select_slip = 28, op_sin_even = 29, &
+    op_cos_even = 30
 
   !> Mirrors `tape_node` of tape_types.hpp. Numbers of nodes and series begin with 0.
   type, bind(c), public :: lane_node_t
@@ -32,8 +33,8 @@ module tape_lane_types
 
   !> Mirrors `tape_machine` of tape_types.hpp.
   type, bind(c), public :: tape_machine_t
-    integer(c_int) :: nodes = 0, by_slip = 0, varying = 0, variables = 0, clock = 0, switches = 0, hold = 0, level = -1, &
-      throws = -1, bounce = -1
+    integer(c_int) :: nodes = 0, by_slip = 0, varying = 0, variables = 0, clock = 0, switches = 0, turns_freely = 0, &
+      passes = 0, hold = 0, level = -1, throws = -1, bounce = -1
     integer(c_int) :: rate(most_tape_variables) = 0, decider(most_tape_switches) = 0, decider_series(most_tape_switches) = -1
     type(lane_node_t) :: node(most_tape_nodes)
     real(c_double) :: unit = 1, tolerance = 0, sizes(most_tape_variables) = 1

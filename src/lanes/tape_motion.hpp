@@ -276,8 +276,15 @@ struct tape_fall {
   e.crosses = 0;
   if (!m.clock)
     e.unclear = e.unclear | ~turns_on(g);
-  // Velocity in the direction of slip.
   tape_fall f;
+  if (m.turns_freely) {
+    e.at = 1;
+    e.turns = e.hits = e.left = mask{};
+    if (m.switches > 0)
+      find_switches(m, g, e);
+    return e;
+  }
+  // Velocity in the direction of slip.
   find_fall(g.p[tape_v], g.s.slip, g.s.z[tape_v] == 0.0, g.error[tape_v], f);
   e.unclear = e.unclear | ~(f.falls | f.stays);
   mask sure = ~e.unclear & flying;

@@ -14,7 +14,8 @@ module tape_preparation
   use tape, only: node_t, tape_t
   use tape_bounds, only: bound_coefficients
   use tape_lane_types, only: lane_node_t, lane_tape_order, most_tape_nodes, most_tape_series, most_tape_switches, &
-    most_tape_variables, op_divide_steady, op_scale, op_select_slip, op_slip, tape_levels, tape_machine_t, tape_speeds
+    most_tape_variables, op_divide_steady, op_scale, op_select_slip, op_slip, &
+    op_sin_even, op_cos_even, tape_levels, tape_machine_t, tape_speeds
   use tape_parts, only: needed
   use tape_series, only: prepare_series, series_t
   implicit none
@@ -44,6 +45,8 @@ module tape_preparation
     !> goes on there if nothing repeats.
     logical :: clock = .false., goes_on = .false.
     real(wp) :: period = 0, phase_speed = 0
+    !> Turning points are no events; lanes pass the end of a period within a step. See `tape_machine`.
+    logical :: turns_freely = .false., passes = .false.
     !> Sizes of the variables, and a time [s].
     real(wp), allocatable :: sizes(:)
     real(wp) :: time = 1
@@ -94,6 +97,8 @@ contains
     machine%length = body%length
     machine%throw_factor = body%throw_factor
     if (body%clock) machine%clock = merge(2, 1, body%goes_on)
+    machine%turns_freely = merge(1, 0, body%turns_freely)
+    machine%passes = merge(1, 0, body%passes)
     machine%period = body%period
     machine%phase_speed = body%phase_speed
     machine%longest_rest = body%longest_rest
@@ -286,10 +291,40 @@ contains
       made%first = number(node%first)
       made%first_series = series(node%first)
       call set_arguments(body%tape, i, number, series, slopes, made)
+      if (grows_evenly(body, node%first)) then
+        if (node%operation == op_sin) made%operation = op_sin_even
+        if (node%operation == op_cos) made%operation = op_cos_even
+      end if
     case default
       fits = .false.
     end select
   end subroutine set_node
+
+  !> Whether a node is a sum of what does not vary and of products of that with variables whose rates do not vary.
+  pure recursive logical function grows_evenly(body, i) result(grows)
+    type(tape_body_t), intent(in) :: body
+    integer, intent(in) :: i
+    associate (node => body%tape%nodes(i), nodes => body%tape%nodes)
+      grows = node%is_steady
+      if (grows) return
+      select case (node%operation)
+      case (op_variable)
+        grows = nodes(body%rates(node%first))%is_steady
+      case (op_add, op_subtract)
+        grows = grows_evenly(body, node%first)
+        if (grows) grows = grows_evenly(body, node%second)
+      case (op_multiply)
+        grows = nodes(node%first)%is_steady .or. nodes(node%second)%is_steady
+        if (grows) grows = grows_evenly(body, node%first)
+        if (grows) grows = grows_evenly(body, node%second)
+      case (op_divide)
+        grows = nodes(node%second)%is_steady
+        if (grows) grows = grows_evenly(body, node%first)
+      case (op_negative)
+        grows = grows_evenly(body, node%first)
+      end select
+    end associate
+  end function grows_evenly
 
   !> What else an operation takes.
   pure subroutine set_arguments(tape, i, number, series, slopes, made)
@@ -387,7 +422,7 @@ contains
     box%high = half
     ! Any angle; any time between two sections.
     box(1) = interval_t(-turns, turns)
-    if (body%clock) box(:2) = [interval_t(0.0_wp, above*body%period), interval_t(0.0_wp, above*turns/2)]
+    if (body%clock) box(:2) = [interval_t(0.0_wp, 2*body%period), interval_t(0.0_wp, turns)]
     rates = 0
     is_bounded = .false.
     parameters = body%parameters

@@ -73,9 +73,11 @@ inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &
     inverse = 1.0 / a;
     return logarithm_or_none(a);
   case tape_sin:
+  case tape_sin_even:
     sine_cosine(a, y, other);
     return y;
   case tape_cos:
+  case tape_cos_even:
     sine_cosine(a, other, y);
     return y;
   case tape_tan:
@@ -189,6 +191,10 @@ template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_node &n, int 
     return products<k, 1, 0>(of[n.first_series], of[n.second_series]) * inverse_of[k];
   case tape_cos:
     return products<k, 1, 0>(of[n.first_series], of[n.second_series]) * (bounds ? inverse_of[k] : -inverse_of[k]);
+  case tape_sin_even:
+    return of[n.first_series][1] * of[n.second_series][k - 1] * inverse_of[k];
+  case tape_cos_even:
+    return of[n.first_series][1] * of[n.second_series][k - 1] * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_log:
   case tape_atan:
     return less(a, products<k, 1, 1>(of[n.slopes], of[n.second_series]) * inverse_of[k]) * t.inverse[i];

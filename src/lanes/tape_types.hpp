@@ -53,7 +53,10 @@ enum {
   tape_scale,
   tape_divide_steady,
   tape_slip,
-  tape_select_slip
+  tape_select_slip,
+  // Of an argument that grows evenly in time.
+  tape_sin_even,
+  tape_cos_even
 };
 
 // A node: numbers of its arguments, and where their series and its own are kept (-1: not). Of functions the
@@ -74,6 +77,9 @@ struct tape_region {
 // Nodes before `by_slip` are numbers, those from there to `varying` depend on the sign of slip alone.
 struct tape_machine {
   int nodes, by_slip, varying, variables, clock, switches;
+  // Forces do not depend on the sign of slip, and there are no stops: turning points are no events. Forces
+  // repeat after a period as they are: lanes pass its end within a step.
+  int turns_freely, passes;
   // Nodes of what acts on the body at rest, holds it there, and is thrown at an impact, and of the
   // restitution; -1: none, or a number.
   int hold, level, throws, bounce;
