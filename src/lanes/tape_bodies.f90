@@ -45,8 +45,8 @@ contains
     call prepare_tape_lanes(body, flow)
   end subroutine prepare_motor_lanes
 
-  !> The same of a body by expressions; `scales` are the sizes of position, velocity and states, `frequency` [rad/s] and `period` [s]
-  !> those of its section, `domain` [m] is the farthest position.
+  !> The same of a body by expressions; `scales` are the sizes of position, velocity and states, `period` [s] is that of its section,
+  !> `domain` [m] is the farthest position.
   pure subroutine prepare_own_lanes(system, scales, period, domain, flow)
     type(motor_system_t), intent(in) :: system
     real(wp), intent(in) :: scales(:), period, domain
@@ -54,6 +54,7 @@ contains
     type(tape_body_t) :: body
     ! Shortest rest of a chatter sequence that is not completed, as a part of the period.
     real(wp), parameter :: rest = 1.01e-2_wp
+    logical :: slides, turns
     call set_equations(system, body)
     body%clock = .true.
     body%goes_on = system%aperiodic
@@ -67,29 +68,33 @@ contains
     body%bounce = system%restitution
     body%longest_rest = rest*merge(system%period, 1.0_wp, system%period > 0)
     body%length = scales(1)
-    body%turns_freely = system%period > 0 .and. min(-body%lower, body%upper) >= far .and. .not. depends_on_slip(body)
+    call look_at_slip(body, slides, turns)
+    body%proves = slides .or. min(-body%lower, body%upper) < far
+    body%turns_freely = system%period > 0 .and. .not. (body%proves .or. turns)
     body%passes = system%period > 0
     if (body%passes) body%passes = repeats(system, body)
     call prepare_tape_lanes(body, flow)
   end subroutine prepare_own_lanes
 
-  !> Whether rates depend on the direction of slip.
-  pure logical function depends_on_slip(body) result(depends)
+  !> Whether rates depend on the direction of slip, as dry friction does, or on the sign of the velocity.
+  pure subroutine look_at_slip(body, slides, turns)
     type(tape_body_t), intent(in) :: body
+    logical, intent(out) :: slides, turns
     logical :: is_used(body%tape%count)
     integer :: i
     is_used = needed(body%tape, body%rates)
-    depends = .false.
+    slides = .false.
+    turns = .false.
     do i = 1, body%tape%count
       associate (node => body%tape%nodes(i))
-        if (node%operation == op_parameter .and. node%first == body%slip) depends = depends .or. is_used(i)
+        if (node%operation == op_parameter .and. node%first == body%slip) slides = slides .or. is_used(i)
         if (node%operation /= op_select .or. .not. is_used(i)) cycle
         associate (decider => body%tape%nodes(body%tape%switches(node%first)%argument))
-          depends = depends .or. (decider%operation == op_variable .and. decider%first == body%velocity)
+          turns = turns .or. (decider%operation == op_variable .and. decider%first == body%velocity)
         end associate
       end associate
     end do
-  end function depends_on_slip
+  end subroutine look_at_slip
 
   !> Whether the rates are the same a period later, without the clock being set back.
   pure logical function repeats(system, body)

@@ -225,7 +225,8 @@ inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tap
   expand(m, fresh, g.s.z, g.s.slip, g.s.crossed, g.t);
   vec natural = natural_length(m, g), end[most_tape_variables], slip, after;
   mask rests = m.turns_freely ? comes_to_rest(m, g) : mask{};
-  mask open = prove_step(m, natural, next_length(m, g, natural), g);
+  vec length = next_length(m, g, natural);
+  mask open = m.proves ? prove_step(m, natural, length, g) : take_length(m, length, g);
   mask to_end = flying & (g.span >= g.c.until - g.s.time);
   tape_event e = find_event(m, open, g);
   mask moves = move(m, e, natural, end, left, g);

@@ -19,6 +19,10 @@ const double shortest_share = 1e-3;
 // Share of its magnitude by which a variable may leave the range of its polynomial, and the part of it that a
 // remainder is to have; the part of a step below which it is tried again; how steps grow at most.
 const double range_share = 1e-8, margin_part = 0.3, least_part = 0.3, most_growth = 2;
+// What a step leaves out, in last terms, where that is not proven; change of a node beyond what its series
+// shows, in that and as a share of its value, above which a step is shortened; by how much, and how often.
+const double estimate = 10, most_shown = 3, change_share = 1e-12, shorter = 0.6;
+const int most_shortenings = 12;
 // Least change of the push of a stop, as its share, over a bounce that chatter does not end with; ten times
 // that of the event loop. Least height of such a bounce, as a share of the length.
 const double least_change = 1e-5, least_height = 1e-12;
@@ -79,12 +83,12 @@ inline vec by_box(const double *table, int stride, const int *box) {
   return y;
 }
 
-// Length of the step by the last two coefficients, in units.
+// Length of the step by the last three coefficients, in units.
 [[gnu::noinline]] inline vec natural_length(const tape_machine &m, const tape_group &g) {
   vec reach = 30;
   for (int i = 0; i < m.variables; i++) {
     vec size = rough_logarithm(larger(magnitude(g.s.z[i]), m.sizes[i]) * m.tolerance);
-    for (int k = tape_order - 1; k <= tape_order; k++)
+    for (int k = tape_order - 2; k <= tape_order; k++)
       reach = smaller(reach, (size - rough_logarithm(magnitude(g.t.of[i][k]))) / double(k));
   }
   return rough_exponential(reach);
@@ -170,6 +174,57 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
     g.decider_error[i] = g.box.series.now[m.decider[i]] * power;
 }
 
+// What a series changes by over a step, at most.
+inline vec change_of(const vec *c, vec length) {
+  vec y = 0;
+  for (int k = tape_order - 1; k > 0; k--)
+    y = (y + magnitude(c[k])) * length;
+  return y;
+}
+
+// Where a function has values, over the range of its arguments in the step, that its series does not show: the
+// series of a function that is nearly constant here knows nothing of a change nearby.
+[[gnu::noinline]] inline mask hides_change(const tape_machine &m, vec length, const tape_group &g) {
+  mask hides = {};
+  for (int i = 0; i < m.checks; i++) {
+    const tape_check &check = m.check[i];
+    const tape_node &n = m.node[check.node];
+    vec inverse, room = change_of(g.t.of[check.first], length), at = g.t.first[n.first];
+    mask sound = ~mask{};
+    interval a = {at - room, at + room}, y;
+    if (check.second >= 0) {
+      room = change_of(g.t.of[check.second], length);
+      interval b = {g.t.first[n.second] - room, g.t.first[n.second] + room};
+      sound = least_of(b) > 0.0;
+      y = product_of(a, {1.0 / b.high, 1.0 / b.low});
+    } else {
+      y = bounds_of_function(n, a, g.box, inverse, sound);
+    }
+    vec value = g.t.first[check.node], change = larger(y.high - value, value - y.low);
+    vec shown = most_shown * change_of(g.t.of[check.own], length) + change_share * magnitude(value);
+    hides = hides | ~(sound & (change <= shown));
+  }
+  return hides;
+}
+
+// The variables over a step up to `length`, in units, with estimates of their errors; the lanes whose step has
+// to be shorter still.
+[[gnu::noinline]] inline mask take_length(const tape_machine &m, vec length, tape_group &g) {
+  vec size[most_tape_variables];
+  mask flying = g.c.status == lane_flying, open = {};
+  for (int i = 0; i < most_shortenings && m.checks > 0; i++) {
+    open = flying & hides_change(m, length, g);
+    if (!any(open))
+      break;
+    put(length, open, shorter * length);
+  }
+  set_variables(m, length, size, g);
+  g.span = length * m.unit;
+  for (int i = 0; i < m.variables; i++)
+    g.error[i] = estimate * m.tolerance * larger(magnitude(g.s.z[i]), m.sizes[i]);
+  return open;
+}
+
 // The variables over a step up to `length`, in units, as far as it is proven, with bounds of their errors;
 // the lanes where a shorter one is to be tried. Where the table of boxes is short of most of the length, the
 // motion's own bounds serve.
@@ -250,7 +305,8 @@ struct tape_fall {
       total += magnitude(p[k]);
       power *= length;
     }
-    vec bound = g.decider_error[s] + (orders * 2.3e-16) * total, sign = pick(g.t.above[s], 1.0, -1.0);
+    vec bound = m.proves ? g.decider_error[s] + (orders * 2.3e-16) * total : estimate * m.tolerance * total;
+    vec sign = pick(g.t.above[s], 1.0, -1.0);
     tape_fall f;
     find_fall(p, sign, magnitude(g.s.crossed) == s + 1.0, bound, f);
     e.unclear = e.unclear | ~(f.falls | f.stays);

@@ -13,7 +13,8 @@ module tape_preparation
     operation_table
   use tape, only: node_t, tape_t
   use tape_bounds, only: bound_coefficients
-  use tape_lane_types, only: lane_node_t, lane_tape_order, most_tape_nodes, most_tape_series, most_tape_switches, &
+  use tape_lane_types, only: lane_node_t, lane_tape_order, most_tape_checks, most_tape_nodes, most_tape_series, &
+    most_tape_switches, &
     most_tape_variables, op_divide_steady, op_scale, op_select_slip, op_slip, &
     op_sin_even, op_cos_even, tape_levels, tape_machine_t, tape_speeds
   use tape_parts, only: needed
@@ -45,8 +46,9 @@ module tape_preparation
     !> goes on there if nothing repeats.
     logical :: clock = .false., goes_on = .false.
     real(wp) :: period = 0, phase_speed = 0
-    !> Turning points are no events; lanes pass the end of a period within a step. See `tape_machine`.
-    logical :: turns_freely = .false., passes = .false.
+    !> What a step leaves out is proven; turning points are no events; lanes pass the end of a period within a step. See
+    !> `tape_machine`.
+    logical :: proves = .true., turns_freely = .false., passes = .false.
     !> Sizes of the variables, and a time [s].
     real(wp), allocatable :: sizes(:)
     real(wp) :: time = 1
@@ -97,6 +99,7 @@ contains
     machine%length = body%length
     machine%throw_factor = body%throw_factor
     if (body%clock) machine%clock = merge(2, 1, body%goes_on)
+    machine%proves = merge(1, 0, body%proves)
     machine%turns_freely = merge(1, 0, body%turns_freely)
     machine%passes = merge(1, 0, body%passes)
     machine%period = body%period
@@ -134,6 +137,7 @@ contains
       machine%decider(switches(i)) = number(body%tape%switches(i)%argument)
       machine%decider_series(switches(i)) = series(body%tape%switches(i)%argument)
     end do
+    if (.not. body%proves) call set_checks(body, is_used, number, series, kept, machine, fits)
     machine%hold = number(body%hold)
     machine%level = optional_number(body%held_by)
     machine%throws = optional_number(body%throws)
@@ -153,6 +157,38 @@ contains
     end function optional_number
 
   end subroutine set_nodes
+
+  !> The nodes that may change more than their series shows: quotients, and functions that are nearly constant far away.
+  pure subroutine set_checks(body, is_used, number, series, kept, machine, fits)
+    type(tape_body_t), intent(in) :: body
+    logical, intent(in) :: is_used(:)
+    integer, intent(in) :: number(0:)
+    integer, intent(inout) :: series(:), kept
+    type(tape_machine_t), intent(inout) :: machine
+    logical, intent(inout) :: fits
+    integer :: i
+    do i = 1, body%tape%count
+      associate (node => body%tape%nodes(i))
+        if (.not. is_used(i) .or. node%is_steady) cycle
+        if (all(node%operation /= [op_divide, op_exp, op_tanh, op_sinh, op_cosh])) cycle
+        if (node%operation == op_divide) then
+          if (body%tape%nodes(node%second)%is_steady) cycle
+          call keep(series(node%second), kept)
+        end if
+        fits = fits .and. machine%checks < most_tape_checks
+        if (.not. fits) return
+        call keep(series(node%first), kept)
+        call keep(series(i), kept)
+        machine%checks = machine%checks + 1
+        associate (made => machine%check(machine%checks))
+          made%node = number(i)
+          made%first = series(node%first)
+          made%own = series(i)
+          if (node%operation == op_divide) made%second = series(node%second)
+        end associate
+      end associate
+    end do
+  end subroutine set_checks
 
   !> Numbers the switching functions in use; one that is the velocity has the sign of slip, and no number.
   pure subroutine number_switches(body, is_used, switches)
@@ -389,7 +425,7 @@ contains
     machine%box(:n) = body%sizes
     machine%speed = [(speed_growth**i, i=1, tape_speeds)]
     machine%level_size = [(2*level_growth**i, i=0, tape_levels - 1)]
-    if (size(body%tape%switches) > 0 .or. body%goes_on) return
+    if (size(body%tape%switches) > 0 .or. body%goes_on .or. .not. body%proves) return
     do speed = 1, merge(1, tape_speeds, body%clock)
       do level = 1, tape_levels
         box = (speed - 1)*tape_levels + level

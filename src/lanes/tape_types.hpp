@@ -14,6 +14,7 @@ enum {
   most_tape_series = 64,
   most_tape_variables = 12,
   most_tape_switches = 8,
+  most_tape_checks = 16,
   tape_levels = 10,
   tape_speeds = 4,
   tape_boxes = tape_levels * tape_speeds,
@@ -67,6 +68,11 @@ struct tape_node {
   double value;
 };
 
+// A node that may change more than its series shows, with the series of its arguments (-1: none) and its own.
+struct tape_check {
+  int node, first, second, own;
+};
+
 struct tape_region {
   double attractor, point[most_tape_section], scaling[most_tape_section], metric[tape_metric_numbers], reach;
 };
@@ -77,15 +83,17 @@ struct tape_region {
 // Nodes before `by_slip` are numbers, those from there to `varying` depend on the sign of slip alone.
 struct tape_machine {
   int nodes, by_slip, varying, variables, clock, switches;
-  // Forces do not depend on the sign of slip, and there are no stops: turning points are no events. Forces
-  // repeat after a period as they are: lanes pass its end within a step.
-  int turns_freely, passes;
+  // There are impacts or dry friction: what a step leaves out is proven, else `checks` serve. Forces do not depend on
+  // the sign of the velocity, and there are no stops: turning points are no events. Forces repeat after a period
+  // as they are: lanes pass its end within a step.
+  int proves, turns_freely, passes, checks;
   // Nodes of what acts on the body at rest, holds it there, and is thrown at an impact, and of the
   // restitution; -1: none, or a number.
   int hold, level, throws, bounce;
   int rate[most_tape_variables];
   // Switching functions: nodes and series.
   int decider[most_tape_switches], decider_series[most_tape_switches];
+  tape_check check[most_tape_checks];
   tape_node node[most_tape_nodes];
   // The time is counted in this unit [s]. Sizes of the variables for the length of a step.
   double unit, tolerance, sizes[most_tape_variables];
