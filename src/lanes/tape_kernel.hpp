@@ -73,8 +73,8 @@ inline mask stop_or_pass_clock(const tape_machine &m, const tape_batch &batch, m
   if (!any(there))
     return moves;
   mask cut = there & (e.turns | e.hits | e.left | (e.crosses != 0.0));
-  for (int i = 0; i < m.variables; i++) {
-    z[i] = value_at(g.p[i], cross);
+  for (int i = tape_x; i < m.variables; i++) {
+    z[i] = variable_at(m, g, i, cross);
     put(end[i], cut, z[i]);
   }
   put(e.at, cut, cross);
@@ -198,8 +198,13 @@ inline mask move(const tape_machine &m, const tape_event &e, vec natural, vec *e
   put(g.s.limit, unclear, 0.5 * (g.span / m.unit));
   left = (unclear & ~(g.s.limit >= shortest_share * natural)) | (g.c.flights >= g.c.budget);
   mask moves = flying & ~unclear & ~left, finite = moves;
-  for (int i = 0; i < m.variables; i++) {
-    end[i] = value_at(g.p[i], e.at);
+  if (m.clock) {
+    vec time = e.at * g.span;
+    end[0] = g.s.z[0] + time;
+    end[1] = g.s.z[1] + time * m.phase_speed;
+  }
+  for (int i = m.clock ? int(tape_x) : 0; i < m.variables; i++) {
+    end[i] = variable_at(m, g, i, e.at);
     finite = finite & (magnitude(end[i]) < 1e300);
   }
   left = left | (moves & ~finite);
@@ -248,7 +253,7 @@ inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tap
     moves = moves & (g.c.status != lane_stopped);
   }
   put(g.s.slip, moves, slip);
-  for (int i = 0; i < m.variables; i++)
+  for (int i = m.clock ? int(tape_x) : 0; i < m.variables; i++)
     put(g.s.z[i], moves, end[i]);
   if (m.clock) {
     put(g.s.time, moves, after);

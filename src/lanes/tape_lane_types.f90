@@ -27,7 +27,7 @@ module tape_lane_types
 
   !> Mirrors `tape_check` of tape_types.hpp.
   type, bind(c), public :: lane_check_t
-    integer(c_int) :: node = 0, first = -1, second = -1, own = -1
+    integer(c_int) :: node = 0, argument = -1, own = -1, unused = 0
   end type lane_check_t
 
   !> Mirrors `tape_region` of tape_types.hpp.

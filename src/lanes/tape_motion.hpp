@@ -21,7 +21,8 @@ const double shortest_share = 1e-3;
 const double range_share = 1e-8, margin_part = 0.3, least_part = 0.3, most_growth = 2;
 // What a step leaves out, in last terms, where that is not proven; change of a node beyond what its series
 // shows, in that and as a share of its value, above which a step is shortened; by how much, and how often.
-const double estimate = 10, most_shown = 3, change_share = 1e-12, shorter = 0.6;
+const double estimate = 10, most_shown = 3, change_share = 1e-12, most_lost = 0.9,
+             shorter = 0.6;
 const int most_shortenings = 12;
 // Least change of the push of a stop, as its share, over a bounce that chatter does not end with; ten times
 // that of the event loop. Least height of such a bounce, as a share of the length.
@@ -86,7 +87,7 @@ inline vec by_box(const double *table, int stride, const int *box) {
 // Length of the step by the last three coefficients, in units.
 [[gnu::noinline]] inline vec natural_length(const tape_machine &m, const tape_group &g) {
   vec reach = 30;
-  for (int i = 0; i < m.variables; i++) {
+  for (int i = m.clock ? int(tape_x) : 0; i < m.variables; i++) {
     vec size = rough_logarithm(larger(magnitude(g.s.z[i]), m.sizes[i]) * m.tolerance);
     for (int k = tape_order - 2; k <= tape_order; k++)
       reach = smaller(reach, (size - rough_logarithm(magnitude(g.t.of[i][k]))) / double(k));
@@ -174,6 +175,11 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
     g.decider_error[i] = g.box.series.now[m.decider[i]] * power;
 }
 
+// A variable at a fraction of the step.
+inline vec variable_at(const tape_machine &m, const tape_group &g, int i, vec fraction) {
+  return m.turns_freely ? value_at(g.t.of[i], fraction * (g.span / m.unit)) : value_at(g.p[i], fraction);
+}
+
 // What a series changes by over a step, at most.
 inline vec change_of(const vec *c, vec length) {
   vec y = 0;
@@ -182,27 +188,25 @@ inline vec change_of(const vec *c, vec length) {
   return y;
 }
 
-// Where a function has values, over the range of its arguments in the step, that its series does not show: the
-// series of a function that is nearly constant here knows nothing of a change nearby.
+// Where a function has values, over the range of its argument in the step, that its series does not show: the
+// series of a function that is nearly constant here knows nothing of a change nearby. A divisor must not lose
+// most of its size.
 [[gnu::noinline]] inline mask hides_change(const tape_machine &m, vec length, const tape_group &g) {
   mask hides = {};
   for (int i = 0; i < m.checks; i++) {
     const tape_check &check = m.check[i];
     const tape_node &n = m.node[check.node];
-    vec inverse, room = change_of(g.t.of[check.first], length), at = g.t.first[n.first];
-    mask sound = ~mask{};
-    interval a = {at - room, at + room}, y;
-    if (check.second >= 0) {
-      room = change_of(g.t.of[check.second], length);
-      interval b = {g.t.first[n.second] - room, g.t.first[n.second] + room};
-      sound = least_of(b) > 0.0;
-      y = product_of(a, {1.0 / b.high, 1.0 / b.low});
-    } else {
-      y = bounds_of_function(n, a, g.box, inverse, sound);
+    vec room = change_of(g.t.of[check.argument], length);
+    if (n.operation == tape_divide) {
+      hides = hides | ~(room <= most_lost * magnitude(g.t.first[n.second]));
+      continue;
     }
-    vec value = g.t.first[check.node], change = larger(y.high - value, value - y.low);
+    vec at = g.t.first[n.first], value = g.t.first[check.node], inverse;
+    mask sound = {};
+    interval y = bounds_of_function(n, {at - room, at + room}, g.box, inverse, sound);
+    vec change = larger(y.high - value, value - y.low);
     vec shown = most_shown * change_of(g.t.of[check.own], length) + change_share * magnitude(value);
-    hides = hides | ~(sound & (change <= shown));
+    hides = hides | ~(change <= shown);
   }
   return hides;
 }
@@ -218,7 +222,8 @@ inline vec change_of(const vec *c, vec length) {
       break;
     put(length, open, shorter * length);
   }
-  set_variables(m, length, size, g);
+  if (!m.turns_freely)
+    set_variables(m, length, size, g);
   g.span = length * m.unit;
   for (int i = 0; i < m.variables; i++)
     g.error[i] = estimate * m.tolerance * larger(magnitude(g.s.z[i]), m.sizes[i]);

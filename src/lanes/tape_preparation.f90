@@ -13,7 +13,7 @@ module tape_preparation
     operation_table
   use tape, only: node_t, tape_t
   use tape_bounds, only: bound_coefficients
-  use tape_lane_types, only: lane_node_t, lane_tape_order, most_tape_checks, most_tape_nodes, most_tape_series, &
+  use tape_lane_types, only: lane_check_t, lane_node_t, lane_tape_order, most_tape_checks, most_tape_nodes, most_tape_series, &
     most_tape_switches, &
     most_tape_variables, op_divide_steady, op_scale, op_select_slip, op_slip, &
     op_sin_even, op_cos_even, tape_levels, tape_machine_t, tape_speeds
@@ -166,26 +166,19 @@ contains
     integer, intent(inout) :: series(:), kept
     type(tape_machine_t), intent(inout) :: machine
     logical, intent(inout) :: fits
-    integer :: i
+    integer :: i, argument
     do i = 1, body%tape%count
       associate (node => body%tape%nodes(i))
         if (.not. is_used(i) .or. node%is_steady) cycle
-        if (all(node%operation /= [op_divide, op_exp, op_tanh, op_sinh, op_cosh])) cycle
-        if (node%operation == op_divide) then
-          if (body%tape%nodes(node%second)%is_steady) cycle
-          call keep(series(node%second), kept)
-        end if
+        if (all(node%operation /= [op_divide, op_exp, op_tanh])) cycle
+        argument = merge(node%second, node%first, node%operation == op_divide)
+        if (body%tape%nodes(argument)%is_steady) cycle
         fits = fits .and. machine%checks < most_tape_checks
         if (.not. fits) return
-        call keep(series(node%first), kept)
+        call keep(series(argument), kept)
         call keep(series(i), kept)
         machine%checks = machine%checks + 1
-        associate (made => machine%check(machine%checks))
-          made%node = number(i)
-          made%first = series(node%first)
-          made%own = series(i)
-          if (node%operation == op_divide) made%second = series(node%second)
-        end associate
+        machine%check(machine%checks) = lane_check_t(number(i), series(argument), series(i))
       end associate
     end do
   end subroutine set_checks

@@ -68,9 +68,10 @@ struct tape_node {
   double value;
 };
 
-// A node that may change more than its series shows, with the series of its arguments (-1: none) and its own.
+// A node that may change more than its series shows, with the series of its argument and its own; of a quotient
+// that of the divisor.
 struct tape_check {
-  int node, first, second, own;
+  int node, argument, own, unused;
 };
 
 struct tape_region {
