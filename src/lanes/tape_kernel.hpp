@@ -211,17 +211,20 @@ inline mask move(const tape_machine &m, const tape_event &e, vec natural, vec *e
   return moves & finite;
 }
 
-// The end of a step of the lanes with a crank.
-inline void end_step(const tape_machine &m, const tape_batch &batch, mask moves, const tape_event &e,
+// The end of a step of the lanes with a crank; those that do not stop at the section, whose state is there
+// already.
+inline mask end_step(const tape_machine &m, const tape_batch &batch, mask moves, const tape_event &e,
                      mask to_end, vec *end, tape_group &g) {
   mask past = moves & (end[tape_phase] >= two_pi);
   put(g.s.time, moves & ~past, g.s.time + e.at * g.span);
   if (any(past))
     pass_section(m, batch, past, e.at, e.section, end, g);
-  mask ends = moves & (g.c.status == lane_flying) & to_end & ~(e.turns | e.hits) & (e.crosses == 0.0);
+  moves = moves & (g.c.status == lane_flying);
+  mask ends = moves & to_end & ~(e.turns | e.hits) & (e.crosses == 0.0);
   put(g.s.time, ends, g.c.until);
   put(g.c.status, ends, lane_stopped);
   put(g.c.flights, ends, g.c.flights + 1.0);
+  return moves;
 }
 
 // One step of the lanes that are flying.
@@ -248,10 +251,8 @@ inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tap
   put(g.s.limit, moves, 1e300);
   put(g.s.crossed, moves, e.crosses);
   put(g.c.flights, moves & (e.turns | e.hits), g.c.flights + 1.0);
-  if (!m.clock) {
-    end_step(m, batch, moves, e, to_end, end, g);
-    moves = moves & (g.c.status != lane_stopped);
-  }
+  if (!m.clock)
+    moves = end_step(m, batch, moves, e, to_end, end, g);
   put(g.s.slip, moves, slip);
   for (int i = m.clock ? int(tape_x) : 0; i < m.variables; i++)
     put(g.s.z[i], moves, end[i]);

@@ -242,6 +242,7 @@ inline vec change_of(const vec *c, vec length) {
     look_up(m, length, size, proof);
     wants = flying & (proof.length < 0.7 * length);
   }
+  put(g.s.proven, flying & ~wants, smaller(most_growth * g.s.proven, 1));
   if (any(wants)) {
     prove_by_bounds(m, length, g, own, growth);
     put(g.s.proven, wants, smaller(length / natural * smaller(growth, most_growth), 1));
