@@ -10,7 +10,8 @@ module tape_bodies
   use motor_system, only: body_held, both_move, motor_system_t
   use operations, only: op_parameter, op_select, op_variable
   use tape_parts, only: needed
-  use tape_preparation, only: far, prepare_tape_lanes, tape_body_t
+  use tape_body, only: far, tape_body_t
+  use tape_preparation, only: prepare_tape_lanes
   use tape_value, only: evaluate
   implicit none
   private

@@ -92,8 +92,18 @@ inline interval bounds_of_function(const tape_node &n, interval a, const tape_bo
 }
 
 // Interval of a node; `sound`: it is defined all over the box.
-inline interval bounds_of_node(const tape_node &n, const interval *z, const tape_box &box, vec &inverse,
-                               mask &sound) {
+inline interval bounds_of_node(const tape_machine &m, const tape_node &n, const interval *z,
+                               const tape_box &box, vec &inverse, mask &sound) {
+  if (n.operation == tape_sum) {
+    interval total = {vec(0), vec(0)};
+    if (n.other >= 0)
+      total = box.of[n.other];
+    for (int i = n.first; i < n.first + n.second; i++) {
+      interval y = product_of(box.of[m.term[i].factor], box.of[m.term[i].node]);
+      total = {total.low + y.low, total.high + y.high};
+    }
+    return total;
+  }
   const interval a = box.of[n.first], b = box.of[n.second];
   switch (n.operation) {
   case tape_variable:
@@ -138,7 +148,7 @@ inline interval bounds_of_node(const tape_node &n, const interval *z, const tape
     const tape_node &n = m.node[i];
     interval y = {t.first[i], t.first[i]};
     if (i >= m.varying) {
-      y = bounds_of_node(n, z, box, b.inverse[i], sound);
+      y = bounds_of_node(m, n, z, box, b.inverse[i], sound);
       vec room = interval_rounding * most_of(y) + tiny_number;
       y = {y.low - room, y.high + room};
     }

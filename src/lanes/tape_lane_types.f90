@@ -10,13 +10,13 @@ module tape_lane_types
 
   integer, parameter, public :: tape_lane_count = 16
   integer, parameter, public :: lane_tape_order = 18, most_tape_nodes = 192, most_tape_series = 64, most_tape_variables = 12, &
-    most_tape_switches = 8, most_tape_checks = 16, tape_levels = 10, tape_speeds = 4, &
+    most_tape_switches = 8, most_tape_checks = 16, most_tape_terms = 256, tape_levels = 10, tape_speeds = 4, &
     tape_boxes = tape_levels*tape_speeds, most_tape_section = 10, most_tape_regions = 64
   integer, parameter :: metric_numbers = (most_tape_section*(most_tape_section + 1))/2
   !> Operations beside those of `operations`: products and quotients with a factor that does not vary; the sign of slip, and a branch
-  !> by it; sine and cosine of an argument that grows evenly in time.
+  !> by it; sine and cosine of an argument that grows evenly in time; a sum of terms.
   integer, parameter, public :: op_scale = 25, op_divide_steady = 26, op_slip = 27, op_select_slip = 28, op_sin_even = 29, &
-    op_cos_even = 30
+    op_cos_even = 30, op_sum = 31
 
   !> Mirrors `tape_node` of tape_types.hpp. Numbers of nodes and series begin with 0.
   type, bind(c), public :: lane_node_t
@@ -24,6 +24,11 @@ module tape_lane_types
       other = 0
     real(c_double) :: value = 0
   end type lane_node_t
+
+  !> Mirrors `tape_term` of tape_types.hpp.
+  type, bind(c), public :: lane_term_t
+    integer(c_int) :: node = 0, factor = 0
+  end type lane_term_t
 
   !> Mirrors `tape_check` of tape_types.hpp.
   type, bind(c), public :: lane_check_t
@@ -39,9 +44,10 @@ module tape_lane_types
   !> Mirrors `tape_machine` of tape_types.hpp.
   type, bind(c), public :: tape_machine_t
     integer(c_int) :: nodes = 0, by_slip = 0, varying = 0, variables = 0, clock = 0, switches = 0, proves = 1, turns_freely = 0, &
-      passes = 0, checks = 0, hold = 0, level = -1, throws = -1, bounce = -1
+      passes = 0, checks = 0, terms = 0, unused = 0, hold = 0, level = -1, throws = -1, bounce = -1
     integer(c_int) :: rate(most_tape_variables) = 0, decider(most_tape_switches) = 0, decider_series(most_tape_switches) = -1
     type(lane_check_t) :: check(most_tape_checks)
+    type(lane_term_t) :: term(most_tape_terms)
     type(lane_node_t) :: node(most_tape_nodes)
     real(c_double) :: unit = 1, tolerance = 0, sizes(most_tape_variables) = 1
     real(c_double) :: box(most_tape_variables) = 1, speed(tape_speeds) = 0, level_size(tape_levels) = 0, &

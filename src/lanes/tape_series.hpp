@@ -56,6 +56,15 @@ template <int k> LANE_LEAF vec square_term(const vec *a) {
   return k % 2 == 0 ? total + a[k / 2] * a[k / 2] : total;
 }
 
+// Sum of the terms of a node.
+LANE_LEAF vec sum_of_terms(const tape_machine &m, const tape_node &n, const vec *factors, const vec *values) {
+  const tape_term *term = &m.term[n.first];
+  vec y = factors[term->factor] * values[term->node];
+  for (int i = 1; i < n.second; i++)
+    y += factors[term[i].factor] * values[term[i].node];
+  return y;
+}
+
 // Value of a function at the state, and what its series is divided by.
 inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &inverse) {
   vec y, other;
@@ -98,7 +107,10 @@ inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &
 }
 
 // Value of a node at the state. Where a switching function crosses zero, `crossed` states its side.
-inline vec value_of(const tape_node &n, int i, const vec *z, vec slip, vec crossed, tape_values &t) {
+inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec crossed, tape_values &t) {
+  const tape_node &n = m.node[i];
+  if (n.operation == tape_sum)
+    return n.other < 0 ? sum_of_terms(m, n, t.first, t.first) : sum_of_terms(m, n, t.first, t.first) + t.first[n.other];
   const vec &a = t.first[n.first], &b = t.first[n.second];
   switch (n.operation) {
   case tape_variable:
@@ -137,7 +149,7 @@ inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, ve
   t.slip = slip;
   for (int i = from; i < m.nodes; i++) {
     const tape_node &n = m.node[i];
-    vec y = value_of(n, i, z, slip, crossed, t);
+    vec y = value_of(m, i, z, slip, crossed, t);
     t.first[i] = y;
     if (n.series >= 0)
       t.of[n.series][0] = y;
@@ -155,7 +167,10 @@ inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, ve
 
 // Coefficient k > 0 of a node from lower ones and those of its arguments; with `bounds` a bound of its
 // magnitude from theirs.
-template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_node &n, int i, tape_values &t) {
+template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_machine &m, int i, tape_values &t) {
+  const tape_node &n = m.node[i];
+  if (n.operation == tape_sum)
+    return sum_of_terms(m, n, t.first, t.now);
   const vec &a = t.now[n.first], &b = t.now[n.second];
   const series *of = t.of;
   auto less = [](vec x, vec y) { return bounds ? x + y : x - y; };
@@ -213,7 +228,7 @@ template <int k, bool bounds> inline void raise_orders(const tape_machine &m, ta
   if constexpr (k < tape_order + bounds) {
     for (int i = m.varying; i < m.nodes; i++) {
       const tape_node &n = m.node[i];
-      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient<k, bounds>(n, i, t);
+      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient<k, bounds>(m, i, t);
       t.now[i] = y;
       if (n.series >= 0)
         t.of[n.series][k] = y;

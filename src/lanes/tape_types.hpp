@@ -15,6 +15,7 @@ enum {
   most_tape_variables = 12,
   most_tape_switches = 8,
   most_tape_checks = 16,
+  most_tape_terms = 256,
   tape_levels = 10,
   tape_speeds = 4,
   tape_boxes = tape_levels * tape_speeds,
@@ -57,7 +58,9 @@ enum {
   tape_select_slip,
   // Of an argument that grows evenly in time.
   tape_sin_even,
-  tape_cos_even
+  tape_cos_even,
+  // Of terms from number `first` on, `second` of them, and the node `other` that does not vary (-1: none).
+  tape_sum
 };
 
 // A node: numbers of its arguments, and where their series and its own are kept (-1: not). Of functions the
@@ -66,6 +69,11 @@ enum {
 struct tape_node {
   int operation, first, second, first_series, second_series, series, slopes, other;
   double value;
+};
+
+// A node times one that does not vary.
+struct tape_term {
+  int node, factor;
 };
 
 // A node that may change more than its series shows, with the series of its argument and its own; of a quotient
@@ -87,7 +95,7 @@ struct tape_machine {
   // There are impacts or dry friction: what a step leaves out is proven, else `checks` serve. Forces do not depend on
   // the sign of the velocity, and there are no stops: turning points are no events. Forces repeat after a period
   // as they are: lanes pass its end within a step.
-  int proves, turns_freely, passes, checks;
+  int proves, turns_freely, passes, checks, terms, unused;
   // Nodes of what acts on the body at rest, holds it there, and is thrown at an impact, and of the
   // restitution; -1: none, or a number.
   int hold, level, throws, bounce;
@@ -95,6 +103,7 @@ struct tape_machine {
   // Switching functions: nodes and series.
   int decider[most_tape_switches], decider_series[most_tape_switches];
   tape_check check[most_tape_checks];
+  tape_term term[most_tape_terms];
   tape_node node[most_tape_nodes];
   // The time is counted in this unit [s]. Sizes of the variables for the length of a step.
   double unit, tolerance, sizes[most_tape_variables];
