@@ -18,6 +18,7 @@ import h5py
 import heyoka
 import numpy as np
 from expressions_peers import DURATION, MACHINES, Machine, Peer
+
 from motor import FEW, SOURCE, bold, peer_rate, processor_time, three_digits
 
 if TYPE_CHECKING:
@@ -43,7 +44,17 @@ class Case:
         self.case.write_text(self.text, encoding="utf-8")
         rows = [",".join(map(repr, start)) for start in self.starts[:count].tolist()]
         self.listed.write_text("x0,v0\n" + "\n".join(rows) + "\n", encoding="utf-8")
-        words = ["points", self.case, "--list", self.listed, "-o", self.path, "--force", "--quiet", *self.words]
+        words = [
+            "points",
+            self.case,
+            "--list",
+            self.listed,
+            "-o",
+            self.path,
+            "--force",
+            "--quiet",
+            *self.words,
+        ]
         return processor_time(self.program, *words)
 
     def rate(self) -> float:
@@ -75,15 +86,16 @@ def runs_of(
 
 
 def accuracy(machine: Machine, program: Path, folder: Path, starts: np.ndarray) -> str:
-    """Deviations from heyoka at 1e-15."""
-    few = starts[:200]
-    exact = Peer(machine, 1e-15, 0).run(few)
-    ours = np.max(np.abs(Case(program, folder, machine.case, few).ends() - exact))
-    theirs = np.max(np.abs(Peer(machine, TOLERANCE, 0).run(few) - exact))
-    text = f"ours {ours:.1e}, heyoka's {theirs:.1e}"
+    """Deviations from the event loop, whose steps are proven."""
+    few = starts[:100]
+    exact = Case(program, folder, machine.case, few, "--set", 'integrator.lanes="off"').ends()
+    ends = {"lanes": Case(program, folder, machine.case, few).ends()}
     if machine.built_in:
-        text += f", the built-in law's {np.max(np.abs(Case(program, folder, machine.built_in, few).ends() - exact)):.1e}"
-    return f"* {machine.name}: {text}"
+        ends["built-in law"] = Case(program, folder, machine.built_in, few).ends()
+    for tolerance in (TOLERANCE, 1e-15):
+        ends[f"heyoka at {tolerance:g}"] = Peer(machine, tolerance, 0).run(few)
+    texts = [f"{name} {np.max(np.abs(values - exact)):.1e}" for name, values in ends.items()]
+    return f"* {machine.name}: {', '.join(texts)}"
 
 
 def page_of(rates: dict[str, dict[str, list[float]]], text: list[str], commit: str, rounds: int) -> str:
@@ -112,7 +124,7 @@ def page_of(rates: dict[str, dict[str, list[float]]], text: list[str], commit: s
         "| ratio | " + " | ".join(best) + " | goal |",
         "| --- |" + " --- |" * (len(best) + 1),
         *(
-            f"| {name} | " + " | ".join(bold(runs[a] / runs[b], goal) for runs in best.values()) + f" | {goal} |"
+            f"| {name} | {' | '.join(bold(runs[a] / runs[b], goal) for runs in best.values())} | {goal} |"
             for name, a, b, goal in RATIOS
         ),
         "| expression to built-in law | "
@@ -123,7 +135,8 @@ def page_of(rates: dict[str, dict[str, list[float]]], text: list[str], commit: s
         + " | 0.77 |",
         "",
         "A ratio in bold is below its goal.",
-        "Largest deviations at the end from heyoka at 1e-15, over 200 starts (m, m/s):",
+        "Largest deviations at the end from the event loop, whose steps are proven, over 100 starts.",
+        "heyoka steps over the thin layer of the tanh friction at either tolerance:",
         "",
         *text,
     ]

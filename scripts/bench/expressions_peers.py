@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Driven bodies of one degree of freedom as cases by expressions, as cases by built-in laws, and by heyoka."""
+"""Driven bodies as cases by expressions, as cases by built-in laws, and by heyoka."""
 
 from __future__ import annotations
 
@@ -128,7 +128,8 @@ MACHINES = [
         "LuGre",
         HEAD
         + '[restoring]\nlaw = "expression"\nforce = "-k*x"\nk = "2 N/m"\n'
-        + '[force.other]\nforce = "f*cos(phase) - s0*z - s2*v"\nf = "1.5 N"\ns0 = "100 N/m"\ns2 = "0.4 N s/m"\n'
+        + '[force.other]\nforce = "f*cos(phase) - s0*z - s2*v"\nf = "1.5 N"\n'
+        + 's0 = "100 N/m"\ns2 = "0.4 N s/m"\n'
         + '[state.z]\nrate = "v - s0/(fc + (fs - fc)*exp(-(v/vs)^2))*abs(v)*z"\nstart = "0 m"\n'
         + 's0 = "100 N/m"\nfc = "0.5 N"\nfs = "0.8 N"\nvs = "0.2 m/s"\n'
         + FREE

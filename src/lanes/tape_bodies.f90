@@ -46,8 +46,8 @@ contains
     call prepare_tape_lanes(body, flow)
   end subroutine prepare_motor_lanes
 
-  !> The same of a body by expressions; `scales` are the sizes of position, velocity and states, `period` [s] is that of its section,
-  !> `domain` [m] is the farthest position.
+  !> The same of a body by expressions; `scales` are the sizes of position, velocity and states, `period` [s] is that of its
+  !> section, `domain` [m] is the farthest position.
   pure subroutine prepare_own_lanes(system, scales, period, domain, flow)
     type(motor_system_t), intent(in) :: system
     real(wp), intent(in) :: scales(:), period, domain

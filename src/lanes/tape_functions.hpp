@@ -27,12 +27,12 @@ inline vec growth(vec x) { return pick(x < 700.0, exponential(x), infinite); }
 inline vec logarithm_or_none(vec x) { return pick((x > 1e-300) & (x < infinite), logarithm(x), undefined); }
 
 // sinh x/x - 1 and cosh x - 1 over x^2, for |x| <= 1.
-const double sinh_series[9] = {1.0 / 6,         1.0 / 120,         1.0 / 5040,
-                               1.0 / 362880,    1.0 / 39916800,    1.0 / 6227020800,
-                               1.0 / 1307674368e3, 1.0 / 355687428096e3, 1.0 / 121645100408832e3};
-const double cosh_series[9] = {1.0 / 2,        1.0 / 24,         1.0 / 720,
-                               1.0 / 40320,    1.0 / 3628800,    1.0 / 479001600,
-                               1.0 / 87178291200, 1.0 / 20922789888e3, 1.0 / 6402373705728e3};
+const double sinh_series[9] = {
+    1.0 / 6,          1.0 / 120,          1.0 / 5040,           1.0 / 362880,           1.0 / 39916800,
+    1.0 / 6227020800, 1.0 / 1307674368e3, 1.0 / 355687428096e3, 1.0 / 121645100408832e3};
+const double cosh_series[9] = {
+    1.0 / 2,         1.0 / 24,          1.0 / 720,           1.0 / 40320,          1.0 / 3628800,
+    1.0 / 479001600, 1.0 / 87178291200, 1.0 / 20922789888e3, 1.0 / 6402373705728e3};
 
 inline vec hyperbolic_sine(vec x) {
   vec size = magnitude(x), z = x * x, far = growth(size);
@@ -69,7 +69,7 @@ const double eighths_low[9] = {0.0,
                                1.5834785051444286e-17,
                                -2.1478388444456983e-17,
                                3.061616997868383e-17};
-const double atan_series[10] = {-1.0 / 3,  1.0 / 5,  -1.0 / 7,  1.0 / 9,  -1.0 / 11,
+const double atan_series[10] = {-1.0 / 3, 1.0 / 5,   -1.0 / 7, 1.0 / 9,   -1.0 / 11,
                                 1.0 / 13, -1.0 / 15, 1.0 / 17, -1.0 / 19, 1.0 / 21};
 
 inline vec arc_tangent(vec x) {

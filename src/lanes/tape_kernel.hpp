@@ -129,19 +129,19 @@ inline vec bounce(const tape_machine &m, const tape_event &e, vec *end, tape_gro
 }
 
 // What acts on the body at rest at the end of the step, what holds it, and which way it then slips, if it
-// does so for either sign of slip.
+// does so for either sign of slip where branches depend on that.
 inline mask forces_at_rest(const tape_machine &m, const vec *end, tape_group &g, vec &force, vec &level,
                            vec &slip) {
   level = m.hold_level;
   mask moves = ~mask{};
-  vec same;
-  for (int sign = -1; sign <= 1; sign += 2) {
+  vec same = 0;
+  for (int sign = m.branches_by_slip ? -1 : 1; sign <= 1; sign += 2) {
     evaluate(m, m.by_slip, end, g.s.slip * double(sign), 0, g.t);
     force = g.t.first[m.hold];
     if (m.level >= 0)
       level = g.t.first[m.level];
     moves = moves & slips_on(force, level, slip);
-    if (sign < 0)
+    if (sign < 0 || !m.branches_by_slip)
       same = slip;
   }
   return moves & (same == slip);
@@ -272,7 +272,7 @@ inline void fly_tape(const tape_machine &m, lane_batch &control, tape_batch &bat
     put(g.c.status, sent, lane_flying);
     for (int i = 0; i < tape_members; i++)
       memcpy((vec *)&g.s + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
-    g.boxed = false;
+    g.box_is_set = false;
     for (bool fresh = true; !any(sent & (g.c.status != lane_flying)); fresh = false)
       step(m, batch, fresh, g);
     g.c.exchange(control.fields, first, [](double *to, const vec &from) { memcpy(to, &from, sizeof from); });

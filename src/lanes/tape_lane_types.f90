@@ -13,8 +13,8 @@ module tape_lane_types
     most_tape_switches = 8, most_tape_checks = 16, most_tape_terms = 256, tape_levels = 10, tape_speeds = 4, &
     tape_boxes = tape_levels*tape_speeds, most_tape_section = 10, most_tape_regions = 64
   integer, parameter :: metric_numbers = (most_tape_section*(most_tape_section + 1))/2
-  !> Operations beside those of `operations`: products and quotients with a factor that does not vary; the sign of slip, and a branch
-  !> by it; sine and cosine of an argument that grows evenly in time; a sum of terms.
+  !> Operations beside those of `operations`: products and quotients with a factor that does not vary; the sign of slip, and a
+  !> branch by it; sine and cosine of an argument that grows evenly in time; a sum of terms.
   integer, parameter, public :: op_scale = 25, op_divide_steady = 26, op_slip = 27, op_select_slip = 28, op_sin_even = 29, &
     op_cos_even = 30, op_sum = 31
 
@@ -44,7 +44,7 @@ module tape_lane_types
   !> Mirrors `tape_machine` of tape_types.hpp.
   type, bind(c), public :: tape_machine_t
     integer(c_int) :: nodes = 0, by_slip = 0, varying = 0, variables = 0, clock = 0, switches = 0, proves = 1, turns_freely = 0, &
-      passes = 0, checks = 0, terms = 0, unused = 0, hold = 0, level = -1, throws = -1, bounce = -1
+      passes = 0, checks = 0, terms = 0, branches_by_slip = 0, hold = 0, level = -1, throws = -1, bounce = -1
     integer(c_int) :: rate(most_tape_variables) = 0, decider(most_tape_switches) = 0, decider_series(most_tape_switches) = -1
     type(lane_check_t) :: check(most_tape_checks)
     type(lane_term_t) :: term(most_tape_terms)

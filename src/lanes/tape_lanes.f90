@@ -98,8 +98,8 @@ contains
     batch%proven(lane) = 1
   end subroutine occupy_tape_lane
 
-  !> The motion in a lane: where it stopped, of a crank with `passed` on the section `lasted` [s] after the last one, or at the start
-  !> of the step that is left to the event loop.
+  !> The motion in a lane: where it stopped, of a crank with `passed` on the section `lasted` [s] after the last one, or at the
+  !> start of the step that is left to the event loop.
   pure subroutine tape_lane_state(clock, lane, batch, state, crank, passed, lasted)
     logical, intent(in) :: clock
     integer, intent(in) :: lane

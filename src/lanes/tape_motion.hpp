@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
 // One certified step of every lane, to its first event: a turning point, an impact, or the end of the step.
-// The section of a crank does not change the equations: lanes pass it within a step. That of a clock ends one.
+// The section of a crank does not change the equations: lanes pass it within a step. That of a clock ends
+// one.
 #ifndef SEPARATRIX_TAPE_MOTION_HPP
 #define SEPARATRIX_TAPE_MOTION_HPP
 

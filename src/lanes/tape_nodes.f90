@@ -61,6 +61,7 @@ contains
       if (.not. (is_used(i) .and. fits)) cycle
       associate (made => machine%node(number(i) + 1))
         call set_node(body, i, number, series, slopes, switches, made, fits)
+        if (made%operation == op_select_slip) machine%branches_by_slip = 1
         if (sum_of(i) > 0) call set_sum(sums(sum_of(i)), number, machine%terms, machine%term, made, fits)
       end associate
     end do

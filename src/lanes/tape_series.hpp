@@ -110,7 +110,8 @@ inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &
 inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec crossed, tape_values &t) {
   const tape_node &n = m.node[i];
   if (n.operation == tape_sum)
-    return n.other < 0 ? sum_of_terms(m, n, t.first, t.first) : sum_of_terms(m, n, t.first, t.first) + t.first[n.other];
+    return n.other < 0 ? sum_of_terms(m, n, t.first, t.first)
+                       : sum_of_terms(m, n, t.first, t.first) + t.first[n.other];
   const vec &a = t.first[n.first], &b = t.first[n.second];
   switch (n.operation) {
   case tape_variable:
@@ -205,7 +206,8 @@ template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_machine &m, i
   case tape_tanh:
     return products<k, 1, 0>(of[n.first_series], of[n.second_series]) * inverse_of[k];
   case tape_cos:
-    return products<k, 1, 0>(of[n.first_series], of[n.second_series]) * (bounds ? inverse_of[k] : -inverse_of[k]);
+    return products<k, 1, 0>(of[n.first_series], of[n.second_series]) *
+           (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_sin_even:
     return of[n.first_series][1] * of[n.second_series][k - 1] * inverse_of[k];
   case tape_cos_even:

@@ -20,8 +20,7 @@ const double shortest_share = 1e-3;
 const double range_share = 1e-8, margin_part = 0.3, least_part = 0.3, most_growth = 2;
 // What a step leaves out, in last terms, where that is not proven; change of a node beyond what its series
 // shows, in that and as a share of its value, above which a step is shortened; by how much, and how often.
-const double estimate = 10, most_shown = 3, change_share = 1e-12, most_lost = 0.9,
-             shorter = 0.6;
+const double estimate = 10, most_shown = 3, change_share = 1e-12, most_lost = 0.9, shorter = 0.6;
 const int most_shortenings = 12;
 // Least change of the push of a stop, as its share, over a bounce that chatter does not end with; ten times
 // that of the event loop. Least height of such a bounce, as a share of the length.
@@ -55,7 +54,7 @@ struct tape_group {
   tape_values t;
   tape_box box;
   // The box knows the numbers.
-  bool boxed;
+  bool box_is_set;
   // Of the step: its length [s], the variables over it, bounds of their errors and of those of switching
   // functions.
   vec span;
@@ -147,8 +146,8 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
     margin[i] = range_share * most_of(range[i]) + 1e-70;
     range[i] = {range[i].low - margin[i], range[i].high + margin[i]};
   }
-  mask sound = bound_series(m, !g.boxed, range, g.t, g.box);
-  g.boxed = true;
+  mask sound = bound_series(m, !g.box_is_set, range, g.t, g.box);
+  g.box_is_set = true;
   vec power = above, excess = 1e-60;
   for (int k = 0; k < orders; k++)
     power *= length;
@@ -210,8 +209,8 @@ inline vec change_of(const vec *c, vec length) {
   return hides;
 }
 
-// The variables over a step up to `length`, in units, with estimates of their errors; the lanes whose step has
-// to be shorter still.
+// The variables over a step up to `length`, in units, with estimates of their errors; the lanes whose step
+// has to be shorter still.
 [[gnu::noinline]] inline mask take_length(const tape_machine &m, vec length, tape_group &g) {
   vec size[most_tape_variables];
   mask flying = g.c.status == lane_flying, open = {};
@@ -236,16 +235,16 @@ inline vec change_of(const vec *c, vec length) {
   vec size[most_tape_variables], growth;
   tape_proof proof = {}, own;
   set_variables(m, length, size, g);
-  mask flying = g.c.status == lane_flying, wants = flying;
+  mask flying = g.c.status == lane_flying, needs = flying;
   if (m.switches == 0) {
     look_up(m, length, size, proof);
-    wants = flying & (proof.length < 0.7 * length);
+    needs = flying & (proof.length < 0.7 * length);
   }
-  put(g.s.proven, flying & ~wants, smaller(most_growth * g.s.proven, 1));
-  if (any(wants)) {
+  put(g.s.proven, flying & ~needs, smaller(most_growth * g.s.proven, 1));
+  if (any(needs)) {
     prove_by_bounds(m, length, g, own, growth);
-    put(g.s.proven, wants, smaller(length / natural * smaller(growth, most_growth), 1));
-    mask better = wants & (own.length > proof.length);
+    put(g.s.proven, needs, smaller(length / natural * smaller(growth, most_growth), 1));
+    mask better = needs & (own.length > proof.length);
     put(proof.length, better, own.length);
     for (int i = 0; i < m.variables; i++)
       put(proof.rest[i], better, own.rest[i]);

@@ -76,8 +76,8 @@ struct tape_term {
   int node, factor;
 };
 
-// A node that may change more than its series shows, with the series of its argument and its own; of a quotient
-// that of the divisor.
+// A node that may change more than its series shows, with the series of its argument and its own; of a
+// quotient that of the divisor.
 struct tape_check {
   int node, argument, own, unused;
 };
@@ -87,15 +87,16 @@ struct tape_region {
 };
 
 // The variables are the phase [rad], its speed, position and velocity of a body, and further states; with a
-// `clock` the time [s] and the phase of a drive come first, and the section comes once in a `period` [s]; with 2
-// the time goes on there.
-// Nodes before `by_slip` are numbers, those from there to `varying` depend on the sign of slip alone.
+// `clock` the time [s] and the phase of a drive come first, and the section comes once in a `period` [s];
+// with 2 the time goes on there. Nodes before `by_slip` are numbers, those from there to `varying` depend on
+// the sign of slip alone.
 struct tape_machine {
   int nodes, by_slip, varying, variables, clock, switches;
-  // There are impacts or dry friction: what a step leaves out is proven, else `checks` serve. Forces do not depend on
-  // the sign of the velocity, and there are no stops: turning points are no events. Forces repeat after a period
-  // as they are: lanes pass its end within a step.
-  int proves, turns_freely, passes, checks, terms, unused;
+  // There are impacts or dry friction: what a step leaves out is proven, else `checks` serve. Forces do not
+  // depend on the sign of the velocity, and there are no stops: turning points are no events. Forces repeat
+  // after a period as they are: lanes pass its end within a step. Some branches are by the sign of the
+  // velocity.
+  int proves, turns_freely, passes, checks, terms, branches_by_slip;
   // Nodes of what acts on the body at rest, holds it there, and is thrown at an impact, and of the
   // restitution; -1: none, or a number.
   int hold, level, throws, bounce;
