@@ -82,12 +82,12 @@ inline vec by_box(const double *table, int stride, const int *box) {
   return y;
 }
 
-// Length of the step by the last three coefficients, in units.
+// Length of the step by the last two coefficients, three where nothing is proven, in units.
 [[gnu::noinline]] inline vec natural_length(const tape_machine &m, const tape_group &g) {
   vec reach = 30;
   for (int i = m.clock ? int(tape_x) : 0; i < m.variables; i++) {
     vec size = rough_logarithm(larger(magnitude(g.s.z[i]), m.sizes[i]) * m.tolerance);
-    for (int k = tape_order - 2; k <= tape_order; k++)
+    for (int k = tape_order - (m.proves ? 1 : 2); k <= tape_order; k++)
       reach = smaller(reach, (size - rough_logarithm(magnitude(g.t.of[i][k]))) / double(k));
   }
   return rough_exponential(reach);
