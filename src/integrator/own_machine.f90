@@ -42,6 +42,7 @@ module own_machine
     procedure :: turn_point
     procedure :: scales
     procedure :: advance => advance_body
+    procedure :: advance_past_event => advance_body_past_event
     procedure :: advance_to_section
     procedure :: advance_to_turn
     procedure :: without_stops
@@ -257,6 +258,17 @@ contains
     section%passed = .false.
     call advance_motor(self%motor, section%state, section%motor, time_end, section%passed, tally, reason, log)
   end subroutine advance_body
+
+  !> Past one event; none is the section.
+  pure subroutine advance_body_past_event(self, section, speed, time_end, tally, reason)
+    class(own_machine_t), intent(in) :: self
+    class(section_state_t), intent(inout) :: section
+    real(wp), intent(in) :: speed, time_end
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    section%passed = .false.
+    call advance_motor(self%motor, section%state, section%motor, time_end, section%passed, tally, reason, one_event=.true.)
+  end subroutine advance_body_past_event
 
   pure subroutine advance_to_section(self, section, tally, reason, log)
     class(own_machine_t), intent(in) :: self

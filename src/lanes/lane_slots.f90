@@ -12,6 +12,7 @@ module lane_slots
   use lanes, only: add_region, fly_lanes, lane_state, occupy_lane, take_counts
   use multibody_machine, only: multibody_machine_t
   use motor_machine, only: motor_machine_t
+  use own_machine, only: own_machine_t
   use motion_state, only: mode_slip_minus, mode_slip_plus, options_t, tally_t
   use structure_lanes, only: add_structure_region, fly_structure_lanes, occupy_structure_lane, structure_flies, &
     structure_lane_state, take_structure_counts
@@ -20,7 +21,7 @@ module lane_slots
   use tape_lane_types, only: tape_batch_t
   use tape_lanes, only: add_tape_region, fly_tape_lanes, occupy_tape_lane, set_tape_clock, take_tape_clock, tape_flies, &
     tape_lane_state
-  use tape_preparation, only: prepare_motor_lanes
+  use tape_bodies, only: prepare_motor_lanes, prepare_own_lanes
   implicit none
   private
 
@@ -59,6 +60,11 @@ contains
       call prepare_lanes(moving%body, flow)
     type is (motor_machine_t)
       call prepare_motor_lanes(moving%motor%system, moving%sizes%length, flow)
+    type is (own_machine_t)
+      if (moving%by_event) return
+      associate (n => moving%coordinates(), scales => moving%scales(moving%sizes%length))
+        call prepare_own_lanes(moving%motor%system, scales(:n), moving%period, options%domain, flow)
+      end associate
     end select
   end subroutine prepare_flow
 
@@ -69,7 +75,7 @@ contains
     select type (moving)
     type is (multibody_machine_t)
       allocate (lane_slots%bodies%structures)
-    type is (motor_machine_t)
+    class is (motor_machine_t)
       allocate (lane_slots%bodies%tapes)
     end select
   end subroutine open_lanes
@@ -93,7 +99,7 @@ contains
         call add_region(lane_slots%regions, attractor, point, scale, metric(:3), reach)
         return
       end if
-    type is (motor_machine_t)
+    class is (motor_machine_t)
       if (size(point) == moving%coordinates()) then
         call add_tape_region(lane_slots%bodies%tapes, attractor, point, scale, metric, reach)
         return
@@ -115,8 +121,8 @@ contains
     type is (body_machine_t)
       flies = (section%state%mode == mode_slip_plus .or. section%state%mode == mode_slip_minus) .and. &
         abs(section%state%v) >= flow%slowest
-    type is (motor_machine_t)
-      flies = tape_flies(section%state, section%motor)
+    class is (motor_machine_t)
+      flies = tape_flies(flow, section%state, section%motor)
     end select
   end function flies_in_lane
 
@@ -134,8 +140,8 @@ contains
       call occupy_structure_lane(moving%bodies, lane, section%multibody, batch, bodies%structures)
     type is (body_machine_t)
       call occupy_lane(flow, lane, section%state, new, batch)
-    type is (motor_machine_t)
-      call occupy_tape_lane(lane, section%state, section%motor, batch, bodies%tapes)
+    class is (motor_machine_t)
+      call occupy_tape_lane(flow, lane, section%state, section%motor, batch, bodies%tapes)
     end select
   end subroutine put_into_lane
 
@@ -155,8 +161,9 @@ contains
       call take_structure_counts(bodies%structures, lane, tally)
     type is (body_machine_t)
       call lane_state(batch, lane, section%state)
-    type is (motor_machine_t)
-      call tape_lane_state(bodies%tapes, lane, section%state, section%motor, section%passed, section%lasted)
+    class is (motor_machine_t)
+      call tape_lane_state(moving%motor%system%clock, lane, bodies%tapes, section%state, section%motor, section%passed, &
+                           section%lasted)
     end select
     call take_counts(batch, lane, tally)
   end subroutine take_from_lane

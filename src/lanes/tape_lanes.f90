@@ -9,7 +9,7 @@ module tape_lanes
   use lane_types, only: lane_batch_t, lane_flow_t, lane_fresh
   use motion_state, only: mode_slip_minus, mode_slip_plus, state_t
   use motor_state, only: motor_state_t
-  use tape_lane_types, only: most_tape_regions, most_tape_section, tape_batch_t, tape_machine_t, tape_region_t
+  use tape_lane_types, only: most_tape_regions, most_tape_section, most_tape_variables, tape_batch_t, tape_machine_t, tape_region_t
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_sizeof
   implicit none
   private
@@ -45,11 +45,13 @@ contains
     tape_sizes = machine == c_sizeof(here) .and. batch == c_sizeof(there)
   end function tape_sizes
 
-  !> Whether a lane can take a motion: the body slips, the crank turns forwards.
-  pure logical function tape_flies(state, crank) result(flies)
+  !> Whether a lane can take a motion: the body slips, a crank turns forwards.
+  pure logical function tape_flies(flow, state, crank) result(flies)
+    type(lane_flow_t), intent(in) :: flow
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
-    flies = (state%mode == mode_slip_plus .or. state%mode == mode_slip_minus) .and. crank%turning > 0 .and. crank%w > 0
+    flies = state%mode == mode_slip_plus .or. state%mode == mode_slip_minus
+    if (flow%tape%clock == 0) flies = flies .and. crank%turning > 0 .and. crank%w > 0
   end function tape_flies
 
   !> The lanes can converge to attractor number `attractor` near its `point`; see `add_structure_region`.
@@ -71,24 +73,37 @@ contains
   end subroutine add_tape_region
 
   !> Puts a motion into a lane.
-  pure subroutine occupy_tape_lane(lane, state, crank, control, batch)
+  pure subroutine occupy_tape_lane(flow, lane, state, crank, control, batch)
+    type(lane_flow_t), intent(in) :: flow
     integer, intent(in) :: lane
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
     type(lane_batch_t), intent(inout) :: control
     type(tape_batch_t), intent(inout) :: batch
+    integer :: n
+    n = flow%tape%variables
     control%status(lane) = lane_fresh
-    batch%z(lane, :5) = [merge(crank%phi, 0.0_wp, crank%phi < two_pi), crank%w, state%x, state%v, crank%own(1)]
+    batch%z(lane, 3:4) = [state%x, state%v]
+    batch%z(lane, 5:n) = crank%own(:n - 4)
+    if (flow%tape%clock > 0) then
+      batch%z(lane, :2) = [crank%phi + state%time, state%time*flow%tape%phase_speed]
+      batch%origin(lane) = crank%phi
+    else
+      batch%z(lane, :2) = [merge(crank%phi, 0.0_wp, crank%phi < two_pi), crank%w]
+    end if
     batch%time(lane) = state%time
     batch%slip(lane) = merge(-1, 1, state%mode == mode_slip_minus)
     batch%limit(lane) = huge(1.0_wp)
+    batch%crossed(lane) = 0
+    batch%proven(lane) = 1
   end subroutine occupy_tape_lane
 
-  !> The motion in a lane: where it stopped, with `passed` on the section `lasted` [s] after the last one, or at the start of the
-  !> step that is left to the event loop.
-  pure subroutine tape_lane_state(batch, lane, state, crank, passed, lasted)
-    type(tape_batch_t), intent(in) :: batch
+  !> The motion in a lane: where it stopped, of a crank with `passed` on the section `lasted` [s] after the last one, or at the
+  !> start of the step that is left to the event loop.
+  pure subroutine tape_lane_state(clock, lane, batch, state, crank, passed, lasted)
+    logical, intent(in) :: clock
     integer, intent(in) :: lane
+    type(tape_batch_t), intent(in) :: batch
     type(state_t), intent(inout) :: state
     type(motor_state_t), intent(inout) :: crank
     logical, intent(out) :: passed
@@ -97,6 +112,12 @@ contains
     state%v = batch%z(lane, 4)
     state%time = batch%time(lane)
     state%mode = merge(mode_slip_minus, mode_slip_plus, batch%slip(lane) < 0)
+    passed = .false.
+    if (clock) then
+      crank%phi = batch%origin(lane)
+      crank%own(:most_tape_variables - 4) = batch%z(lane, 5:)
+      return
+    end if
     crank%phi = batch%z(lane, 1)
     crank%w = batch%z(lane, 2)
     crank%own(1) = batch%z(lane, 5)

@@ -5,12 +5,9 @@
 #ifndef SEPARATRIX_TAPE_SEARCH_HPP
 #define SEPARATRIX_TAPE_SEARCH_HPP
 
-#include "tape_series.hpp"
+#include "tape_bounds.hpp"
 
 namespace {
-
-inline vec larger(vec a, vec b) { return pick(a < b, b, a); }
-inline vec smaller(vec a, vec b) { return pick(a < b, a, b); }
 
 // Least coefficient and least and largest first and second differences, times the powers of the degree that
 // make them bounds of value, slope and curvature; the last coefficient.
@@ -18,9 +15,9 @@ struct tape_range {
   vec least, most_slope, most_curvature, last;
 };
 
-[[gnu::noinline]] inline tape_range range_of(const vec *p) {
+// Bernstein coefficients over the step.
+LANE_LEAF void to_bernstein(const vec *p, vec *b) {
   const int n = tape_order;
-  series b;
   double inverse = 1;
   for (int k = 0; k <= n; k++) {
     b[k] = p[k] * inverse;
@@ -29,6 +26,24 @@ struct tape_range {
   for (int k = 1; k <= n; k++)
     for (int i = n; i >= k; i--)
       b[i] += b[i - 1];
+}
+
+// Lower and upper bound over the step.
+[[gnu::noinline]] inline interval bounds_of(const vec *p) {
+  series b;
+  to_bernstein(p, b);
+  interval range = {b[0], b[0]};
+  for (int k = 1; k < orders; k++) {
+    range.low = smaller(range.low, b[k]);
+    range.high = larger(range.high, b[k]);
+  }
+  return range;
+}
+
+[[gnu::noinline]] inline tape_range range_of(const vec *p) {
+  const int n = tape_order;
+  series b;
+  to_bernstein(p, b);
   tape_range r;
   r.least = b[0];
   vec slope = b[1] - b[0];
