@@ -120,7 +120,7 @@ contains
     type(tape_t), intent(inout) :: tape
     integer, intent(in) :: base, exponent
     integer, intent(inout) :: node
-    integer :: small, above, below, zero, inner, power
+    integer :: small, above, below, zero, quiet, inner, power
     if (tape%nodes(base)%is_steady) return
     if (tape%nodes(exponent)%operation == op_constant .and. .not. tape%nodes(exponent)%value > 0) return
     power = node
@@ -128,8 +128,8 @@ contains
     call constant(tape, 0.0_wp, zero)
     call binary(tape, op_subtract, base, small, above)
     call binary(tape, op_add, base, small, below)
-    call choice(tape, exponent, -1, zero, power, inner)
-    call choice(tape, below, 1, inner, power, inner)
+    call choice(tape, exponent, -1, zero, power, quiet)
+    call choice(tape, below, 1, quiet, power, inner)
     call choice(tape, above, -1, power, inner, node)
   end subroutine leave_out_zero
 
