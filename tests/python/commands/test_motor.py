@@ -55,6 +55,45 @@ def test_outcomes_of_a_run_up(separatrix, yoke, tmp_path):
     assert outcome(separatrix, yoke, tmp_path, "motor.voltage=-3", "run.duration=20") == "reversed"
 
 
+def test_crank_that_does_not_get_round(separatrix, yoke, tmp_path):
+    """Friction holds the body; its spring turns the crank back, which comes to rest after a while."""
+    held = ("friction={law='coulomb', kinetic_coefficient=10}", "motor.voltage=0.3", "run.window=2")
+    assert outcome(separatrix, yoke, tmp_path, *held, "run.duration=6") == "rocking"
+    assert outcome(separatrix, yoke, tmp_path, *held, "run.duration=60") == "stalled"
+
+
+@pytest.mark.parametrize(("case", "voltage", "speed", "expected"), [
+    ("impact", 5.7, 9, "captured"),
+    ("impact", 6.1, 10, "captured"),
+    ("impact", 6.1, 16, "passed"),
+    ("unbalance", 8, 9, "captured"),
+    ("lever", None, 0, "captured"),
+    ("lever", None, 18, "passed"),
+])  # fmt: skip
+def test_impacts_raise_the_resonance(separatrix, tmp_path, case, voltage, speed, expected):
+    """All these cranks turn faster than body and spring would oscillate; those before the resonance hit."""
+    sets = [f"motor.crank_speed={speed}", "run.duration=100", "run.window=20"]
+    if voltage:
+        sets.append(f"motor.voltage={voltage}")
+    assert outcome(separatrix, EXAMPLES / f"motor_{case}.toml", tmp_path, *sets) == expected
+    with h5py.File(tmp_path / "motion.h5") as file:
+        assert file.attrs["crank_speed"] > 3 * np.pi
+        assert file.attrs["crank_outcome"] == expected
+        assert (file.attrs["impacts"] > 0) == (expected == "captured")
+
+
+def test_power_goes_somewhere(separatrix, tmp_path):
+    """In a steady motion the mean power is the sum of its shares; the voltage gives it and the heat."""
+    sets = ["motor.crank_speed=10", "run.duration=150", "run.window=30"]
+    outcome(separatrix, IMPACT, tmp_path, *sets)
+    with h5py.File(tmp_path / "motion.h5") as file:
+        attributes = dict(file.attrs)
+        current = file["current"][()][file["time"][()] >= 120].mean()
+    shares = sum(attributes[f"{name}_power"] for name in ("impact", "friction", "damping", "bearing"))
+    assert abs(attributes["power"] - shares) < 2e-3 * shares
+    assert abs(8 * current - attributes["power"] - attributes["heat_power"]) < 2e-3 * shares
+
+
 def test_slow_ramp_is_captured_longer(separatrix, yoke, tmp_path):
     """A voltage between threshold and fold: reached slowly, the crank stays below the resonance."""
     quick, slow = "motor.voltage=7.5", "motor.ramp_time=100"
