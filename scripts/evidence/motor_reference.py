@@ -16,6 +16,7 @@ from motor_reference_machine import Machine
 from scipy.integrate import DOP853, solve_ivp
 from scipy.optimize import brentq
 
+Guard = Callable[[float, np.ndarray], float]
 TOLERANCE, SMALL = 1e-13, 1e-15
 PHI, W, X, V, Y, WORK, DAMPING, DRY = range(8)
 #: Largest step, in radians of what is fastest; samples of a step in which events are looked for.
@@ -95,24 +96,24 @@ class Motion:
         energy = (inertia * w**2 + m.mass * v**2 + m.stiffness * (m.free_length + foot - x) ** 2) / 2
         return energy - m.moment * math.sin(phi) * w * v
 
-    def hold(self, z: np.ndarray) -> float:
+    def hold(self, t: float, z: np.ndarray) -> float:
         """Force on the body that friction has to hold."""
         m = self.machine
         foot, _, inertia, _ = m.mechanism(z[PHI])
         force = m.stiffness * (m.free_length + foot - z[X])
         if m.moment > 0 and self.turning:
             motor = m.motor
-            torque = self.torque(self.time, z[W], z[Y])[0] - motor.get("bearing_damping", 0.0) * z[W]
+            torque = self.torque(t, z[W], z[Y])[0] - motor.get("bearing_damping", 0.0) * z[W]
             alpha = (torque - motor.get("bearing_friction", 0.0) * self.turning) / inertia
             force += m.moment * (z[W] ** 2 * math.cos(z[PHI]) + alpha * math.sin(z[PHI]))
         return force
 
-    def crank_hold(self, z: np.ndarray) -> float:
+    def crank_hold(self, t: float, z: np.ndarray) -> float:
         """Torque on the crank that its bearing has to hold."""
         m = self.machine
         foot, slope, _, _ = m.mechanism(z[PHI])
         spring = m.stiffness * (m.free_length + foot - z[X])
-        torque = self.torque(self.time, 0.0, z[Y])[0]
+        torque = self.torque(t, 0.0, z[Y])[0]
         if m.moment == 0:
             return torque - spring * slope
         if not self.slip:
@@ -122,7 +123,7 @@ class Motion:
 
     def choose_body(self) -> None:
         """Mode of a body at rest."""
-        m, force = self.machine, self.hold(self.z)
+        m, force = self.machine, self.hold(self.time, self.z)
         self.wall = 1 if self.z[X] >= m.upper else -1 if self.z[X] <= m.lower else 0
         self.slip = int(np.sign(force)) if abs(force) > m.static else 0
         if self.slip == self.wall:
@@ -132,7 +133,7 @@ class Motion:
 
     def choose_crank(self) -> None:
         """Whether the bearing holds the crank."""
-        torque = self.crank_hold(self.z)
+        torque = self.crank_hold(self.time, self.z)
         held = abs(torque) <= self.machine.motor.get("bearing_friction", 0.0)
         self.turning = 0 if held else int(np.sign(torque))
 
@@ -145,51 +146,51 @@ class Motion:
         command = self.machine.torque(self.time, self.z[W], self.z[Y])[0]
         self.limited = int(np.sign(command)) if abs(command) > limit else 0
 
-    def control(self) -> Iterator[tuple[str, Callable[[np.ndarray], float]]]:
+    def control(self) -> Iterator[tuple[str, Guard]]:
         """Guards of a limited speed control and of the knots of a table."""
         m = self.machine.motor
         for knot in m["speed"] if m["law"] == "table" else ():
-            yield "knot", lambda z, knot=knot: z[W] - knot
-            yield "knot", lambda z, knot=knot: knot - z[W]
+            yield "knot", lambda _t, z, knot=knot: z[W] - knot
+            yield "knot", lambda _t, z, knot=knot: knot - z[W]
         limit = m.get("torque_limit", 0.0)
         if limit == 0:
             return
 
-        def command(z: np.ndarray) -> float:
-            return self.machine.torque(self.time, z[W], z[Y])[0]
+        def command(t: float, z: np.ndarray) -> float:
+            return self.machine.torque(t, z[W], z[Y])[0]
 
         if self.limited:
-            yield "follow", lambda z: limit - self.limited * command(z)
+            yield "follow", lambda t, z: limit - self.limited * command(t, z)
         else:
-            yield "limit_up", lambda z: command(z) - limit
-            yield "limit_down", lambda z: -command(z) - limit
+            yield "limit_up", lambda t, z: command(t, z) - limit
+            yield "limit_down", lambda t, z: -command(t, z) - limit
         if self.held:
-            yield "resume", lambda z: self.held * (z[W] - m["reference"])
+            yield "resume", lambda t, z: self.held * (z[W] - self.machine.supply(t))
         else:
-            yield "hold_up", lambda z: m["integral"] * z[Y] - limit
-            yield "hold_down", lambda z: -m["integral"] * z[Y] - limit
+            yield "hold_up", lambda _t, z: m["integral"] * z[Y] - limit
+            yield "hold_down", lambda _t, z: -m["integral"] * z[Y] - limit
 
-    def guards(self) -> Iterator[tuple[str, Callable[[np.ndarray], float]]]:
+    def guards(self) -> Iterator[tuple[str, Guard]]:
         """Functions that cross zero from below at an event."""
         m, s, d = self.machine, self.slip, self.turning
         yield from self.control()
         if s:
-            yield "turn", lambda z: -s * z[V]
+            yield "turn", lambda _t, z: -s * z[V]
             if s > 0 and math.isfinite(m.upper):
-                yield "impact_upper", lambda z: z[X] - m.upper
+                yield "impact_upper", lambda _t, z: z[X] - m.upper
             if s < 0 and math.isfinite(m.lower):
-                yield "impact_lower", lambda z: m.lower - z[X]
+                yield "impact_lower", lambda _t, z: m.lower - z[X]
         else:
             if self.wall <= 0:
-                yield "up", lambda z: self.hold(z) - m.static
+                yield "up", lambda t, z: self.hold(t, z) - m.static
             if self.wall >= 0:
-                yield "down", lambda z: -self.hold(z) - m.static
+                yield "down", lambda t, z: -self.hold(t, z) - m.static
         if d:
-            yield "standstill", lambda z: -d * z[W]
+            yield "standstill", lambda _t, z: -d * z[W]
         else:
             level = m.motor.get("bearing_friction", 0.0)
-            yield "crank_up", lambda z: self.crank_hold(z) - level
-            yield "crank_down", lambda z: -self.crank_hold(z) - level
+            yield "crank_up", lambda t, z: self.crank_hold(t, z) - level
+            yield "crank_down", lambda t, z: -self.crank_hold(t, z) - level
 
     def run(self, until: float) -> None:
         """Moves to a time [s]."""
@@ -206,7 +207,7 @@ class Motion:
         fastest = max(abs(self.z[W]), math.sqrt(self.machine.stiffness / self.machine.mass), 1.0)
         longest = min((until - self.time) / 4, LONGEST / fastest)
         solver = DOP853(self.rates, self.time, self.z, until, rtol=TOLERANCE, atol=SMALL, max_step=longest)
-        before = np.array([f(self.z) for _, f in guards])
+        before = np.array([f(self.time, self.z) for _, f in guards])
         while solver.status == "running":
             start, z0 = solver.t, solver.y.copy()
             solver.step()
@@ -214,7 +215,7 @@ class Motion:
             times = np.linspace(start, solver.t, SAMPLES + 1)
             for t0, t1 in pairwise(times):
                 z1 = dense(t1)
-                after = np.array([f(z1) for _, f in guards])
+                after = np.array([f(t1, z1) for _, f in guards])
                 crossed = np.flatnonzero((before < 0) & (after >= 0))
                 before = after
                 if crossed.size:
@@ -225,7 +226,7 @@ class Motion:
         self.time, self.z = solver.t, solver.y
         return ""
 
-    def refine(self, start: float, z0: np.ndarray, time: float, guard: Callable[[np.ndarray], float]) -> None:
+    def refine(self, start: float, z0: np.ndarray, time: float, guard: Guard) -> None:
         """Takes the event near a time, from the beginning of its step."""
         for _ in range(3):
             z = z0
@@ -233,10 +234,11 @@ class Motion:
                 z = solve_ivp(self.rates, (start, time), z0, "DOP853", rtol=TOLERANCE, atol=SMALL).y[:, -1]
             step = 1e-6
             rate = self.rates(time, z)
-            slope = (guard(z + step * rate) - guard(z - step * rate)) / (2 * step)
-            if not abs(slope) > 0 or abs(guard(z) / slope) > 1e-6:
+            ahead, behind = (guard(time + one, z + one * rate) for one in (step, -step))
+            slope = (ahead - behind) / (2 * step)
+            if not abs(slope) > 0 or abs(guard(time, z) / slope) > 1e-6:
                 break
-            time -= guard(z) / slope
+            time -= guard(time, z) / slope
         self.time, self.z = time, z.copy()
 
     def happen(self, name: str) -> None:
@@ -263,7 +265,7 @@ class Motion:
         if m.moment > 0:
             if not self.turning:
                 self.choose_crank()
-            if not self.slip and abs(self.hold(z)) > m.static:
+            if not self.slip and abs(self.hold(self.time, z)) > m.static:
                 was = self.wall
                 self.choose_body()
                 if self.slip:
@@ -273,12 +275,11 @@ class Motion:
         """What ends or begins at a limit of the control."""
         if name.startswith("limit"):
             self.limited = 1 if name == "limit_up" else -1
-        elif name == "follow":
-            self.limited = 0
         elif name.startswith("hold"):
             self.held = 1 if name == "hold_up" else -1
-        elif name == "resume":
-            self.held = 0
+        elif name in ("follow", "resume"):
+            # With a held integral both happen at the reference speed, where the command is at the limit.
+            self.limited, self.held = 0, 0
 
     def impact(self, name: str) -> None:
         """Newton's law; an unbalance throws the crank."""
@@ -300,8 +301,8 @@ class Motion:
         self.events.append((kind, self.time, self.z[PHI], self.z[W], self.z[X], v))
 
 
-def root(dense: Callable, guard: Callable[[np.ndarray], float], low: float, high: float) -> float:
+def root(dense: Callable, guard: Guard, low: float, high: float) -> float:
     """Zero of a guard on a dense output between two times."""
-    if guard(dense(low)) >= 0:
+    if guard(low, dense(low)) >= 0:
         return low
-    return brentq(lambda t: guard(dense(t)), low, high, xtol=1e-15)
+    return brentq(lambda t: guard(t, dense(t)), low, high, xtol=1e-15)

@@ -104,7 +104,7 @@ contains
     type(crank_summary_t) :: crank
     text = ''
     if (.not. allocated(machine) .or. attractor%kind /= kind_cycle) return
-    call summarize_attractor(laws, machine, attractor, crank)
+    call summarize_attractor(machine, attractor, crank)
     text = ', crank speed '//to_text(crank%speed, 6)//' rad/s'
     if (resonance_of(laws) > 0) text = text//', '//to_text(crank%speed/resonance_of(laws), 4)//' of the natural'
     text = text//': '//trim(crank_outcomes(crank%outcome))

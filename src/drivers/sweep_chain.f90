@@ -5,6 +5,7 @@
 !> of two bodies.
 module sweep_chain
   use attractors, only: features_t
+  use crank_summary, only: crank_numbers, crank_values
   use errors, only: error_t
   use grid, only: grid_t
   use journal, only: journal_t
@@ -23,11 +24,11 @@ module sweep_chain
 
   public :: new_chains, run_chains
 
-  !> Numbers kept of a hold before its samples: regime, reason, period, word, impacts per period, mean
-  !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
-  !> not a number there.
-  integer, parameter :: hold_numbers = 11, hold_codes = 4
-  integer, parameter, public :: hold_reason = 2, hold_impacts = 5
+  !> Numbers kept of a hold before its samples: regime, reason, period, word, outcome of a crank, impacts per period, mean
+  !> impact speed, amplitude, x_max, x_min, v_max, rotation, time of a cycle, and those of a crank; the first five are codes, 0 where
+  !> a direction was not run, the rest is not a number there.
+  integer, parameter :: hold_numbers = 13 + crank_numbers, hold_codes = 5
+  integer, parameter, public :: hold_reason = 2, hold_outcome = 5, hold_impacts = 6, hold_cycle_time = 13, hold_crank = 14
   !> Numbers kept of each limit.
   integer, parameter :: limit_numbers = 7
 
@@ -163,7 +164,8 @@ contains
     real(wp) :: numbers(hold_numbers)
     associate (f => held%features)
       numbers = [real(f%regime, wp), real(held%reason, wp), real(held%settled%period, wp), real(f%word, wp), &
-                 f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, f%rotation]
+                 real(held%crank%outcome, wp), f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, &
+                 f%v_max, f%rotation, held%settled%duration, crank_values(held%crank)]
     end associate
   end function numbers_of
 

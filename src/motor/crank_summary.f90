@@ -14,7 +14,7 @@ module crank_summary
   implicit none
   private
 
-  public :: crank_values, summarize_crank
+  public :: crank_values, no_summary, summarize_crank
 
   !> Outcomes of a run-up.
   integer, parameter, public :: crank_not_known = 0, crank_stalled = 1, crank_rocking = 2, crank_reversed = 3, crank_turning = 4, &
@@ -73,10 +73,9 @@ contains
     type(log_t), intent(in) :: log
     integer, intent(in) :: first, last
     type(crank_summary_t), intent(out) :: summary
-    real(wp) :: lasted, gone(5), none
+    real(wp) :: lasted, gone(5)
     if (last <= first) then
-      none = ieee_value(1.0_wp, ieee_quiet_nan)
-      summary = crank_summary_t(none, none, none, none, none, none, none, none, none, none, none)
+      summary = no_summary()
       return
     end if
     associate (motor => laws(number_of_family(laws, 'motor')))
@@ -102,6 +101,13 @@ contains
       end associate
     end associate
   end subroutine summarize_crank
+
+  !> Of a motion that had to be given up: not numbers.
+  pure type(crank_summary_t) function no_summary() result(summary)
+    real(wp) :: none
+    none = ieee_value(1.0_wp, ieee_quiet_nan)
+    summary = crank_summary_t(none, none, none, none, none, none, none, none, none, none, none)
+  end function no_summary
 
   !> Mean over time by the trapezoidal rule.
   pure real(wp) function mean_of(t, values) result(mean)
