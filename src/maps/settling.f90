@@ -16,7 +16,7 @@ module settling
   implicit none
   private
 
-  public :: settle, mark_of, with_crank
+  public :: settle, mark_of, same_mark, with_crank
 
   !> Distance of a section point from that one cycle before, in sizes of the motion: below the first the motion has settled, above
   !> the second it is nowhere near a cycle.
@@ -131,6 +131,13 @@ contains
     type(crank_summary_t), intent(in) :: crank
     both = mark + marks_of_outcome*crank%outcome
   end function with_crank
+
+  !> Whether two marks are the same as far as they are known.
+  pure logical function same_mark(one, other) result(same)
+    integer, intent(in) :: one, other
+    same = modulo(one, marks_of_outcome) == modulo(other, marks_of_outcome)
+    if (min(one, other) >= marks_of_outcome) same = one == other
+  end function same_mark
 
   !> The mark by which limits are found: the regime of bodies that may ride along, else whether there are impacts.
   pure integer function mark_of(moving, features) result(mark)

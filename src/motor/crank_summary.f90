@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What the crank of a motor does over a while, from the samples of a log: speed, torque, power and where it goes, and the outcome of
+!> What the crank of a motor does over a while, from the samples of a log: speed, torque, power and its shares, and the outcome of
 !> a run-up.
 module crank_summary
   use constants, only: two_pi

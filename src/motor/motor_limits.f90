@@ -16,6 +16,9 @@ module motor_limits
 
   public :: active_limits, change_limits, start_limits
 
+  !> Share of a speed that rounding of the instant of an event makes of it.
+  real(wp), parameter :: rounding_of_speed = 1024*epsilon(1.0_wp)
+
 contains
 
   !> Supply, piece of the table and limits at a start; `settled`: a ramp is over.
@@ -52,6 +55,20 @@ contains
       if (is_beyond(-series%c(:, guards(guard_limit_down)%node), room)) crank%limited = -1
     end associate
   end subroutine choose_limit
+
+  !> Whether the integral that is held goes on: the speed passes the wanted one.
+  pure subroutine choose_hold(system, state, crank)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    type(motor_state_t), intent(inout) :: crank
+    type(series_t) :: series
+    integer :: fault, mode
+    mode = equation_mode(slips(state%mode), crank%turning /= 0)
+    call low_series(system, mode, state, crank, series, fault)
+    associate (c => series%c(:, system%flights(mode, 0)%guards(guard_resume)%node))
+      if (is_beyond(crank%held*c, rounding_of_speed*abs(crank%w))) crank%held = 0
+    end associate
+  end subroutine choose_hold
 
   pure logical function is_beyond(c, rounding)
     real(wp), intent(in) :: c(0:), rounding
@@ -124,7 +141,10 @@ contains
       crank%held = merge(1, -1, crossed(guard_integral_up))
       crank%own(1) = crank%held*system%control%largest_integral
     end if
-    if (system%control%torque_limit > 0) call choose_limit(system, state, crank)
+    if (.not. system%control%torque_limit > 0) return
+    ! Where the integral is held the torque leaves its limit at the same instant, of which the flight sees one or both.
+    if (crank%held /= 0) call choose_hold(system, state, crank)
+    call choose_limit(system, state, crank)
   end subroutine change_limits
 
 end module motor_limits
