@@ -150,7 +150,7 @@ def case_text(machine: Machine, x: float, v: float) -> str:
         "drive": machine.drive,
         "motor": machine.motor,
         "start": {"x0": x, "v0": v},
-        "run": {"duration": DURATION, "window": DURATION / 4},
+        "run": {"duration": DURATION, "window": DURATION / 4, "average": "window"},
     }
     stops = {name: value for name in ("upper", "lower") if math.isfinite(value := getattr(machine, name))}
     if stops:

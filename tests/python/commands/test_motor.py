@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from program import differences, run, succeed
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -128,6 +129,72 @@ def test_exponents_are_those_of_the_multipliers(separatrix, tmp_path):
     pair, single = np.log(abs(-0.609077686526 + 0.567414199022j)), np.log(0.652441520152)
     np.testing.assert_allclose(sorted(found), np.array([single, pair, pair]) / period, rtol=0.02)
     assert "the motion is periodic" in report
+
+
+def test_cranks_of_attractors(separatrix, tmp_path):
+    """Torque k (U - k w)/R in the mean; the power is the sum of its shares; each slice has its own speed."""
+    axes = (
+        "{name='motor.voltage', from=8, to=8.2, count=2}, {name='motor.crank_speed', from=9, to=17, count=5}"
+    )
+    sets = [f"axis=[{axes}]"]
+    sets += ["attractors.sample=24", "start.x0=0.05"]
+    succeed(
+        separatrix,
+        "basin",
+        IMPACT,
+        *(f"--set={word}" for word in sets),
+        "-o",
+        "map.h5",
+        folder=tmp_path,
+        timeout=300,
+    )
+    with sx.open_result(tmp_path / "map.h5") as result:
+        cranks = result.separatrix.attractors.reset_index()
+        speed = result.separatrix.of_attractor("crank_speed")
+        labels = result["attractor"].values
+    voltage = 8 + 0.2 * cranks["slice"]
+    np.testing.assert_allclose(cranks["torque"], 0.5 * (voltage - 0.5 * cranks["crank_speed"]) / 5, rtol=1e-5)
+    shares = sum(cranks[f"{name}_power"] for name in ("impact", "friction", "damping", "bearing"))
+    np.testing.assert_allclose(cranks["power"], shares, rtol=1e-5)
+    assert (cranks["crank_speed_min"] < cranks["crank_speed"]).all()
+    assert (cranks["crank_speed"] < cranks["crank_speed_max"]).all()
+    assert set(cranks["crank_outcome"]) == {"captured", "passed"}
+    for one in cranks.itertuples():
+        mine = speed.values[one.slice][labels[one.slice] == one.attractor]
+        assert (mine == one.crank_speed).all()
+
+
+# machine, range, direction, start w, x, v near the cycle there, then kind and value of the limit
+LIMITS = [
+    ("yoke", (8.1, 8.4), "up", (9.4389, 0.0048, 3.5517), "fold", 8.252828124769745),
+    ("yoke", (5.55, 5.7), "down", (10.4748, -0.0748, 0.1859), "neimark_sacker", 5.643766508919115),
+    ("impact", (4.5, 4.7), "up", (8.3445, 0.1170, 0.2064), "graze", 4.611362473527201),
+    ("impact", (8.8, 8.95), "up", (13.0929, -0.1080, 1.6999), "fold", 8.864114491727010),
+    ("impact", (5.95, 6.1), "down", (11.0888, -0.0695, 0.1658), "neimark_sacker", 6.019664934380103),
+]
+
+
+@pytest.mark.parametrize("limit", LIMITS, ids=[f"{one[0]}_{one[2]}_{one[4]}" for one in LIMITS])
+def test_sweep_names_its_limits(separatrix, yoke, tmp_path, limit):
+    """The first limit of a sweep: its kind, its value, and the speeds on both sides."""
+    machine, (low, high), direction, start, kind, value = limit
+    case = yoke if machine == "yoke" else IMPACT
+    text = re.sub(r"(?s)\[\[axis.*", "", case.read_text())
+    text += f'[sweep]\nparameter = "motor.voltage"\nfrom = {low}\nto = {high}\nstep = {(high - low) / 3!r}\n'
+    (tmp_path / "case.toml").write_text(text + f'directions = "{direction}"\nstarts = [0, 0]\n')
+    sets = [
+        f"--set={key}={one}"
+        for key, one in zip(("motor.crank_speed", "start.x0", "start.v0"), start, strict=True)
+    ]
+    sets += ["--set=run.duration=40", "--set=run.window=8"]
+    succeed(separatrix, "sweep", "case.toml", *sets, "-o", "sweep.h5", folder=tmp_path, timeout=600)
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        limits = file["limits"]
+        names = limits["kind"].attrs["flag_meanings"].split()
+        assert names[limits["kind"][0]] == kind
+        assert abs(limits["value"][0] - value) < 1e-8
+        before, after = limits["crank_speed_before"][0], limits["crank_speed_after"][0]
+        assert (after > before) == (direction == "up")
 
 
 SMALL = ("axis[1].count=6", "axis[2].count=5", "run.duration=8", "run.window=2", "attractors.sample=8")
