@@ -49,7 +49,7 @@ class Accessor:
     def attractors(self) -> "pandas.DataFrame":
         """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ...
 
-        Of a machine with a motor `crank_speed` [rad/s], `torque` and `power` are means; `crank_outcome` is the
+        Of a motor `crank_speed` [rad/s], `torque` and `power` are means; `crank_outcome` is the
         side of the resonance.
         `grazing_margin` is NaN where no turning point missed a barrier.
         """

@@ -15,6 +15,8 @@ module motor_choices
 
   !> Largest decay of a difference of speeds over a turn, as an exponent.
   real(wp), parameter :: most_decay = 1e4_wp
+  !> By how much a rod is longer than its crank at least, as a share: at the dead point the speed of the foot is infinite.
+  real(wp), parameter :: dead_point = 1e-9_wp
   character(len=*), parameter :: too_steep = 'motor.inertia: so little that the speed follows the torque within 1e-4 of a '// &
     'turn; allowed more, or a drive without a motor, whose speed is given'
 
@@ -153,8 +155,9 @@ contains
     end if
     if (allocated(error)) return
     if (drive%name == 'slider_crank') then
-      if (.not. value_of(drive, 'rod') > value_of(drive, 'crank')) then
-        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: a shorter rod cannot go round')
+      if (.not. value_of(drive, 'rod') > (1 + dead_point)*value_of(drive, 'crank')) then
+        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: a shorter rod cannot go round, and one as long '// &
+                  'has a dead point')
       end if
     end if
   end subroutine refuse_laws

@@ -174,7 +174,11 @@ LIMITS = [
 ]
 
 
-@pytest.mark.parametrize("limit", LIMITS, ids=[f"{one[0]}_{one[2]}_{one[4]}" for one in LIMITS])
+@pytest.mark.parametrize(
+    "limit",
+    [pytest.param(one, marks=pytest.mark.long if i in (1, 3) else ()) for i, one in enumerate(LIMITS)],
+    ids=[f"{one[0]}_{one[2]}_{one[4]}" for one in LIMITS],
+)
 def test_sweep_names_its_limits(separatrix, yoke, tmp_path, limit):
     """The first limit of a sweep: its kind, its value, and the speeds on both sides."""
     machine, (low, high), direction, start, kind, value = limit
