@@ -114,9 +114,6 @@ pure function why_not_varied(machine) result(why)
   associate (system => machine%motor%system)
     if (system%control%supply > 0) then
       why = 'motor.ramp_time: a machine that changes with time has no cycles; motor.ramp_time = 0 is the machine after the ramp'
-    else if (system%control%torque_limit > 0) then
-      why = 'motor.torque_limit: the variations of a limited torque are not known; motor.torque_limit = 0 is '// &
-        'the motor without a limit'
     end if
   end associate
 end function why_not_varied

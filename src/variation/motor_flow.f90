@@ -142,6 +142,9 @@ contains
         step = step_of(series%c(:, states), max(scales, abs(z)))
         if (step >= abs(left)) step = abs(left)
         step = sign(step, left)
+        if (control%command > 0) then
+          if (passes_limit(control, series%c(:, control%command), step)) exit
+        end if
         if (control%curve%count > 0) call stop_at_knot(control, series%c(:, states(w_at)), step, piece)
         do k = 1, count
           z(k) = value_of(series%c(:, states(k)), step)
@@ -151,6 +154,17 @@ contains
     end associate
     if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
   end subroutine take_steps
+
+  !> Whether the torque of a control, with the coefficients `c`, is beyond its limit within a step: variations there are not known.
+  pure logical function passes_limit(control, c, step) result(passes)
+    type(motor_control_t), intent(in) :: control
+    real(wp), intent(in) :: c(0:), step
+    integer :: i
+    passes = .false.
+    do i = 0, parts
+      passes = passes .or. abs(value_of(c, step*i/parts)) > control%torque_limit
+    end do
+  end function passes_limit
 
   !> Shortens a step to where the speed, with the coefficients `c`, leaves the piece of a table, which is then the next one.
   pure subroutine stop_at_knot(control, c, step, piece)
