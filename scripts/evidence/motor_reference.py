@@ -147,11 +147,8 @@ class Motion:
         self.limited = int(np.sign(command)) if abs(command) > limit else 0
 
     def control(self) -> Iterator[tuple[str, Guard]]:
-        """Guards of a limited speed control and of the knots of a table."""
+        """Guards of a limited speed control."""
         m = self.machine.motor
-        for knot in m["speed"] if m["law"] == "table" else ():
-            yield "knot", lambda _t, z, knot=knot: z[W] - knot
-            yield "knot", lambda _t, z, knot=knot: knot - z[W]
         limit = m.get("torque_limit", 0.0)
         if limit == 0:
             return

@@ -36,7 +36,7 @@ THRESHOLD = 6.383280023598
 
 def outcome(separatrix: Path, case: Path, folder: Path, *settings: str) -> str:
     """The last word of the line about the crank."""
-    sets = [f"--set={setting}" for setting in settings]
+    sets = [f"--set={setting}" for setting in (*settings, "run.average='window'")]
     report = succeed(separatrix, "trajectory", case, *sets, "-o", "motion.h5", "--force", folder=folder).out
     return re.search(r"^crank speed .*: (\w+)$", report, re.MULTILINE)[1]
 
@@ -73,7 +73,7 @@ def test_crank_that_does_not_get_round(separatrix, yoke, tmp_path):
 ])  # fmt: skip
 def test_impacts_raise_the_resonance(separatrix, tmp_path, case, voltage, speed, expected):
     """All these cranks turn faster than body and spring would oscillate; those before the resonance hit."""
-    sets = [f"motor.crank_speed={speed}", "run.duration=100", "run.window=20"]
+    sets = [f"motor.crank_speed={speed}", "run.duration=60", "run.window=12"]
     if voltage:
         sets.append(f"motor.voltage={voltage}")
     assert outcome(separatrix, EXAMPLES / f"motor_{case}.toml", tmp_path, *sets) == expected
@@ -119,6 +119,18 @@ def test_branches_find_the_fold(separatrix, yoke, tmp_path):
     ).out  # fmt: skip
     fold = re.search(r"SN at motor\.voltage = (\S+) V", report)
     assert abs(float(fold[1]) - 8.252828124769745) < 1e-8
+
+
+@pytest.mark.long
+def test_curve_of_folds(separatrix, yoke, tmp_path):
+    """The end of the slow run-up over the inertia passes the published value."""
+    words = "--parameter motor.voltage --from 8.2 --to 8.3 --searches 1".split()
+    words += "--free motor.inertia --free-from 0.045 --free-to 0.055 -o curve.h5".split()
+    succeed(separatrix, "branches", yoke, *words, folder=tmp_path, timeout=600)
+    with h5py.File(tmp_path / "curve.h5") as file:
+        voltage, inertia = file["curve_parameter"][()], file["curve_free"][()]
+    order = np.argsort(inertia)
+    assert abs(np.interp(0.05, inertia[order], voltage[order]) - 8.252828124769745) < 1e-8
 
 
 def test_exponents_are_those_of_the_multipliers(separatrix, tmp_path):
