@@ -274,7 +274,7 @@ def main() -> None:
                     wrong.append(f"{motor}, {drive}, {number}: {found[-1].wrong}")
             events = sum(one.events for one in found)
             apart, closing = max(one.difference for one in found), max(one.closing for one in found)
-            rows.append((motor, drive, len(found), events, f"{apart:.1e}", f"{closing:.1e}"))
+            rows.append((motor, drive, str(len(found)), str(events), f"{apart:.1e}", f"{closing:.1e}"))
             print(*rows[-1], *wrong[-1:], sep=" | ", flush=True)
     names = ["motor", "drive", "machines", "events", "largest difference", "energy"]
     listed = "\n".join(f"* {item}" for item in wrong) if wrong else "None."
