@@ -13,7 +13,7 @@ import xarray as xr
 from separatrix.cases import Case
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.open import decode_flags, decode_words, flag_names, table
-from separatrix.variables import KINDS, REGIMES
+from separatrix.variables import KINDS, REGIMES, is_start
 
 if TYPE_CHECKING:
     import pandas
@@ -49,7 +49,8 @@ class Accessor:
     def attractors(self) -> "pandas.DataFrame":
         """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ...
 
-        `crank_speed` is the mean of a machine with a motor [rad/s].
+        Of a motor `crank_speed` [rad/s], `torque` and `power` are means; `crank_outcome` is the
+        side of the resonance.
         `grazing_margin` is NaN where no turning point missed a barrier.
         """
         self._require("basin")
@@ -62,7 +63,9 @@ class Accessor:
             frame["kind"] = [KINDS[code - 1] for code in catalogue["kind"].values]
         frame["regime"] = [REGIMES[code] for code in catalogue["regime"].values]
         frame["event_word"] = decode_words(catalogue["event_word"]).values
-        if "motor" in self.case.resolved:
+        if "crank_outcome" in catalogue:
+            frame["crank_outcome"] = decode_flags(catalogue["crank_outcome"]).values
+        elif "motor" in self.case.resolved:
             frame["crank_speed"] = 2 * np.pi * frame["period"] / frame["cycle_time"]
         # not a number where no turning point missed a barrier; files of version 1 have the largest number
         margins = frame["grazing_margin"]
@@ -70,6 +73,21 @@ class Accessor:
         slices = np.unique(catalogue["slice"].values).size
         frame.insert(2, "share", frame["count"] * slices / self._result["attractor"].size)
         return frame.set_index(["slice", "attractor"] if slices > 1 else "attractor")
+
+    def of_attractor(self, column: str) -> xr.DataArray:
+        """Return a number of `attractors` at every point of a map: that of its attractor, NaN without one."""
+        values = self.attractors[column]
+        if values.dtype.kind not in "fi":
+            raise SeparatrixError(f"column '{column}' is no number", USAGE)
+        labels = self._result["attractor"]
+        keys = labels.values.ravel().tolist()
+        if values.index.nlevels > 1:
+            sizes = [1 if is_start(str(name)) else size for name, size in labels.sizes.items()]
+            slices = np.broadcast_to(np.arange(np.prod(sizes)).reshape(sizes), labels.shape)
+            keys = list(zip(slices.ravel().tolist(), keys, strict=True))
+        found = values.to_dict()
+        numbers = np.array([found.get(key, np.nan) for key in keys], float).reshape(labels.shape)
+        return xr.DataArray(numbers, labels.coords, labels.dims, column)
 
     @property
     def labelled_points(self) -> "pandas.DataFrame":

@@ -31,19 +31,22 @@ contains
     real(wp), dimension(machines%centre%n) :: point, growth
     real(wp) :: frame(machines%centre%n, machines%centre%n), batch(batches, machines%centre%n), duration
     logical :: ok
-    integer :: i, k, left, part
+    integer :: i, left, part
     series = 0
     batch = 0
     duration = 0
     left = size(point) - 1
-    frame = 0
-    do k = 1, size(point)
-      frame(k, k) = 1
-    end do
+    call begin_frame(frame)
     call machines%centre%fly_to_section(start, point, events, ok)
     if (.not. ok) spectrum%reason = reason_step_failed
     do i = 1 - transient, turns
       if (spectrum%reason == 0) call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
+      if (spectrum%reason == reason_not_smooth .and. i < 1) then
+        ! What a transient meets does not matter: the directions begin anew.
+        call begin_frame(frame)
+        left = size(point) - 1
+        call pass_turn(machines, point, spectrum%reason)
+      end if
       if (spectrum%reason /= 0) return
       if (i < 1) cycle
       duration = duration + events(size(events))%time
@@ -59,6 +62,31 @@ contains
     spectrum%mean_period = duration/turns
     call conclude(batch*batches/duration, left, spectrum)
   end subroutine exponents_of_turns
+
+  !> Directions along the coordinates.
+  pure subroutine begin_frame(frame)
+    real(wp), intent(out) :: frame(:, :)
+    integer :: k
+    frame = 0
+    do k = 1, size(frame, 1)
+      frame(k, k) = 1
+    end do
+  end subroutine begin_frame
+
+  !> One turn without directions.
+  subroutine pass_turn(machines, point, reason)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(inout) :: point(:)
+    integer, intent(out) :: reason
+    type(event_t), allocatable :: events(:)
+    type(tally_t) :: tally
+    real(wp) :: image(size(point))
+    integer :: mode
+    logical :: ok
+    call machines%centre%fly_sections(point, 1, .false., image, events, mode, tally, ok)
+    reason = merge(0, reason_step_failed, ok)
+    point = image
+  end subroutine pass_turn
 
   !> One turn, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions that
   !> the motion leaves of its start.

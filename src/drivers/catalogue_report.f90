@@ -6,11 +6,16 @@ module catalogue_report
   use angle_units, only: unit_of
   use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_family, kind_not_known, regime_names
   use basin, only: catalogue_t
-  use constants, only: two_pi
+  use build_motion, only: machine_of
+  use crank_summary, only: crank_outcomes, crank_summary_t
+  use crank_turns, only: summarize_attractor
+  use errors, only: error_t
   use journal, only: journal_t
   use kinds, only: wp
   use law_table, only: law_choice_t
-  use motor_choices, only: resonance_of
+  use machine_type, only: machine_t
+  use motion_state, only: options_t
+  use motor_choices, only: has_motor, resonance_of
   use restoring_law, only: position_is_angle
   use statistics, only: share_upper_limit
   use text, only: to_text
@@ -75,30 +80,34 @@ contains
     type(journal_t), intent(inout) :: journal
     type(attractor_t), intent(in) :: attractors(:)
     type(law_choice_t), intent(in) :: laws(:)
-    real(wp) :: resonance
+    class(machine_t), allocatable :: machine
+    type(error_t), allocatable :: error
     logical :: is_angle
     integer :: first, last
     is_angle = position_is_angle(laws)
-    resonance = resonance_of(laws)
+    if (has_motor(laws)) call machine_of(laws, options_t(), machine, error)
     first = 1
     do while (first <= size(attractors))
       last = alike_until(attractors, first)
-      call journal%line('attractor', attractor_text(attractors(first:last), is_angle)//speed_text(attractors(first), resonance))
+      call journal%line('attractor', attractor_text(attractors(first:last), is_angle)// &
+                        speed_text(laws, machine, attractors(first)))
       first = last + 1
     end do
   end subroutine list_attractors
 
-  !> The mean speed of the crank of a motor on a cycle, and on which side of the resonance [rad/s] that is; '' without a motor.
-  pure function speed_text(attractor, resonance) result(text)
+  !> The mean speed of the crank of a motor on a cycle, and on which side of the resonance that is; '' without a motor.
+  function speed_text(laws, machine, attractor) result(text)
+    type(law_choice_t), intent(in) :: laws(:)
+    class(machine_t), allocatable, intent(in) :: machine
     type(attractor_t), intent(in) :: attractor
-    real(wp), intent(in) :: resonance
     character(len=:), allocatable :: text
-    real(wp) :: speed
+    type(crank_summary_t) :: crank
     text = ''
-    if (.not. resonance > 0 .or. attractor%kind /= kind_cycle .or. .not. attractor%duration > 0) return
-    speed = two_pi*attractor%period/attractor%duration
-    text = ', crank speed '//to_text(speed, 6)//' rad/s, '//to_text(speed/resonance, 4)//' times the natural frequency: '// &
-      trim(merge('passed  ', 'captured', speed > resonance))
+    if (.not. allocated(machine) .or. attractor%kind /= kind_cycle) return
+    call summarize_attractor(machine, attractor, crank)
+    text = ', crank speed '//to_text(crank%speed, 6)//' rad/s'
+    if (resonance_of(laws) > 0) text = text//', '//to_text(crank%speed/resonance_of(laws), 4)//' times the natural frequency'
+    text = text//': '//trim(crank_outcomes(crank%outcome))
   end function speed_text
 
   !> The last of the entries from `first` on that share one line: motions that are not known to be periodic, alike but for their

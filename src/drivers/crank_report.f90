@@ -2,64 +2,74 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> What `separatrix trajectory` reports of a motor at the end of a motion: speed, torque and power over the window, and the outcome
-!> of a run-up.
+!> of a run-up; in the log and as attributes.
 module crank_report
-  use constants, only: two_pi
+  use crank_summary, only: crank_outcomes, crank_summary_t, crank_table, crank_values, summarize_crank
   use journal, only: journal_t
   use kinds, only: wp
   use law_table, only: law_choice_t
+  use map_schema, only: schema_t
   use motion_state, only: log_t
   use motor_choices, only: has_motor, resonance_of
   use text, only: to_text
   implicit none
   private
 
-  public :: crank_outcome, report_crank
+  public :: describe_crank, report_crank
 
 contains
 
-  !> One line, of a machine with a motor, over the samples of the last `window` [s].
+  !> Summary over the samples of the last `window` [s]; `known`: there is a motor, and there are samples.
+  subroutine summary_of_window(laws, window, log, summary, known)
+    type(law_choice_t), intent(in) :: laws(:)
+    real(wp), intent(in) :: window
+    type(log_t), intent(in) :: log
+    type(crank_summary_t), intent(out) :: summary
+    logical, intent(out) :: known
+    integer :: first, last
+    last = log%samples
+    known = has_motor(laws) .and. last > 1
+    if (.not. known) return
+    first = min(1 + count(log%sample_data(1, :last) < log%sample_data(1, last) - window), last - 1)
+    call summarize_crank(laws, log, first, last, summary)
+  end subroutine summary_of_window
+
+  !> One line, of a machine with a motor.
   subroutine report_crank(journal, laws, window, log)
     type(journal_t), intent(inout) :: journal
     type(law_choice_t), intent(in) :: laws(:)
     real(wp), intent(in) :: window
     type(log_t), intent(in) :: log
-    real(wp) :: mean, power, torque
+    type(crank_summary_t) :: crank
     character(len=:), allocatable :: outcome, ratio
-    integer :: first, last
-    last = log%samples
-    if (.not. has_motor(laws) .or. last < 2) return
-    first = 1 + count(log%sample_data(1, :last) < log%sample_data(1, last) - window)
-    first = min(first, last - 1)
-    associate (angle => log%sample_driver(1, first:last), speed => log%sample_driver(2, first:last), &
-               values => log%sample_coordinates(:, first:last))
-      mean = (angle(size(angle)) - angle(1))/(log%sample_data(1, last) - log%sample_data(1, first))
-      torque = sum(values(1, :))/size(angle)
-      power = sum(values(3, :))/size(angle)
-      outcome = crank_outcome(angle, speed, mean, resonance_of(laws))
-      ratio = ''
-      if (resonance_of(laws) > 0) ratio = to_text(mean/resonance_of(laws), 4)//' times the natural frequency, '
-      call journal%line('crank', 'crank speed '//to_text(mean, 7)//' rad/s ('//ratio//to_text(minval(speed), 5)//' to '// &
-        to_text(maxval(speed), 5)//'), torque '//to_text(torque, 5)//' N m (at most '//to_text(maxval(abs(values(1, :))), 5)// &
-        '), power '//to_text(power, 5)//' W: '//outcome, '"speed": '//to_text(mean)//', "outcome": "'//outcome//'"')
-    end associate
+    logical :: known
+    call summary_of_window(laws, window, log, crank, known)
+    if (.not. known) return
+    outcome = trim(crank_outcomes(crank%outcome))
+    ratio = ''
+    if (resonance_of(laws) > 0) ratio = to_text(crank%speed/resonance_of(laws), 4)//' times the natural frequency, '
+    call journal%line('crank', 'crank speed '//to_text(crank%speed, 7)//' rad/s ('//ratio//to_text(crank%speed_min, 5)//' to '// &
+      to_text(crank%speed_max, 5)//'), torque '//to_text(crank%torque, 5)//' N m (at most '//to_text(crank%torque_max, 5)// &
+      '), power '//to_text(crank%power, 5)//' W: '//outcome, '"speed": '//to_text(crank%speed)//', "outcome": "'//outcome//'"')
   end subroutine report_crank
 
-  !> Outcome from angles [rad] and speeds [rad/s] over a while, their mean speed, and the speed at resonance (0: none).
-  pure function crank_outcome(angle, speed, mean, resonance) result(outcome)
-    real(wp), intent(in) :: angle(:), speed(:), mean, resonance
-    character(len=:), allocatable :: outcome
-    if (.not. any(abs(speed) > 0)) then
-      outcome = 'stalled'
-    else if (maxval(angle) - minval(angle) < two_pi .and. minval(speed)*maxval(speed) < 0) then
-      outcome = 'rocking'
-    else if (mean < 0) then
-      outcome = 'reversed'
-    else if (.not. resonance > 0) then
-      outcome = 'turning'
-    else
-      outcome = trim(merge('passed  ', 'captured', mean > resonance))
-    end if
-  end function crank_outcome
+  !> The same as attributes of a file.
+  subroutine describe_crank(laws, window, log, schema)
+    type(law_choice_t), intent(in) :: laws(:)
+    real(wp), intent(in) :: window
+    type(log_t), intent(in) :: log
+    type(schema_t), intent(inout) :: schema
+    type(crank_summary_t) :: crank
+    real(wp) :: values(size(crank_table))
+    logical :: known
+    integer :: i
+    call summary_of_window(laws, window, log, crank, known)
+    if (.not. known) return
+    values = crank_values(crank)
+    do i = 1, size(values)
+      call schema%add_attribute('', trim(crank_table(i)%name), values(i))
+    end do
+    call schema%add_attribute('', 'crank_outcome', trim(crank_outcomes(crank%outcome)))
+  end subroutine describe_crank
 
 end module crank_report

@@ -4,17 +4,19 @@
 !> The two chains of a sweep, run up and run down, each by one rank, and the limits between which impacts occur, or a regime
 !> of two bodies.
 module sweep_chain
-  use attractors, only: features_t
+  use crank_summary, only: crank_numbers, crank_values
   use errors, only: error_t
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use limit_kind, only: find_kind, kind_not_known
   use machine_type, only: section_state_t
+  use motor_choices, only: has_motor, start_of_motor
   use status, only: reason_time_over
   use stop_check, only: check_stop
-  use settling, only: settled_t
+  use settling, only: marks_of_outcome, same_mark, settled_t
   use sweep, only: hold_parameter, hold_t
-  use sweep_limits, only: branch_end, limit_not_known, observe_limit
+  use sweep_limits, only: branch_end, limit_bracketed, limit_not_known, observe_limit
   use team, only: team_t
   use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -23,13 +25,13 @@ module sweep_chain
 
   public :: new_chains, run_chains
 
-  !> Numbers kept of a hold before its samples: regime, reason, period, word, impacts per period, mean
-  !> impact speed, amplitude, x_max, x_min, v_max; the first four are codes, 0 where a direction was not run, the rest is
-  !> not a number there.
-  integer, parameter :: hold_numbers = 11, hold_codes = 4
-  integer, parameter, public :: hold_reason = 2, hold_impacts = 5
+  !> Numbers kept of a hold before its samples: regime, reason, period, word, outcome of a crank, impacts per period, mean
+  !> impact speed, amplitude, x_max, x_min, v_max, rotation, cycle time, and those of a crank; the first five are codes, 0 where
+  !> a direction was not run, the rest is not a number there.
+  integer, parameter :: hold_numbers = 13 + crank_numbers, hold_codes = 5
+  integer, parameter, public :: hold_reason = 2, hold_outcome = 5, hold_impacts = 6, hold_cycle_time = 13, hold_crank = 14
   !> Numbers kept of each limit.
-  integer, parameter :: limit_numbers = 7
+  integer, parameter :: limit_numbers = 11
 
   type, public :: limit_t
     !> Marks of the holds (see `hold_t`) before and behind it, and whether the parameter goes up.
@@ -40,6 +42,10 @@ module sweep_chain
     !> Values between which the settled motion comes to its end, if the outcome is `limit_bracketed`; else not numbers.
     real(wp) :: bracket(2) = 0
     integer :: outcome = limit_not_known
+    !> Of a motor: what ends the cycle, at which value (not a number: not known), and the mean speed of the crank before and after
+    !> the change in steps [rad/s].
+    integer :: kind = kind_not_known
+    real(wp) :: at = 0, speed(2) = 0
   end type limit_t
 
   !> Up (1) and down (2): numbers of each hold, and its section samples.
@@ -101,7 +107,7 @@ contains
   end function new_chains
 
   !> One chain as plain numbers: holds, samples, number of limits, and of each marks before and behind, the bracket in
-  !> steps, that of the settled motion, its outcome. `done` values were run before.
+  !> steps, that of the settled motion, its outcome, its kind and value, speeds. `done` values were run before.
   subroutine run_chain(journal, done, time_limit, grid, span, path, values, up, samples, longest, tolerance, packed, error)
     type(journal_t), intent(inout) :: journal
     integer, intent(in) :: done
@@ -114,14 +120,13 @@ contains
     integer, intent(in) :: samples, longest
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), observed(2), bracket(2)
+    real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), speed
     real(wp) :: limits(limit_numbers, size(values)), visited(size(values))
     type(hold_t) :: held
     type(settled_t) :: settled(size(values))
     type(section_state_t) :: state
-    integer :: i, k, found, before, mark, next, outcome
-    state%state%x = grid%start(1)
-    state%state%v = grid%start(2)
+    integer :: i, k, found, before, mark
+    state = first_state(grid)
     found = 0
     before = 0
     mark = 0
@@ -137,18 +142,18 @@ contains
       points(:, :, k) = held%samples
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == reason_time_over) then
-        if (before > 0 .and. held%mark /= mark) then
-          next = held%mark
-          call observe_limit(grid, span, path, visited(before), visited(i), state, mark, tolerance, next, observed, error)
-          if (.not. allocated(error)) call branch_end(grid, path, visited, settled(:before), state, mark, longest, tolerance, &
-                                                      bracket, outcome, error)
-          if (allocated(error)) return
+        if (before > 0 .and. .not. same_mark(held%mark, mark)) then
           found = found + 1
-          limits(:, found) = [real([mark, next], wp), observed, bracket, real(outcome, wp)]
+          call find_limit(grid, span, path, visited, i, settled(:before), state, [mark, held%mark], longest, tolerance, &
+                          limits(:, found), error)
+          if (allocated(error)) return
+          limits(limit_numbers - 1:, found) = [speed, held%crank%speed]
         end if
-        mark = held%mark
+        ! An outcome that is not known is none that has changed.
+        if (held%mark >= marks_of_outcome .or. before == 0 .or. mark < marks_of_outcome) mark = held%mark
         before = i
         state = held%state
+        speed = held%crank%speed
       end if
       call journal%progress(int(done + i, int64))
       call check_stop(journal, time_limit, 'running '//trim(path)//trim(merge(' up  ', ' down', up)), error)
@@ -158,12 +163,58 @@ contains
               reshape(limits(:, :found), [limit_numbers*found])]
   end subroutine run_chain
 
+  !> The state before the first hold: a motor has a speed, and a current or an integral, too.
+  pure type(section_state_t) function first_state(grid) result(state)
+    type(grid_t), intent(in) :: grid
+    real(wp) :: motor(2)
+    state%state%x = grid%start(1)
+    state%state%v = grid%start(2)
+    if (.not. has_motor(grid%laws)) return
+    motor = start_of_motor(grid%laws)
+    state%motor%w = motor(1)
+    state%motor%own(1) = motor(2)
+  end function first_state
+
+  !> A limit before number `beyond` of the values that are `visited`, the motion having settled as `settled` at those before that
+  !> were not given up, and being in a `state` then; `marks` before and behind it. Numbers as in `run_chain`, without speeds.
+  subroutine find_limit(grid, span, path, visited, beyond, settled, state, marks, longest, tolerance, numbers, error)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: visited(:), tolerance
+    type(settled_t), intent(in) :: settled(:)
+    type(section_state_t), intent(in) :: state
+    integer, intent(in) :: beyond, marks(2), longest
+    real(wp), intent(out) :: numbers(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(settled_t) :: last
+    real(wp) :: observed(2), bracket(2), near, at
+    integer :: next, outcome, kind
+    numbers = 0
+    next = marks(2)
+    call observe_limit(grid, span, path, visited(size(settled)), visited(beyond), state, marks(1), tolerance, next, observed, error)
+    if (allocated(error)) return
+    call branch_end(grid, path, visited, settled, state, marks(1), longest, tolerance, bracket, outcome, error, last, near)
+    if (allocated(error)) return
+    kind = kind_not_known
+    at = ieee_value(1.0_wp, ieee_quiet_nan)
+    if (has_motor(grid%laws)) then
+      if (outcome == limit_bracketed) then
+        call find_kind(grid, path, last, near, bracket, kind, at)
+      else
+        call find_kind(grid, path, last, near, [min(near, observed(1)), max(near, observed(2))], kind, at)
+      end if
+    end if
+    numbers(:limit_numbers - 2) = [real([marks(1), next], wp), observed, bracket, real([outcome, kind], wp), at]
+  end subroutine find_limit
+
   pure function numbers_of(held) result(numbers)
     type(hold_t), intent(in) :: held
     real(wp) :: numbers(hold_numbers)
     associate (f => held%features)
       numbers = [real(f%regime, wp), real(held%reason, wp), real(held%settled%period, wp), real(f%word, wp), &
-                 f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, f%rotation]
+                 real(held%crank%outcome, wp), f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, &
+                 f%v_max, f%rotation, held%settled%duration, crank_values(held%crank)]
     end associate
   end function numbers_of
 
@@ -186,7 +237,7 @@ contains
       do i = 1, count
         associate (numbers => all_values(position + limit_numbers*(i - 1) + 1:position + limit_numbers*i))
           chains%limits = [chains%limits, limit_t(nint(numbers(1)), nint(numbers(2)), direction == 1, numbers(3:4), numbers(5:6), &
-                                                  nint(numbers(7)))]
+                                                  nint(numbers(7)), nint(numbers(8)), numbers(9), numbers(10:11))]
         end associate
       end do
       position = position + limit_numbers*count + 1

@@ -7,16 +7,20 @@ module sweep_report
   use case_type, only: contact_position => contact_law
   use constants, only: unreachable
   use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
+  use crank_summary, only: crank_numbers, crank_outcomes, crank_table, last_crank_outcome
   use file_layout, only: add_axes, add_reason, add_regime
   use journal, only: json_number
   use kinds, only: int64, wp
   use law_table, only: effect_family
+  use limit_kind, only: kind_not_known, last_limit_kind, limit_kinds
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int8
+  use motor_choices, only: has_motor
   use pair, only: is_pair
   use restoring_law, only: position_is_angle
   use session, only: session_t
+  use settling, only: marks_of_outcome
   use status, only: reason_names, reason_time_over
-  use sweep_chain, only: chains_t, hold_impacts, hold_reason, limit_t
+  use sweep_chain, only: chains_t, hold_crank, hold_cycle_time, hold_impacts, hold_outcome, hold_reason, limit_t
   use sweep_limits, only: limit_beyond_range, limit_bracketed, limit_outcomes
   use text, only: interval_text, join, replace_all, to_text
   implicit none
@@ -44,15 +48,16 @@ contains
     call fill(2)
     call add('period', type_int16, '1', 'period in drive periods of the cycle on which the motion settles, 0 = not known', 3)
     call add('event_word', type_float64, '1', 'events of one period of the motion, three bits each', 4)
-    call add('impacts_per_period', type_float64, '1', 'impacts per drive period', 5)
-    call add('mean_impact_speed', type_float64, 'm/s', 'mean speed just before impact', 6)
-    call add('amplitude', type_float64, 'm', 'half the range of the position', 7)
-    call add('x_max', type_float64, 'm', 'largest position', 8)
-    call add('x_min', type_float64, 'm', 'smallest position', 9)
-    call add('v_max', type_float64, 'm/s', 'largest velocity towards the upper barrier', 10)
+    call add('impacts_per_period', type_float64, '1', 'impacts per drive period', 6)
+    call add('mean_impact_speed', type_float64, 'm/s', 'mean speed just before impact', 7)
+    call add('amplitude', type_float64, 'm', 'half the range of the position', 8)
+    call add('x_max', type_float64, 'm', 'largest position', 9)
+    call add('x_min', type_float64, 'm', 'smallest position', 10)
+    call add('v_max', type_float64, 'm/s', 'largest velocity towards the upper barrier', 11)
     if (position_is_angle(session%the_case%laws)) then
-      call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 11)
+      call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 12)
     end if
+    if (has_motor(session%the_case%laws)) call add_crank()
     call schema%add_variable('section_x', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
       units='m', long_name='position at crank angle 0', data=reshape(chains%samples(1, :, :, :), &
       [size(chains%samples)/2]))
@@ -75,6 +80,18 @@ contains
       call schema%add_variable(name, type, dimensions, units=units, long_name=long_name)
       call fill(row)
     end subroutine add
+
+    subroutine add_crank()
+      integer :: i
+      call schema%add_variable('crank_outcome', type_int8, dimensions, units='1', long_name='outcome of a run-up of the crank', &
+                               flag_values=[(i, i=0, last_crank_outcome)], flag_meanings=join(crank_outcomes, ' '))
+      call fill(hold_outcome)
+      call add('cycle_time', type_float64, 's', 'time that one cycle takes, 0 = not known', hold_cycle_time)
+      do i = 1, crank_numbers
+        call add(trim(crank_table(i)%name), type_float64, trim(crank_table(i)%unit), trim(crank_table(i)%meaning), &
+                 hold_crank + i - 1)
+      end do
+    end subroutine add_crank
 
     subroutine fill(row)
       integer, intent(in) :: row
@@ -132,6 +149,14 @@ contains
     call add('upper', 'upper end of the bracket in which the settled motion ends', limits%bracket(2))
     call add('observed_lower', 'lower end of the bracket in which the change is seen in steps', limits%observed(1))
     call add('observed_upper', 'upper end of the bracket in which the change is seen in steps', limits%observed(2))
+    if (.not. has_motor(session%the_case%laws)) return
+    call schema%add_variable('kind', type_int8, ['limit'], units='1', group='limits', data=real(limits%kind, wp), &
+                             long_name='bifurcation that ends the settled cycle', flag_values=[(i, i=0, last_limit_kind)], &
+                             flag_meanings=join(limit_kinds, ' '))
+    call add('value', 'value of that bifurcation', limits%at)
+    unit = 'rad/s'
+    call add('crank_speed_before', 'mean speed of the crank before the change in steps', limits%speed(1))
+    call add('crank_speed_after', 'mean speed of the crank after the change in steps', limits%speed(2))
 
   contains
 
@@ -151,7 +176,13 @@ contains
     if (is_pair(session%the_case%laws)) then
       name = trim(regime_names(limit%from))//'_to_'//trim(regime_names(limit%to))
     else
-      name = 'impacts_'//trim(merge('start', 'stop ', limit%to == regime_impact))
+      associate (from => modulo(limit%from, marks_of_outcome), to => modulo(limit%to, marks_of_outcome))
+        if (from /= to) then
+          name = 'impacts_'//trim(merge('start', 'stop ', to == regime_impact))
+        else
+          name = trim(crank_outcomes(limit%from/marks_of_outcome))//'_to_'//trim(crank_outcomes(limit%to/marks_of_outcome))
+        end if
+      end associate
     end if
     name = name//'_'//trim(merge('up  ', 'down', limit%up))
   end function limit_name
@@ -189,10 +220,10 @@ contains
       do i = 1, size(limits)
         name = limit_name(session, limits(i))
         call session%journal%line('limit', '  run '//trim(merge('up  ', 'down', limits(i)%up))//': '// &
-          replace_all(name(:index(name, '_', back=.true.) - 1), '_', ' ')//' '//limit_text(limits(i)), &
+          replace_all(name(:index(name, '_', back=.true.) - 1), '_', ' ')//' '//limit_text(limits(i))//crank_text(limits(i)), &
           '"name": "'//name//'", "settled": "'//trim(limit_outcomes(limits(i)%outcome))//'", "lower": '// &
           json_number(limits(i)%bracket(1))//', "upper": '//json_number(limits(i)%bracket(2))//', "observed_lower": '// &
-          json_number(limits(i)%observed(1))//', "observed_upper": '//json_number(limits(i)%observed(2)))
+          json_number(limits(i)%observed(1))//', "observed_upper": '//json_number(limits(i)%observed(2))//crank_json(limits(i)))
       end do
     end associate
     if (size(chains%limits) > 0) return
@@ -206,6 +237,29 @@ contains
     else
       call session%journal%line('limit', '  impacts neither start nor stop')
     end if
+
+  contains
+
+    !> What ends the cycle of a motor, and the jump of its speed.
+    function crank_text(limit) result(text)
+      type(limit_t), intent(in) :: limit
+      character(len=:), allocatable :: text
+      text = ''
+      if (.not. has_motor(session%the_case%laws)) return
+      text = '; the crank goes from '//to_text(limit%speed(1), 6)//' to '//to_text(limit%speed(2), 6)//' rad/s'
+      if (limit%kind == kind_not_known) return
+      text = '; '//replace_all(trim(limit_kinds(limit%kind)), '_', '-')//' at '//to_text(limit%at, 12)//text
+    end function crank_text
+
+    function crank_json(limit) result(text)
+      type(limit_t), intent(in) :: limit
+      character(len=:), allocatable :: text
+      text = ''
+      if (.not. has_motor(session%the_case%laws)) return
+      text = ', "kind": "'//trim(limit_kinds(limit%kind))//'", "value": '//json_number(limit%at)//', "crank_speed_before": '// &
+        json_number(limit%speed(1))//', "crank_speed_after": '//json_number(limit%speed(2))
+    end function crank_json
+
   end subroutine report_limits
 
   !> Where a limit is, with as many digits as its brackets are worth.

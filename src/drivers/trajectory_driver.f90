@@ -10,6 +10,7 @@ module trajectory_driver
   use command_line, only: command_t
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
+  use crank_report, only: describe_crank
   use endings, only: assess_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
@@ -84,6 +85,7 @@ contains
                         cycle)
     call describe_file(session, 'trajectory', schema)
     call describe_motion(moving, span, outcome, cycle, log, schema)
+    call describe_crank(session%the_case%laws, span%window, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
     call add_columns(moving%event_columns(log), 'event', 'event_', schema)

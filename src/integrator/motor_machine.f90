@@ -29,6 +29,7 @@ module motor_machine
 
   type, extends(machine_t), public :: motor_machine_t
     type(motor_motion_t) :: motor
+    type(law_choice_t), allocatable :: laws(:)
     !> Size of the current [A] or the integral [rad].
     real(wp) :: own_size = 1
     !> Speed of the crank [rad/s] and current or integral where a start has none.
@@ -72,6 +73,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call prepare_motor(choices, options, machine%motor, error)
     if (allocated(error)) return
+    machine%laws = choices
     machine%own_start = start_of_motor(choices)
     call set_facts(machine)
   end subroutine prepare_motor_machine

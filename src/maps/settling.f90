@@ -7,6 +7,8 @@
 module settling
   use attractors, only: features_t, most_coordinates, regime_impact, regime_non_impact
   use circle, only: point_near
+  use crank_summary, only: crank_summary_t
+  use crank_turns, only: summarize_turns
   use kinds, only: wp
   use machine_type, only: machine_t, section_state_t
   use motion_features, only: cycle_word, features_over
@@ -14,13 +16,15 @@ module settling
   implicit none
   private
 
-  public :: settle, mark_of
+  public :: settle, mark_of, same_mark, with_crank
 
   !> Distance of a section point from that one cycle before, in sizes of the motion: below the first the motion has settled, above
   !> the second it is nowhere near a cycle.
   real(wp), parameter :: at_rounding = 1e-10_wp, near = 0.02_wp
   !> Below this distance a period may be a multiple of that of the cycle: which, will show.
   real(wp), parameter :: undecided = 1e-6_wp
+  !> More than any mark without a motor.
+  integer, parameter, public :: marks_of_outcome = 64
   !> Returns shrink if they do by this factor within some rounds, far from a cycle within one: those of chaos do now and then.
   real(wp), parameter :: shrinking = 0.99_wp, approaching = 0.9_wp
   integer, parameter :: rounds_to_shrink = 4
@@ -40,6 +44,8 @@ module settling
     type(features_t) :: features
     !> See `mark_of`.
     integer :: mark = 0
+    !> Of a motor, over the cycle, or the turns after a motion that has not settled.
+    type(crank_summary_t) :: crank
     !> Not 0 if the motion had to be given up, see module `status`.
     integer :: reason = 0
   end type settled_t
@@ -112,8 +118,26 @@ contains
       settled%features = features_over(moving, tally, real(size(points, 2), wp))
       settled%features%word = 0
     end if
-    settled%mark = mark_of(moving, settled%features)
+    if (.not. moving%timed) then
+      call summarize_turns(moving, settled%state, merge(settled%period, longest, settled%period > 0), &
+                           merge(settled%duration, longest*moving%period, settled%period > 0), settled%crank)
+    end if
+    settled%mark = with_crank(mark_of(moving, settled%features), settled%crank)
   end subroutine settle_on_section
+
+  !> The mark of a machine with a motor: beside the other one the outcome of a run-up.
+  pure integer function with_crank(mark, crank) result(both)
+    integer, intent(in) :: mark
+    type(crank_summary_t), intent(in) :: crank
+    both = mark + marks_of_outcome*crank%outcome
+  end function with_crank
+
+  !> Whether two marks are the same as far as they are known.
+  pure logical function same_mark(one, other) result(same)
+    integer, intent(in) :: one, other
+    same = modulo(one, marks_of_outcome) == modulo(other, marks_of_outcome)
+    if (min(one, other) >= marks_of_outcome) same = one == other
+  end function same_mark
 
   !> The mark by which limits are found: the regime of bodies that may ride along, else whether there are impacts.
   pure integer function mark_of(moving, features) result(mark)

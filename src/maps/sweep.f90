@@ -6,13 +6,15 @@
 !> the parameter changes and its angle carries over exactly.
 module sweep
   use attractors, only: features_t
+  use crank_summary, only: crank_summary_t, no_summary
+  use crank_turns, only: summarize_turns
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
   use machine_type, only: machine_t, section_state_t
   use motion_features, only: features_over
   use motion_state, only: tally_t
-  use settling, only: mark_of, settle, settled_t
+  use settling, only: mark_of, settle, settled_t, with_crank
   use span_check, only: check_periods
   use status, only: reason_time_over
   use single_trajectory, only: span_t
@@ -33,6 +35,8 @@ module sweep
     integer :: mark = 0
     !> Where the motion would end if the hold went on.
     type(settled_t) :: settled
+    !> Of a motor, as long as the window, after it; over the cycle where one was found.
+    type(crank_summary_t) :: crank
   end type hold_t
 
 contains
@@ -70,6 +74,7 @@ contains
       if (held%reason /= 0) then
         held%samples = ieee_value(1.0_wp, ieee_quiet_nan)
         held%features = no_features()
+        held%crank = no_summary()
         return
       end if
       if (i > periods - samples) held%samples(:, i - periods + samples) = [held%state%state%x, held%state%state%v]
@@ -77,12 +82,16 @@ contains
     if (.not. moving%has_clock) call sample_turns(moving, held%state, held%samples)
     held%reason = reason_time_over
     held%features = features_over(moving, tally, real(in_window, wp))
-    held%mark = mark_of(moving, held%features)
+    if (.not. moving%timed) then
+      call summarize_turns(moving, held%state, in_window, in_window*moving%period, held%crank)
+    end if
+    held%mark = with_crank(mark_of(moving, held%features), held%crank)
     held%features%word = 0
     if (longest == 0) return
     call settle(moving, held%state, longest, 0, held%settled)
     held%features%word = held%settled%features%word
     if (held%settled%period == 0) return
+    held%crank = held%settled%crank
     associate (seen => held%features, cycle => held%settled%features)
       seen%regime = cycle%regime
       seen%impacts_per_period = cycle%impacts_per_period

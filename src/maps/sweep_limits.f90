@@ -10,7 +10,7 @@ module sweep_limits
   use grid, only: grid_t, machine_with
   use kinds, only: wp
   use machine_type, only: machine_t, section_state_t
-  use settling, only: settle, settled_t
+  use settling, only: same_mark, settle, settled_t
   use status, only: reason_time_over
   use sweep, only: hold_parameter, hold_t
   use single_trajectory, only: span_t
@@ -59,7 +59,7 @@ contains
       call hold_parameter(grid, span, path, middle, last, 0.0_wp, 0, 0, held, error)
       if (allocated(error)) return
       if (held%reason /= reason_time_over) exit
-      if (held%mark == mark) then
+      if (same_mark(held%mark, mark)) then
         near = middle
         last = held%state
       else
@@ -72,8 +72,9 @@ contains
 
   !> Follows the motion with `mark`, whose mark has changed behind the last of the `values` for which there is a `settled`, where
   !> the state was `state`, from the last of them at which it had settled. A motion may have left its branch long before its mark
-  !> shows it; one that has not settled, and does not even when it is watched for long, cannot be followed.
-  subroutine branch_end(grid, path, values, settled, state, mark, longest, tolerance, bracket, outcome, error)
+  !> shows it; one that has not settled, and does not even when it is watched for long, cannot be followed. `last` is the last one
+  !> that has settled, `at` its value.
+  subroutine branch_end(grid, path, values, settled, state, mark, longest, tolerance, bracket, outcome, error, last, at)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: values(:), tolerance
@@ -83,8 +84,11 @@ contains
     real(wp), intent(out) :: bracket(2)
     integer, intent(out) :: outcome
     type(error_t), allocatable, intent(out) :: error
+    type(settled_t), intent(out) :: last
+    real(wp), intent(out) :: at
     type(settled_t) :: there, next
     integer :: from
+    at = values(size(settled))
     bracket = ieee_value(1.0_wp, ieee_quiet_nan)
     outcome = limit_not_known
     from = size(settled)
@@ -95,22 +99,22 @@ contains
       if (.not. allocated(error)) there = next
     end if
     if (allocated(error)) return
-    if (there%period == 0 .and. there%mark == mark) return
-    do while (there%period == 0 .or. there%mark /= mark)
+    if (there%period == 0 .and. same_mark(there%mark, mark)) return
+    do while (there%period == 0 .or. .not. same_mark(there%mark, mark))
       from = from - 1
       if (from == 0) return
       there = settled(from)
     end do
-    call follow_limit(grid, path, values(from), values(size(values)), abs(values(from + 1) - values(from)), &
-      there, longest, &
-                      tolerance, bracket, outcome, error)
+    call follow_limit(grid, path, values(from), values(size(values)), abs(values(from + 1) - values(from)), there, longest, &
+                      tolerance, bracket, outcome, error, last, at)
   end subroutine branch_end
 
   !> Follows a motion that has settled at `value` of the parameter `path` towards `last`, its settled motions being cycles of at
   !> most `longest` drive periods. Steps begin as `step` and are halved where the motion does not settle with the same mark. The
   !> end of the branch is between the last value at which it did and one, at most `tolerance` away where possible, at which
-  !> the mark is another. `outcome` is `limit_bracketed` then; else `bracket` is not numbers.
-  subroutine follow_limit(grid, path, value, last, step, settled, longest, tolerance, bracket, outcome, error)
+  !> the mark is another. `outcome` is `limit_bracketed` then; else `bracket` is not numbers. `here` is the last motion that has
+  !> settled with the same mark, at the value `near`.
+  subroutine follow_limit(grid, path, value, last, step, settled, longest, tolerance, bracket, outcome, error, here, near)
     type(grid_t), intent(in) :: grid
     character(len=*), intent(in) :: path
     real(wp), intent(in) :: value, last, step, tolerance
@@ -119,8 +123,10 @@ contains
     real(wp), intent(out) :: bracket(2)
     integer, intent(out) :: outcome
     type(error_t), allocatable, intent(out) :: error
-    type(settled_t) :: here, next, before
-    real(wp) :: near, far, behind, h, smallest, ahead
+    type(settled_t), intent(out) :: here
+    real(wp), intent(out) :: near
+    type(settled_t) :: next, before
+    real(wp) :: far, behind, h, smallest, ahead
     integer :: i
     bracket = ieee_value(1.0_wp, ieee_quiet_nan)
     outcome = limit_not_known
@@ -144,8 +150,8 @@ contains
       if (.not. keeps(next, here) .and. abs(far - near) <= smallest) then
         call look_beyond(grid, path, near, last, step, here, longest, tolerance, far, next, error)
         if (allocated(error)) return
-        if (next%mark == here%mark .and. next%period == 0) return
-        if (next%mark /= here%mark) then
+        if (same_mark(next%mark, here%mark) .and. next%period == 0) return
+        if (.not. same_mark(next%mark, here%mark)) then
           bracket = [min(near, far), max(near, far)]
           outcome = limit_bracketed
           return
@@ -166,7 +172,7 @@ contains
   !> Whether a motion has settled with the mark of another.
   pure logical function keeps(next, here)
     type(settled_t), intent(in) :: next, here
-    keeps = next%period > 0 .and. next%mark == here%mark
+    keeps = next%period > 0 .and. same_mark(next%mark, here%mark)
   end function keeps
 
   !> What becomes of the motion that has settled at `near` where it can no longer be followed: goes `tolerance` further, or where
@@ -187,7 +193,7 @@ contains
       far = near + sign(min(width, abs(last - near)), last - near)
       call settle_at(grid, path, far, here, longest, patience, next, error)
       if (allocated(error)) return
-      if (next%period > 0 .or. next%mark /= here%mark .or. .not. next%near_cycle) return
+      if (next%period > 0 .or. .not. same_mark(next%mark, here%mark) .or. .not. next%near_cycle) return
       if (width >= min(step, abs(last - near))) return
       width = min(2*width, step)
     end do

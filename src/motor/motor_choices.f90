@@ -16,6 +16,8 @@ module motor_choices
 
   !> Largest decay of a difference of speeds over a turn, as an exponent.
   real(wp), parameter :: most_decay = 1e4_wp
+  !> By how much a rod is longer than its crank at least, as a share: at the dead point the speed of the foot is infinite.
+  real(wp), parameter :: dead_point = 1e-9_wp
   character(len=*), parameter :: too_steep = 'motor.inertia: so small that the crank speed settles within 1e-4 of a turn; '// &
     'allowed a larger one, or a drive of given speed without [motor]'
 
@@ -158,8 +160,9 @@ contains
     end if
     if (allocated(error)) return
     if (drive%name == 'slider_crank') then
-      if (.not. value_of(drive, 'rod') > value_of(drive, 'crank')) then
-        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully')
+      if (.not. value_of(drive, 'rod') > (1 + dead_point)*value_of(drive, 'crank')) then
+        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully, and '// &
+                  'one as long has a dead point')
       end if
     end if
   end subroutine refuse_laws

@@ -16,6 +16,9 @@ module motor_limits
 
   public :: active_limits, change_limits, start_limits
 
+  !> Share of a speed that rounding of the instant of an event makes of it.
+  real(wp), parameter :: rounding_of_speed = 1024*epsilon(1.0_wp)
+
 contains
 
   !> Supply, piece of the table and limits at a start; `settled`: a ramp is over.
@@ -66,7 +69,7 @@ contains
     mode = equation_mode(slips(state%mode), crank%turning /= 0)
     call low_series(system, mode, state, crank, series, fault)
     associate (beyond => crank%held*series%c(:, system%flights(mode, 0)%guards(guard_resume)%node))
-      if (is_beyond(beyond, 64*epsilon(1.0_wp)*abs(crank%w))) crank%held = 0
+      if (is_beyond(beyond, rounding_of_speed*abs(crank%w))) crank%held = 0
     end associate
   end subroutine release_integral
 

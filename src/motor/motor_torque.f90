@@ -25,6 +25,8 @@ module motor_torque
     real(wp) :: from = 0, to = 0, rate = 0
     !> Largest torque of a speed control [N m], and the integral that gives it alone [rad]; 0: none.
     real(wp) :: torque_limit = 0, largest_integral = 0
+    !> Node of the torque that a limited control asks for.
+    integer :: command = 0
     !> Table of the torque, and its polynomials.
     type(curve_t) :: curve
     real(wp) :: pieces(0:3, 0:most_knots) = 0
@@ -134,6 +136,7 @@ contains
     call define(sheet, 'integral_up', 'integral*y - torque_limit')
     call define(sheet, 'integral_down', 'integral*y + torque_limit')
     call define(sheet, 'resume', 'w - reference')
+    control%command = node_of(sheet, 'command')
     control%follows = parameter_number(sheet, 'follows')
     control%limited = parameter_number(sheet, 'limited')
     control%integrates = parameter_number(sheet, 'integrates')

@@ -4,6 +4,7 @@
 !> A body with a motor as a hybrid machine without a clock. Its state is x [m], crank angle [rad], v [m/s], crank speed [rad/s], and
 !> current [A] or integral [rad]. The section, the passage of the crank through a turn, is the last event of every cycle.
 module motor_body
+  use curve_law, only: piece_at
   use guards, only: turns_round
   use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
   use constants, only: two_pi
@@ -112,11 +113,7 @@ pure function why_not_varied(machine) result(why)
   why = ''
   associate (system => machine%motor%system)
     if (system%control%supply > 0) then
-      why = 'motor.ramp_time: during a ramp there are no cycles'
-    else if (system%control%torque_limit > 0) then
-      why = 'motor.torque_limit: variations are not available for a limited torque'
-    else if (system%control%curve%count > 0) then
-      why = 'motor.law: found "table"; variations are not available for a tabulated torque'
+      why = 'motor.ramp_time: during a ramp there are no cycles; motor.ramp_time = 0 is the machine after it'
     end if
   end associate
 end function why_not_varied
@@ -156,7 +153,8 @@ end function motor_body_of
 pure type(motor_state_t) function crank_in(self, y) result(crank)
   class(motor_body_t), intent(in) :: self
   real(wp), intent(in) :: y(:)
-  crank = motor_state_t(phi=y(angle_of), w=y(speed_of), turning=merge(-1, 1, y(speed_of) < 0))
+  crank = motor_state_t(phi=y(angle_of), w=y(speed_of), turning=merge(-1, 1, y(speed_of) < 0), &
+                        piece=piece_at(self%machine%motor%system%control%curve, y(speed_of)))
   if (self%n == own_of) crank%own(1) = y(own_of)
 end function crank_in
 

@@ -4,8 +4,10 @@
 !> Flights of a machine with a motor between events, forwards or back, with their derivatives by the start: Taylor series of the
 !> equations and of their variational equations on one tape.
 module motor_flow
+  use curve_law, only: piece_at
   use kinds, only: wp
-  use motor_system, only: motor_system_t
+  use motor_system, only: motor_system_t, w_at
+  use motor_torque, only: motor_control_t, set_piece
   use operations, only: op_add, op_multiply
   use series_flight, only: series_order
   use tape, only: constant, tape_t, variable
@@ -19,6 +21,8 @@ module motor_flow
 
   !> Steps after which a flight is given up: a turn takes some twenty.
   integer, parameter :: most_steps = 20000
+  !> Parts of a step at whose ends the speed is compared with the knots of a table.
+  integer, parameter :: parts = 16
 
   public :: add_slopes, fly_on, new_flow, rates_at
 
@@ -30,6 +34,8 @@ module motor_flow
     integer :: n = 0
     !> Nodes of variables and of their rates.
     integer, allocatable :: states(:), rates(:)
+    !> A table of the torque: its polynomial changes from piece to piece, continuously and with its slope.
+    type(motor_control_t) :: control
   end type motor_flow_t
 
 contains
@@ -42,6 +48,7 @@ contains
     integer :: slopes(system%variables, system%variables), i, j, k, n, term, sum_of, rate
     n = system%variables
     flow%n = n
+    flow%control = system%control
     flow%tape = system%sheet%tape
     flow%plain = system%sheet%tape
     allocate (flow%states(n + n**2), flow%rates(n + n**2))
@@ -97,7 +104,7 @@ contains
     integer :: i, n
     n = flow%n
     if (.not. present(slopes)) then
-      call take_steps(flow%plain, flow%states(:n), flow%rates(:n), parameters, sizes, duration, z)
+      call take_steps(flow, flow%plain, n, parameters, sizes, duration, z)
       return
     end if
     all = 0
@@ -107,36 +114,101 @@ contains
       all(n*i + i) = 1
       scales(n*i + 1:n*(i + 1)) = sizes/sizes(i)
     end do
-    call take_steps(flow%tape, flow%states, flow%rates, parameters, scales, duration, all)
+    call take_steps(flow, flow%tape, size(all), parameters, scales, duration, all)
     z = all(:n)
     slopes = reshape(all(n + 1:), [n, n])
   end subroutine fly_on
 
-  !> Steps of the series of a tape with these nodes of variables and rates.
-  pure subroutine take_steps(tape, states, rates, parameters, scales, duration, z)
+  !> Steps of the series of a tape, that of a flow with or without derivatives, for its first `count` variables.
+  pure subroutine take_steps(flow, tape, count, parameters, scales, duration, z)
+    type(motor_flow_t), intent(in) :: flow
     type(tape_t), intent(in) :: tape
-    integer, intent(in) :: states(:), rates(:)
+    integer, intent(in) :: count
     real(wp), intent(in) :: parameters(:), scales(:), duration
     real(wp), intent(inout) :: z(:)
     type(series_t) :: series
-    real(wp) :: left, step
-    integer :: fault, i, k
-    call prepare_series(tape, series_order, rates, [integer ::], [integer ::], series)
-    left = duration
-    do i = 1, most_steps
-      if (.not. abs(left) > 0) return
-      call expand(tape, z, parameters, series, fault)
-      if (fault /= 0) exit
-      step = step_of(series%c(:, states), max(scales, abs(z)))
-      if (step >= abs(left)) step = abs(left)
-      step = sign(step, left)
-      do k = 1, size(states)
-        z(k) = value_of(series%c(:, states(k)), step)
+    real(wp) :: left, step, now(size(parameters))
+    integer :: fault, i, k, piece
+    associate (states => flow%states(:count), control => flow%control)
+      call prepare_series(tape, series_order, flow%rates(:count), [integer ::], [integer ::], series)
+      left = duration
+      now = parameters
+      if (control%curve%count > 0) piece = piece_at(control%curve, z(w_at))
+      do i = 1, most_steps
+        if (.not. abs(left) > 0) return
+        if (control%curve%count > 0) call set_piece(control, piece, now)
+        call expand(tape, z, now, series, fault)
+        if (fault /= 0) exit
+        step = step_of(series%c(:, states), max(scales, abs(z)))
+        if (step >= abs(left)) step = abs(left)
+        step = sign(step, left)
+        if (control%command > 0) then
+          if (passes_limit(control, series%c(:, control%command), step)) exit
+        end if
+        if (control%curve%count > 0) call stop_at_knot(control, series%c(:, states(w_at)), step, piece)
+        do k = 1, count
+          z(k) = value_of(series%c(:, states(k)), step)
+        end do
+        left = left - step
       end do
-      left = left - step
-    end do
+    end associate
     if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
   end subroutine take_steps
+
+  !> Whether the torque of a control, with the coefficients `c`, is beyond its limit within a step: variations there are not known.
+  pure logical function passes_limit(control, c, step) result(passes)
+    type(motor_control_t), intent(in) :: control
+    real(wp), intent(in) :: c(0:), step
+    integer :: i
+    passes = .false.
+    do i = 0, parts
+      passes = passes .or. abs(value_of(c, step*i/parts)) > control%torque_limit
+    end do
+  end function passes_limit
+
+  !> Shortens a step to where the speed, with the coefficients `c`, leaves the piece of a table, which is then the next one.
+  pure subroutine stop_at_knot(control, c, step, piece)
+    type(motor_control_t), intent(in) :: control
+    real(wp), intent(in) :: c(0:)
+    real(wp), intent(inout) :: step
+    integer, intent(inout) :: piece
+    real(wp) :: inside, beyond, middle
+    integer :: i, way
+    do i = 1, parts
+      way = side_of(control, piece, value_of(c, step*i/parts))
+      if (way == 0) cycle
+      inside = step*(i - 1)/parts
+      beyond = step*i/parts
+      do
+        middle = (inside + beyond)/2
+        if (.not. (abs(middle - inside) > 0 .and. abs(middle - beyond) > 0)) exit
+        if (side_of(control, piece, value_of(c, middle)) == 0) then
+          inside = middle
+        else
+          beyond = middle
+        end if
+      end do
+      step = beyond
+      piece = piece + way
+      return
+    end do
+  end subroutine stop_at_knot
+
+  !> Whether a speed is below (-1) or above (1) a piece of the table.
+  pure integer function side_of(control, piece, w) result(side)
+    type(motor_control_t), intent(in) :: control
+    integer, intent(in) :: piece
+    real(wp), intent(in) :: w
+    side = 0
+    associate (curve => control%curve)
+      if (piece > 0) then
+        if (w < curve%at(piece)) side = -1
+      end if
+      if (piece < curve%count) then
+        if (w > curve%at(piece + 1)) side = 1
+      end if
+    end associate
+  end function side_of
 
   !> The step whose last two terms are rounding (Jorba & Zou 2005).
   pure real(wp) function step_of(c, scales) result(step)

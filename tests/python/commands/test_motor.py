@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from program import differences, run, succeed
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -35,7 +36,7 @@ THRESHOLD = 6.383280023598
 
 def outcome(separatrix: Path, case: Path, folder: Path, *settings: str) -> str:
     """The last word of the line about the crank."""
-    sets = [f"--set={setting}" for setting in settings]
+    sets = [f"--set={setting}" for setting in (*settings, "run.average='window'")]
     report = succeed(separatrix, "trajectory", case, *sets, "-o", "motion.h5", "--force", folder=folder).out
     return re.search(r"^crank speed .*: (\w+)$", report, re.MULTILINE)[1]
 
@@ -53,6 +54,45 @@ def test_outcomes_of_a_run_up(separatrix, yoke, tmp_path):
     assert outcome(separatrix, yoke, tmp_path, f"motor.voltage={THRESHOLD + 1e-6}") == "passed"
     assert outcome(separatrix, yoke, tmp_path, "motor.bearing_friction=0.8", "run.duration=20") == "stalled"
     assert outcome(separatrix, yoke, tmp_path, "motor.voltage=-3", "run.duration=20") == "reversed"
+
+
+def test_crank_that_does_not_get_round(separatrix, yoke, tmp_path):
+    """Friction holds the body; its spring turns the crank back, which comes to rest after a while."""
+    held = ("friction={law='coulomb', kinetic_coefficient=10}", "motor.voltage=0.3", "run.window=2")
+    assert outcome(separatrix, yoke, tmp_path, *held, "run.duration=6") == "rocking"
+    assert outcome(separatrix, yoke, tmp_path, *held, "run.duration=60") == "stalled"
+
+
+@pytest.mark.parametrize(("case", "voltage", "speed", "expected"), [
+    ("impact", 5.7, 9, "captured"),
+    ("impact", 6.1, 10, "captured"),
+    ("impact", 6.1, 16, "passed"),
+    ("unbalance", 8, 9, "captured"),
+    ("lever", None, 0, "captured"),
+    ("lever", None, 18, "passed"),
+])  # fmt: skip
+def test_impacts_raise_the_resonance(separatrix, tmp_path, case, voltage, speed, expected):
+    """All these cranks turn faster than body and spring would oscillate; those before the resonance hit."""
+    sets = [f"motor.crank_speed={speed}", "run.duration=60", "run.window=12"]
+    if voltage:
+        sets.append(f"motor.voltage={voltage}")
+    assert outcome(separatrix, EXAMPLES / f"motor_{case}.toml", tmp_path, *sets) == expected
+    with h5py.File(tmp_path / "motion.h5") as file:
+        assert file.attrs["crank_speed"] > 3 * np.pi
+        assert file.attrs["crank_outcome"] == expected
+        assert (file.attrs["impacts"] > 0) == (expected == "captured")
+
+
+def test_power_goes_somewhere(separatrix, tmp_path):
+    """In a steady motion the mean power is the sum of its shares; the voltage gives it and the heat."""
+    sets = ["motor.crank_speed=10", "run.duration=150", "run.window=30"]
+    outcome(separatrix, IMPACT, tmp_path, *sets)
+    with h5py.File(tmp_path / "motion.h5") as file:
+        attributes = dict(file.attrs)
+        current = file["current"][()][file["time"][()] >= 120].mean()
+    shares = sum(attributes[f"{name}_power"] for name in ("impact", "friction", "damping", "bearing"))
+    assert abs(attributes["power"] - shares) < 2e-3 * shares
+    assert abs(8 * current - attributes["power"] - attributes["heat_power"]) < 2e-3 * shares
 
 
 def test_slow_ramp_is_captured_longer(separatrix, yoke, tmp_path):
@@ -81,6 +121,18 @@ def test_branches_find_the_fold(separatrix, yoke, tmp_path):
     assert abs(float(fold[1]) - 8.252828124769745) < 1e-8
 
 
+@pytest.mark.long
+def test_curve_of_folds(separatrix, yoke, tmp_path):
+    """The end of the slow run-up over the inertia passes the published value."""
+    words = "--parameter motor.voltage --from 8.2 --to 8.3 --searches 1".split()
+    words += "--free motor.inertia --free-from 0.045 --free-to 0.055 -o curve.h5".split()
+    succeed(separatrix, "branches", yoke, *words, folder=tmp_path, timeout=600)
+    with h5py.File(tmp_path / "curve.h5") as file:
+        voltage, inertia = file["curve_parameter"][()], file["curve_free"][()]
+    order = np.argsort(inertia)
+    assert abs(np.interp(0.05, inertia[order], voltage[order]) - 8.252828124769745) < 1e-8
+
+
 def test_exponents_are_those_of_the_multipliers(separatrix, tmp_path):
     """The free cycle at 8 V: logarithms of its multipliers over its time."""
     report = succeed(separatrix, "stability", IMPACT, "--periods", "2000", folder=tmp_path).out
@@ -89,6 +141,100 @@ def test_exponents_are_those_of_the_multipliers(separatrix, tmp_path):
     pair, single = np.log(abs(-0.609077686526 + 0.567414199022j)), np.log(0.652441520152)
     np.testing.assert_allclose(sorted(found), np.array([single, pair, pair]) / period, rtol=0.02)
     assert "the motion is periodic" in report
+
+
+def test_starts_that_end_fast(separatrix, tmp_path):
+    """Of 41 x 41 starts of the impacting machine 1229 end on the free cycle, as by another program."""
+    succeed(separatrix, "basin", IMPACT, "-o", "map.h5", folder=tmp_path, timeout=300)
+    with sx.open_result(tmp_path / "map.h5") as result:
+        speed = result.separatrix.of_attractor("crank_speed").values
+    assert speed.shape == (41, 41)
+    fast = np.isclose(speed, 15.30884297906753, rtol=0, atol=1e-8)
+    assert fast.sum() == 1229
+    np.testing.assert_allclose(speed[~fast], 12.47775818691878, rtol=0, atol=1e-8)
+
+
+def test_cranks_of_attractors(separatrix, tmp_path):
+    """Torque k (U - k w)/R in the mean; the power is the sum of its shares; each slice has its own speed."""
+    axes = (
+        "{name='motor.voltage', from=8, to=8.2, count=2}, {name='motor.crank_speed', from=9, to=17, count=5}"
+    )
+    sets = [f"axis=[{axes}]"]
+    sets += ["attractors.sample=24", "start.x0=0.05"]
+    succeed(
+        separatrix,
+        "basin",
+        IMPACT,
+        *(f"--set={word}" for word in sets),
+        "-o",
+        "map.h5",
+        folder=tmp_path,
+        timeout=300,
+    )
+    with sx.open_result(tmp_path / "map.h5") as result:
+        cranks = result.separatrix.attractors.reset_index()
+        speed = result.separatrix.of_attractor("crank_speed")
+        labels = result["attractor"].values
+    voltage = 8 + 0.2 * cranks["slice"]
+    np.testing.assert_allclose(cranks["torque"], 0.5 * (voltage - 0.5 * cranks["crank_speed"]) / 5, rtol=1e-5)
+    shares = sum(cranks[f"{name}_power"] for name in ("impact", "friction", "damping", "bearing"))
+    np.testing.assert_allclose(cranks["power"], shares, rtol=1e-5)
+    assert (cranks["crank_speed_min"] < cranks["crank_speed"]).all()
+    assert (cranks["crank_speed"] < cranks["crank_speed_max"]).all()
+    assert set(cranks["crank_outcome"]) == {"captured", "passed"}
+    for one in cranks.itertuples():
+        mine = speed.values[one.slice][labels[one.slice] == one.attractor]
+        assert (mine == one.crank_speed).all()
+
+
+# machine, range, direction, start w, x, v near the cycle there, then kind and value of the limit
+LIMITS = [
+    ("yoke", (8.1, 8.4), "up", (9.4389, 0.0048, 3.5517), "fold", 8.252828124769745),
+    ("yoke", (5.55, 5.7), "down", (10.4748, -0.0748, 0.1859), "neimark_sacker", 5.643766508919115),
+    ("impact", (4.5, 4.7), "up", (8.3445, 0.1170, 0.2064), "graze", 4.611362473527201),
+    ("impact", (8.8, 8.95), "up", (13.0929, -0.1080, 1.6999), "fold", 8.864114491727010),
+    ("impact", (5.95, 6.1), "down", (11.0888, -0.0695, 0.1658), "neimark_sacker", 6.019664934380103),
+]
+
+
+@pytest.mark.parametrize(
+    "limit",
+    [pytest.param(one, marks=pytest.mark.long if i in (1, 3) else ()) for i, one in enumerate(LIMITS)],
+    ids=[f"{one[0]}_{one[2]}_{one[4]}" for one in LIMITS],
+)
+def test_sweep_names_its_limits(separatrix, yoke, tmp_path, limit):
+    """The first limit of a sweep: its kind, its value, and the speeds on both sides."""
+    machine, (low, high), direction, start, kind, value = limit
+    case = yoke if machine == "yoke" else IMPACT
+    text = re.sub(r"(?s)\[\[axis.*", "", case.read_text())
+    text += f'[sweep]\nparameter = "motor.voltage"\nfrom = {low}\nto = {high}\nstep = {(high - low) / 3!r}\n'
+    (tmp_path / "case.toml").write_text(text + f'directions = "{direction}"\nstarts = [0, 0]\n')
+    sets = [
+        f"--set={key}={one}"
+        for key, one in zip(("motor.crank_speed", "start.x0", "start.v0"), start, strict=True)
+    ]
+    sets += ["--set=run.duration=40", "--set=run.window=8"]
+    succeed(separatrix, "sweep", "case.toml", *sets, "-o", "sweep.h5", folder=tmp_path, timeout=600)
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        limits = file["limits"]
+        names = limits["kind"].attrs["flag_meanings"].split()
+        assert names[limits["kind"][0]] == kind
+        assert abs(limits["value"][0] - value) < 1e-8
+        before, after = limits["crank_speed_before"][0], limits["crank_speed_after"][0]
+        assert (after > before) == (direction == "up")
+
+
+def test_exponents_of_a_limited_control(separatrix, yoke, tmp_path):
+    """From standstill the torque is at its limit, on the cycle it is not: exponents are those without one."""
+    motor = '[motor]\nlaw = "pi"\nproportional = 0.1\nintegral = 0.2\nreference = 9\ninertia = 0.05\n'
+    text = yoke.read_text()
+    yoke.write_text(text[: text.index("[motor]")] + motor + "bearing_damping = 0.002\ntorque_limit = 0.2\n")
+    report = succeed(separatrix, "stability", yoke, "--periods", "400", folder=tmp_path, timeout=300).out
+    found = [float(value) for value in re.findall(r"exponent \d: (\S+) 1/s", report)]
+    pairs = np.log(np.abs([0.818042582540 + 0.151914954620j, -0.067561169099 + 0.490596887719j]))
+    np.testing.assert_allclose(sorted(found), np.sort(np.repeat(pairs, 2)) * 9 / (2 * np.pi), rtol=0.06)
+    limited = succeed(separatrix, "stability", yoke, "--set=motor.torque_limit=0.11", folder=tmp_path).out
+    assert "limit of a torque" in limited
 
 
 SMALL = ("axis[1].count=6", "axis[2].count=5", "run.duration=8", "run.window=2", "attractors.sample=8")

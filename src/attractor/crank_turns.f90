@@ -1,0 +1,77 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What the crank of a motor does over turns from a section point on.
+module crank_turns
+  use attractors, only: attractor_t, kind_cycle
+  use crank_summary, only: crank_summary_t, summarize_crank
+  use kinds, only: wp
+  use law_table, only: law_choice_t
+  use machine_type, only: machine_t, section_state_t
+  use motion_state, only: log_t, open_log, tally_t
+  use motor_machine, only: motor_machine_t
+  implicit none
+  private
+
+  public :: summarize_attractor, summarize_turns
+
+  !> Samples of a turn of mean length.
+  integer, parameter :: samples = 256
+
+contains
+
+  !> Summary of the `turns` turns after a `start` on the section; they take about `lasts` [s]. Not numbers if the motion had to be
+  !> given up, or without a motor.
+  pure subroutine summarize_turns(machine, start, turns, lasts, summary)
+    class(machine_t), intent(in) :: machine
+    type(section_state_t), intent(in) :: start
+    integer, intent(in) :: turns
+    real(wp), intent(in) :: lasts
+    type(crank_summary_t), intent(out) :: summary
+    type(log_t) :: log
+    select type (machine)
+    type is (motor_machine_t)
+      if (turns > 0 .and. lasts > 0) call log_turns(machine, start, turns, lasts/(turns*samples), log)
+      call summarize_crank(machine%laws, log, 1, log%samples, summary)
+    class default
+      call summarize_crank([law_choice_t ::], log, 1, 0, summary)
+    end select
+  end subroutine summarize_turns
+
+  !> A log of turns, with samples at this interval [s]; none if the motion had to be given up.
+  pure subroutine log_turns(machine, start, turns, interval, log)
+    class(machine_t), intent(in) :: machine
+    type(section_state_t), intent(in) :: start
+    integer, intent(in) :: turns
+    real(wp), intent(in) :: interval
+    type(log_t), intent(inout) :: log
+    type(section_state_t) :: section
+    type(tally_t) :: tally
+    integer :: i, reason
+    call open_log(log, interval)
+    section = start
+    call machine%begin_tally(section, tally)
+    do i = 1, turns
+      log%next_sample = 0
+      call machine%advance_to_section(section, tally, reason, log)
+      if (reason /= 0) log%samples = 0
+      if (reason /= 0) return
+    end do
+    call machine%sample(section, log)
+  end subroutine log_turns
+
+  !> Summary of a cycle; not numbers of an attractor that is none.
+  pure subroutine summarize_attractor(machine, attractor, summary)
+    class(machine_t), intent(in) :: machine
+    type(attractor_t), intent(in) :: attractor
+    type(crank_summary_t), intent(out) :: summary
+    integer :: turns
+    turns = merge(attractor%period, 0, attractor%kind == kind_cycle)
+    if (turns == 0) then
+      call summarize_turns(machine, section_state_t(), 0, 0.0_wp, summary)
+    else
+      call summarize_turns(machine, machine%state_at(attractor%points(:, 1)), turns, attractor%duration, summary)
+    end if
+  end subroutine summarize_attractor
+
+end module crank_turns

@@ -1,0 +1,73 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> What the crank of a motor does on each cycle of the catalogues of a map: columns of the catalogue in its file.
+module crank_catalogue
+  use basin, only: catalogue_t
+  use crank_summary, only: crank_numbers, crank_outcomes, crank_summary_t, crank_table, crank_values, last_crank_outcome
+  use crank_turns, only: summarize_attractor
+  use errors, only: error_t
+  use grid, only: grid_t, slice_motion
+  use kinds, only: int64, wp
+  use machine_type, only: machine_t
+  use map_schema, only: schema_t, type_float64, type_int8
+  use motor_choices, only: has_motor
+  use team, only: team_t
+  use text, only: join
+  implicit none
+  private
+
+  public :: add_crank_catalogue
+
+contains
+
+  !> Adds the columns of a machine with a motor; values of what is no cycle are not numbers. The ranks share the slices.
+  subroutine add_crank_catalogue(team, grid, catalogues, schema)
+    class(team_t), intent(in) :: team
+    type(grid_t), intent(in) :: grid
+    type(catalogue_t), intent(in) :: catalogues(:)
+    type(schema_t), intent(inout) :: schema
+    real(wp), allocatable :: values(:, :)
+    integer :: i
+    if (.not. has_motor(grid%laws)) return
+    call summarize_entries(team, grid, catalogues, values)
+    if (size(values, 2) == 0) return
+    call schema%add_variable('crank_outcome', type_int8, ['entry'], units='1', group='catalogue', data=values(1, :), &
+                             long_name='outcome of a run-up of the crank', flag_values=[(i, i=0, last_crank_outcome)], &
+                             flag_meanings=join(crank_outcomes, ' '))
+    do i = 1, crank_numbers
+      call schema%add_variable(trim(crank_table(i)%name), type_float64, ['entry'], units=trim(crank_table(i)%unit), &
+                               long_name=trim(crank_table(i)%meaning), data=values(1 + i, :), group='catalogue')
+    end do
+  end subroutine add_crank_catalogue
+
+  !> Outcome and numbers of every entry (columns), slice after slice.
+  subroutine summarize_entries(team, grid, catalogues, values)
+    class(team_t), intent(in) :: team
+    type(grid_t), intent(in) :: grid
+    type(catalogue_t), intent(in) :: catalogues(:)
+    real(wp), allocatable, intent(out) :: values(:, :)
+    real(wp), allocatable :: mine(:), gathered(:)
+    class(machine_t), allocatable :: machine
+    type(error_t), allocatable :: error
+    type(crank_summary_t) :: crank
+    integer :: i, k, entry
+    allocate (mine(0))
+    entry = 0
+    do i = 1, size(catalogues)
+      if (modulo(i, team%size()) == team%rank()) call slice_motion(grid, int(i - 1, int64), machine, error)
+      do k = 1, size(catalogues(i)%attractors)
+        entry = entry + 1
+        if (modulo(i, team%size()) /= team%rank() .or. allocated(error)) cycle
+        call summarize_attractor(machine, catalogues(i)%attractors(k), crank)
+        mine = [mine, real(entry, wp), real(crank%outcome, wp), crank_values(crank)]
+      end do
+    end do
+    call team%allgather(mine, gathered)
+    allocate (values(1 + crank_numbers, entry), source=0.0_wp)
+    do i = 1, size(gathered), 2 + crank_numbers
+      values(:, nint(gathered(i))) = gathered(i + 1:i + 1 + crank_numbers)
+    end do
+  end subroutine summarize_entries
+
+end module crank_catalogue
