@@ -84,8 +84,8 @@ contains
     if (len(problem) == 0) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
   end function start_problem
 
-  !> Whether a start of 3 numbers or more is one: finite, and not beyond a barrier. Of what is asked of many starts by many threads no
-  !> text is made.
+  !> Whether a start of 3 numbers or more is one: finite, and not beyond a barrier. Of what is asked of many starts by many
+  !> threads no text is made.
   pure logical function is_start(prepared, start)
     type(prepared_t), intent(in) :: prepared
     real(wp), intent(in) :: start(:)
