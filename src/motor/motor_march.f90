@@ -7,7 +7,7 @@ module motor_march
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, take_step, watched_system_t
   use kinds, only: wp
   use motor_system, only: guard_back, guard_count, guard_section, motor_system_t
-  use operations, only: op_constant, op_parameter, op_variable, operate, operation_table
+  use operations, only: op_add, op_constant, op_multiply, op_parameter, op_subtract, op_variable, operate, operation_table
   use polynomial, only: value_at
   use series_flight, only: flight_t
   use tape, only: tape_t
@@ -184,6 +184,13 @@ contains
         value(i) = y(equations%first(i))
       case (op_constant, op_parameter)
         value(i) = equations%value(i)
+        ! Most operations are these, and always defined.
+      case (op_add)
+        value(i) = value(equations%first(i)) + value(equations%second(i))
+      case (op_subtract)
+        value(i) = value(equations%first(i)) - value(equations%second(i))
+      case (op_multiply)
+        value(i) = value(equations%first(i))*value(equations%second(i))
       case default
         call operate(equations%operation(i), value(equations%first(i)), value(equations%second(i)), value(i), is_defined)
       end select

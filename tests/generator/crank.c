@@ -1,8 +1,9 @@
 /* SPDX-FileCopyrightText: The Separatrix developers
  * SPDX-License-Identifier: GPL-3.0-or-later
  *
- * A body on a spring whose foot a motor moves through a scotch yoke, by fixed steps of the classical Runge-Kutta
- * method; events are located by bisection of a step. It shares neither code nor method with the program. */
+ * A body on a spring whose foot a motor moves through a scotch yoke, by fixed steps of the classical
+ * Runge-Kutta method; events are located by bisection of a step. It shares neither code nor method with the
+ * program. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -46,9 +47,8 @@ static void rates(const struct crank_machine *m, int slip, const double *s, doub
   r[W] = torque / (m->inertia + wave);
   r[X] = slip ? s[V] : 0;
   r[V] = slip ? (force(m, s) - slip * (m->coulomb + m->stribeck * exp(-over * over))) / m->mass : 0;
-  r[I] = m->inductance > 0
-             ? (m->voltage - m->resistance * s[I] - m->torque_constant * s[W]) / m->inductance
-             : 0;
+  r[I] =
+      m->inductance > 0 ? (m->voltage - m->resistance * s[I] - m->torque_constant * s[W]) / m->inductance : 0;
   r[U] = m->maxwell_time > 0 ? m->maxwell_stiffness * r[X] - s[U] / m->maxwell_time : 0;
 }
 

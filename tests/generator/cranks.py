@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from simulator import FLAGS, FOLDER, NOWHERE, SimulationError, compiled
+from simulator import FOLDER, NOWHERE, SimulationError, compiled
 
-PHI, W, X, V, I, U = range(6)
+PHI, W, X, V, CURRENT, MAXWELL = range(6)
 SCALARS = (
     "mass stiffness damping coulomb stribeck stribeck_velocity upper restitution offset"
     " amplitude second_harmonic inertia bearing_damping bearing_friction"
@@ -40,7 +40,7 @@ class CrankMachine(ctypes.Structure):
 
 @dataclass
 class CrankCase:
-    """A case: its machine as it is and as its owner thinks, voltages of the records, what sensors there are."""
+    """A case: its machine as it is and as its owner thinks, voltages of the records, sensors."""
 
     number: int
     machine: str
@@ -159,7 +159,7 @@ bearing_damping = {base["bearing_damping"]}
 """
 
 
-def write(folder: Path, case: CrankCase, seconds: float = 9.0) -> None:
+def write(folder: Path, case: CrankCase, seconds: float = 6.0) -> None:
     """Base case and records, and the truth beside them."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / BASE).write_text(base_text(case))
@@ -173,9 +173,9 @@ def write(folder: Path, case: CrankCase, seconds: float = 9.0) -> None:
 def _record(case: CrankCase, voltage: float, seconds: float, random: np.random.Generator) -> str:
     count = int(seconds * RATE)
     start = np.array([0.0, 0.0, 0.02, 0.0, 0.0, 0.0])
-    start[PHI], start[W] = random.uniform(0, 2 * np.pi), random.uniform(8, 14)
+    start[PHI], start[W] = random.uniform(0, 2 * np.pi), random.uniform(4, 8)
     true = case.true | {"voltage": voltage}
-    begun = simulate(true, start, 1 / RATE, int(1.5 * RATE))[-1]
+    begun = simulate(true, start, 1 / RATE, int(0.3 * RATE))[-1]
     states = simulate(true, begun, 1 / RATE, count)
     seen = states
     if case.delay:
@@ -201,7 +201,7 @@ def _record(case: CrankCase, voltage: float, seconds: float, random: np.random.G
         units.append("1")
     if more:
         i = (voltage - true["torque_constant"] * states[:, W]) / true["resistance"]
-        i = states[:, I] if true.get("inductance") else i
+        i = states[:, CURRENT] if true.get("inductance") else i
         columns["current"] = i + 0.005 * np.abs(np.mean(i)) * random.standard_normal(count)
         units.append("A")
     head = [f"# units: {', '.join(f'{n} {u}' for n, u in zip(columns, units, strict=True))}"]
@@ -214,5 +214,5 @@ def _acceleration(true: dict[str, float], states: np.ndarray) -> np.ndarray:
     """Of a body that slips [m/s^2]."""
     foot = true["amplitude"] * np.cos(states[:, PHI])
     foot = foot + true.get("second_harmonic", 0.0) * np.cos(2 * states[:, PHI])
-    force = true["stiffness"] * (foot - states[:, X]) - true.get("damping", 0.0) * states[:, V] - states[:, U]
+    force = true["stiffness"] * (foot - states[:, X]) - true.get("damping", 0.0) * states[:, V] - states[:, MAXWELL]
     return (force - true.get("coulomb", 0.0) * np.sign(states[:, V])) / true["mass"]

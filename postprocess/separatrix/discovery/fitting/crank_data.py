@@ -5,7 +5,6 @@
 import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.data import fit_stages
 from separatrix.discovery.fitting.machine import Free, bounds_of
 from separatrix.discovery.fitting.motor_effects import names_with_motor
 from separatrix.discovery.fitting.sensed import SensedData
@@ -17,6 +16,8 @@ from separatrix.discovery.policy import FIT
 ZERO = "nuisance:crank_zero"
 """What a sensor of the crank shows at the crank angle 0 of the case [rad]."""
 _TURN = 2 * np.pi
+# to which the zero of pulses is tried out before it is fitted [rad]
+_NEAR_ZERO = 0.05
 _ANGLE = CRANKED.index("crank")
 # parameters that no motion at one scale of forces determines, or that another one represents
 _FIXED = ("mass", "gravity", "free_length", "stribeck_exponent")
@@ -75,14 +76,14 @@ class CrankProblem(CoordinateProblem):
             offsets,
             times,
             derivatives=directions is not None,
-            tolerance=FIT.tolerance_of_bodies,
+            tolerance=FIT.tolerance_of_cranks,
             directions=directions,
         )
         result.motion[:, _ANGLE] = np.mod(result.motion[:, _ANGLE], _TURN)
         motion = [result.motion[k::each] for k in range(each)]
         if directions is None:
             return result, motion, None
-        # in the place of the angle of a clock, which this machine has none of
+        # this machine has no clock, whose angle the last column is of
         result.jacobian[:, :, -1] = 0.0
         return result, motion, [result.jacobian[k::each] for k in range(each)]
 
@@ -123,16 +124,23 @@ class CrankData(SensedData):
         if all(one.sensor(ANGLE).known is None for one in self.prepared):
             return
         at = next(i for i, one in enumerate(free) if one.path == ZERO)
-        costs = []
         turns = np.arange(FIT.phases) * _TURN / FIT.phases
-        for turn in turns:
-            self._take_zero(turn)
-            free[at] = _zero(turn)
-            values = np.array([one.value for one in free])
-            _, fit = fit_stages(self, model, free, values, stages=[0], most=4)
-            costs.append(float(np.sum(np.where(fit.evaluation.failed, 1e12, np.minimum(fit.chi2, 1e12)))))
-        self._take_zero(float(turns[int(np.argmin(costs))]))
-        free[at] = _zero(self.prepared[0].zero)
+        best = float(turns[int(np.argmin([self._misfit(model, free, turn) for turn in turns]))])
+        step = _TURN / FIT.phases / 2
+        while step > _NEAR_ZERO:
+            tried = [best - step, best, best + step]
+            best = tried[int(np.argmin([self._misfit(model, free, turn) for turn in tried]))]
+            step /= 2
+        self._take_zero(best)
+        free[at] = _zero(best)
+
+    def _misfit(self, model, free: list[Free], zero: float) -> float:
+        """How far short segments from their smoothed starts are off; those that lose their start count alike."""
+        self._take_zero(zero)
+        values = np.array([zero if one.path == ZERO else one.value for one in free])
+        found = self.problem(model, 0, free).evaluate(values, self.smoothed_starts(0), derivatives=False)
+        squares = np.sum(found.residual**2 * found.used, axis=1)
+        return float(np.median(np.where(found.failed, np.inf, squares)))
 
     def take_zeros(self, free: list[Free]) -> None:
         """Take the zero that a fit to other records has."""
@@ -157,7 +165,8 @@ class CrankData(SensedData):
 
     def fly(self, model, active: list, values: np.ndarray, start: np.ndarray, first, times) -> object:
         """Segments of a model without derivatives."""
-        found = model.crank_segments(active, values, following(start), first, times, derivatives=False)
+        exact = {"derivatives": False, "tolerance": FIT.tolerance_of_cranks}
+        found = model.crank_segments(active, values, following(start), first, times, **exact)
         found.motion[:, _ANGLE] = np.mod(found.motion[:, _ANGLE], _TURN)
         return found
 
@@ -170,5 +179,3 @@ def following(start: np.ndarray) -> np.ndarray:
 def _zero(value: float) -> Free:
     # a turn either way: a fit may pass the end of one
     return Free(ZERO, float(value), -_TURN, 2 * _TURN, 0.01)
-
-

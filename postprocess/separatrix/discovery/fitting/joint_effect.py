@@ -33,5 +33,7 @@ class JointEffect:
     moved: tuple[str, ...] = ()
     # a key and the key with minus its value
     mirrored: tuple[str, str] = ("", "")
+    # how far sizes may go beyond those to start from; 0: as far as usual
+    reach: float = 0.0
     # effects that can be the same motion, with their location, and when
     confused: dict[str, tuple[str, str]] = field(default_factory=dict)

@@ -191,7 +191,7 @@ def effect_of(name: str) -> Effect:
         return effects()[name]
     kind, _, where = name.partition(AT)
     row = MOTOR_EFFECTS[kind] if where in MOTOR_LOCATIONS else JOINT_EFFECTS[kind]
-    confused = {f"{other}{AT}{place}": why for other, (place, why) in row.confused.items()}
+    confused = {f"{other}{AT}{law}": why for other, (law, why) in row.confused.items()}
     return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", confused)
 
 
@@ -232,7 +232,10 @@ def candidate_of(
     if AT not in name:
         return candidate(model, free, names, name, scales)
     kind, _, where = name.partition(AT)
-    row, structure = row_with_motor(kind, model) if has_motor(model) else JOINT_EFFECTS[kind], structure_of(model)
+    row, structure = (
+        row_with_motor(kind, model) if has_motor(model) else JOINT_EFFECTS[kind],
+        structure_of(model),
+    )
     joint = structure.joint(where) if row.of[0] else None
     ends = joint.ends if joint else structure.location(where).ends
     location = Location(where, ends, joint.row if joint else structure.location(where).row, ())
@@ -288,7 +291,8 @@ def _cannot_act(row: JointEffect, size: LocationScales | None, measured: bool) -
 def _free(row: JointEffect, key: str, values: list[float], path: str, model) -> Free:
     """A parameter of an effect, from the first of its usual sizes."""
     if key in row.sizes:
-        ends = np.log([min(values) / FIT.far_joint_start, max(values) * FIT.far_joint_start])
+        reach = row.reach or FIT.far_joint_start
+        ends = np.log([min(values) / reach, max(values) * reach])
         mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
         start = float(np.log(values[0]))
         return Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror)

@@ -23,7 +23,7 @@ _LINE = {
     "dc": ("torque_constant", "resistance"),
     "kloss": ("breakdown_torque", "breakdown_slip"),
 }
-_TWO_SPEEDS = "at one speed: a record at another voltage, or speed of the motor, tells them apart"
+_TWO_SPEEDS = "at one speed: a record at another voltage, or speed of the motor, distinguishes them"
 # of weight alone comes the dry friction of a case: without any it gets this [m/s^2]
 _GRAVITY = 9.81
 
@@ -33,7 +33,9 @@ def _unbuilt(*_: object) -> str:
 
 
 def _row(name: str, meaning: str, family: str, **traits: object) -> JointEffect:
-    return JointEffect(name, meaning, family, _unbuilt, dict, traits.pop("amplitudes", ()), of=("law", ""), **traits)
+    return JointEffect(
+        name, meaning, family, _unbuilt, dict, traits.pop("amplitudes", ()), of=("law", ""), **traits
+    )
 
 
 MOTOR_EFFECTS = {
@@ -48,7 +50,7 @@ MOTOR_EFFECTS = {
         _row("lever_inertia", "an inertia of the lever", "inertia of the drive",
              amplitudes=("lever_inertia",)),
         _row("current_lag", "a current that lags behind the voltage", "torque over time",
-             sizes=("inductance",)),
+             sizes=("inductance",), reach=2.0),
         _row("viscous", "damping that grows with the speed", "friction over speed", amplitudes=("damping",)),
         _row("coulomb", "dry friction", "friction over speed", amplitudes=("kinetic_coefficient",)),
         _row("stribeck", "friction that falls with the speed", "friction over speed",
@@ -131,7 +133,8 @@ def _current_lag(model: Model) -> Built:
             raise SeparatrixError(why)
         return "motor"
 
-    lags = (0.05, 0.2, 0.01)
+    # a current that follows much sooner makes no difference, and its equations are stiff
+    lags = (0.05, 0.2)
     return change, lambda s: {"inductance": [resistance * share / s.speed for share in lags]}
 
 
@@ -157,7 +160,11 @@ def _relawed(model: Model, law: str, added: dict[str, float], why: str = "") -> 
 
 
 def _viscous(model: Model) -> Built:
-    why = "the friction of the case is of another form" if "friction.stribeck_velocity" in model.parameters else ""
+    why = (
+        "the friction of the case is of another form"
+        if "friction.stribeck_velocity" in model.parameters
+        else ""
+    )
     change = _relawed(model, _law_with(model, False, True), {"damping": 0.0}, why)
     return change, lambda s: {"damping": [0.02 * s.force / s.speed]}
 

@@ -13,7 +13,13 @@ from separatrix.discovery.fitting.locations import SensedScales, location_scales
 from separatrix.discovery.fitting.motor_effects import names_with_motor
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.sensed import gather_sensed
-from separatrix.discovery.measured.bodies import has_motor, is_pair, is_structure, pair_as_structure, structure_of
+from separatrix.discovery.measured.bodies import (
+    has_motor,
+    is_pair,
+    is_structure,
+    pair_as_structure,
+    structure_of,
+)
 from separatrix.discovery.measured.cranks import LAWS, law_of, prepare_crank
 from separatrix.discovery.measured.in_force import prepare_force
 from separatrix.discovery.measured.preflight import Prepared, prepare

@@ -78,7 +78,7 @@ def prepare_crank(record: Record, model: Model, rest: Record | None = None) -> C
     sensors.append(_of_crank(record, notes))
     if "current" in record.sensors:
         if model.parameters.get("motor.resistance") is None:
-            raise SeparatrixError(f"{record.file}: found a column current, allowed with motor.law = \"dc\"")
+            raise SeparatrixError(f'{record.file}: found a column current, allowed with motor.law = "dc"')
         sensors.append(_sensor(record, "current", "i", CRANK, record.sensors["current"], notes))
     first, angle = sensors[0], next(one for one in sensors if one.name == ANGLE)
     prepared = CrankPrepared(

@@ -141,7 +141,9 @@ def _integrated(columns: dict[str, np.ndarray], sensors: list[str], notes: list[
         notes.append(f"no position: x is the integral of {speeds[0]} from 0 and is not compared")
         return cumulative_trapezoid(columns[speeds[0]], columns["t"], initial=0)
     name = next(name for name in sensors if is_kind(name, "a"))
-    notes.append(f"no position and no speed: x is integrated from {name} without its drift and is not compared")
+    notes.append(
+        f"no position and no speed: x is integrated from {name} without its drift and is not compared"
+    )
     t = columns["t"]
     once = cumulative_trapezoid(columns[name] - np.mean(columns[name]), t, initial=0)
     twice = cumulative_trapezoid(once - np.polyval(np.polyfit(t, once, 1), t), t, initial=0)

@@ -30,6 +30,7 @@ class Fit:
         "share of the gain of free forces at which one variable closes most")
     # fitting/coordinates.py
     tolerance_of_bodies: float = row(1e-10, "1", "rounding", "tolerance of the motion of several bodies")
+    tolerance_of_cranks: float = row(1e-8, "1", "rounding", "tolerance of the motion of body and crank")
     slope_share: float = row(0.25, "1", "rounding",
         "share of an interval over which an acceleration is a slope")
     slope_angle: float = row(1e-3, "rad", "rounding", "the same of the drive")
