@@ -214,5 +214,9 @@ def _acceleration(true: dict[str, float], states: np.ndarray) -> np.ndarray:
     """Of a body that slips [m/s^2]."""
     foot = true["amplitude"] * np.cos(states[:, PHI])
     foot = foot + true.get("second_harmonic", 0.0) * np.cos(2 * states[:, PHI])
-    force = true["stiffness"] * (foot - states[:, X]) - true.get("damping", 0.0) * states[:, V] - states[:, MAXWELL]
+    force = (
+        true["stiffness"] * (foot - states[:, X])
+        - true.get("damping", 0.0) * states[:, V]
+        - states[:, MAXWELL]
+    )
     return (force - true.get("coulomb", 0.0) * np.sign(states[:, V])) / true["mass"]

@@ -135,7 +135,7 @@ class CrankData(SensedData):
         free[at] = _zero(best)
 
     def _misfit(self, model, free: list[Free], zero: float) -> float:
-        """How far short segments from their smoothed starts are off; those that lose their start count alike."""
+        """Median misfit of short segments from their smoothed starts."""
         self._take_zero(zero)
         values = np.array([zero if one.path == ZERO else one.value for one in free])
         found = self.problem(model, 0, free).evaluate(values, self.smoothed_starts(0), derivatives=False)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Records of a machine with a motor: a motion of the body, the crank, and what the motor was fed with.
 
-The body shows `x`, `v` or `a.body`. The crank shows its angle `phi`, or a `pulse` per turn, whose rising edges
-count. `current` is compared; a `voltage` is that at which the motor ran. Without the column,
+The body shows `x`, `v` or `a.body`. The crank shows its angle `phi`, or a `pulse` per turn, whose rising
+edges count. `current` is compared; a `voltage` is that at which the motor ran. Without the column,
 `motor_voltage_v` in the header states it; of other motors `motor_speed_rad_s` is their speed without torque.
 """
 
@@ -27,7 +27,6 @@ LAWS = ("linear", "kloss", "dc", "table")
 """Motors whose state a segment can begin with: the integral of a speed control shows in no sensor."""
 ANGLE = f"x.{CRANK}"
 _SUPPLY = {"dc": "motor.voltage", "linear": "motor.no_load_speed", "kloss": "motor.synchronous_speed"}
-# a turn is half done where the pulse crosses the middle between its levels
 _LEAST_TURNS = 4
 
 
@@ -67,7 +66,7 @@ def prepare_crank(record: Record, model: Model, rest: Record | None = None) -> C
     """Find the sensors of a record, their noise, and what the motor ran at."""
     if rest is not None:
         raise SeparatrixError(
-            f"{rest.file}: found a record at rest, allowed with a motor stated noise: noise.x.body in the header"
+            f"{rest.file}: found a record at rest, allowed with a motor stated noise: noise.x.body"
         )
     if record.force is not None:
         raise SeparatrixError(f"{record.file}: found a column force, allowed with a motor current, voltage")
@@ -106,7 +105,8 @@ def _body_columns(record: Record) -> dict[str, np.ndarray]:
             continue
         if name[2:] != BODY or name[0] not in "xva":
             raise SeparatrixError(
-                f"{record.file}: column '{name}': allowed with a motor x, v, a.{BODY}, phi, {', '.join(OF_MOTOR)}"
+                f"{record.file}: column '{name}': allowed with a motor x, v, a.{BODY}, phi, "
+                f"{', '.join(OF_MOTOR)}"
             )
         if name in found:
             raise SeparatrixError(f"{record.file}: found columns {name[0]} and {name}, allowed one of them")
@@ -141,8 +141,8 @@ def _of_crank(record: Record, notes: list[str]) -> Sensor:
         return _sensor(record, ANGLE, "x", CRANK, np.unwrap(record.phi), notes)
     if "pulse" not in record.sensors:
         raise SeparatrixError(
-            f"{record.file}: found neither phi nor pulse, allowed with a motor the angle of its crank or a pulse "
-            "per turn: without them its speed is not known"
+            f"{record.file}: found neither phi nor pulse, allowed with a motor the angle of its crank or a "
+            "pulse per turn: without them its speed is not known"
         )
     t, level = record.t, record.sensors["pulse"]
     middle = (np.max(level) + np.min(level)) / 2

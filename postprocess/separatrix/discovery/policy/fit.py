@@ -180,6 +180,7 @@ class Fit:
     screen_seed: int = row(22, "1", "effort", "seed of the bootstrap of the null")
     screen_draws: int = row(4000, "1", "effort", "its draws")
     screen_tail: float = row(0.05, "1", "test", "level at which independent tests are counted")
+    screen_same: float = row(1e-3, "noise", "rounding", "difference below which two machines are the same")
     screen_rounding: float = row(1e-100, "1", "rounding", "size of a signature that is rounding")
     screen_nothing: float = row(1e-7, "1", "rounding",
         "share of a signature below which nothing is left of it")
