@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from separatrix.discovery.fitting.crank_data import ZERO, CrankData
+from separatrix.discovery.fitting.crank_data import CrankData
+from separatrix.discovery.fitting.machine import CRANK_ZERO
 from separatrix.discovery.fitting.observations import observation_of
 from separatrix.discovery.measured.cranks import ANGLE, prepare_crank
 from separatrix.discovery.measured.records import make_record, read_record
@@ -106,7 +107,7 @@ def test_pulses_show_the_zero(tmp_path: Path) -> None:
     free = data.unknowns(model)
     data.find_zeros(model, free)
     # the pulse rises at the angle 2 pi - 1
-    zero = next(one.value for one in free if one.path == ZERO)
+    zero = next(one.value for one in free if one.path == CRANK_ZERO)
     assert abs(np.mod(zero - 1.0 + np.pi, 2 * np.pi) - np.pi) < 0.3
 
 
@@ -117,6 +118,8 @@ def test_an_inertia_is_named(tmp_path: Path) -> None:
     asked = Options(candidates=("crank_inertia", "viscous", "coulomb"), quick=True)
     verdict = discover(tmp_path / cranks.BASE, records, [tmp_path / cranks.HELD_OUT], asked)
     assert verdict["effects"] == ["crank_inertia@motor"]
+    # the zero of the crank moves with the inertia, also where the record is predicted
+    assert verdict["gap"]["held_out"]["after"] < 1.3
     found = verdict["parameters"]["motor.inertia"]
     assert abs(found["value"] - case.true["inertia"]) < 4 * found["standard_error"]
 

@@ -5,7 +5,7 @@
 import numpy as np
 
 from separatrix.discovery.fitting.coordinates import CoordinateProblem
-from separatrix.discovery.fitting.machine import Free, bounds_of
+from separatrix.discovery.fitting.machine import CRANK_ZERO, Free, bounds_of
 from separatrix.discovery.fitting.motor_effects import names_with_motor
 from separatrix.discovery.fitting.sensed import SensedData
 from separatrix.discovery.measured.bodies import CRANKED
@@ -13,8 +13,6 @@ from separatrix.discovery.measured.cranks import ANGLE
 from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
 from separatrix.discovery.policy import FIT
 
-ZERO = "nuisance:crank_zero"
-"""What a sensor of the crank shows at the crank angle 0 of the case [rad]."""
 _TURN = 2 * np.pi
 # to which the zero of pulses is tried out before it is fitted [rad]
 _NEAR_ZERO = 0.05
@@ -54,13 +52,13 @@ class CrankProblem(CoordinateProblem):
     def _missed(self, sensor: Sensor, difference: np.ndarray, values: np.ndarray) -> np.ndarray:
         if sensor.name != ANGLE:
             return difference
-        found = [value for one, value in zip(self.free, values, strict=True) if one.path == ZERO]
+        found = [value for one, value in zip(self.free, values, strict=True) if one.path == CRANK_ZERO]
         zero = found[0] if found else self.prepared[0].zero
         return np.mod(difference - zero + np.pi, _TURN) - np.pi
 
     def _add_slopes(self, sensor: Sensor, by_parameter: np.ndarray) -> None:
         if sensor.name == ANGLE:
-            by_parameter[:, [one.path == ZERO for one in self.free]] += 1.0
+            by_parameter[:, [one.path == CRANK_ZERO for one in self.free]] += 1.0
 
     def _fly(self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, directions) -> tuple:
         """Motion, current and Jacobian at the samples and one and two instants later."""
@@ -123,7 +121,7 @@ class CrankData(SensedData):
         """Try the zeros of a turn where pulses show the turns alone."""
         if all(one.sensor(ANGLE).known is None for one in self.prepared):
             return
-        at = next(i for i, one in enumerate(free) if one.path == ZERO)
+        at = next(i for i, one in enumerate(free) if one.path == CRANK_ZERO)
         turns = np.arange(FIT.phases) * _TURN / FIT.phases
         best = float(turns[int(np.argmin([self._misfit(model, free, turn) for turn in turns]))])
         step = _TURN / FIT.phases / 2
@@ -137,7 +135,7 @@ class CrankData(SensedData):
     def _misfit(self, model, free: list[Free], zero: float) -> float:
         """Median misfit of short segments from their smoothed starts."""
         self._take_zero(zero)
-        values = np.array([zero if one.path == ZERO else one.value for one in free])
+        values = np.array([zero if one.path == CRANK_ZERO else one.value for one in free])
         found = self.problem(model, 0, free).evaluate(values, self.smoothed_starts(0), derivatives=False)
         squares = np.sum(found.residual**2 * found.used, axis=1)
         return float(np.median(np.where(found.failed, np.inf, squares)))
@@ -145,7 +143,7 @@ class CrankData(SensedData):
     def take_zeros(self, free: list[Free]) -> None:
         """Take the zero that a fit to other records has."""
         for one in free:
-            if one.path == ZERO:
+            if one.path == CRANK_ZERO:
                 self._take_zero(one.value)
 
     def _take_zero(self, zero: float) -> None:
@@ -178,4 +176,4 @@ def following(start: np.ndarray) -> np.ndarray:
 
 def _zero(value: float) -> Free:
     # a turn either way: a fit may pass the end of one
-    return Free(ZERO, float(value), -_TURN, 2 * _TURN, 0.01)
+    return Free(CRANK_ZERO, float(value), -_TURN, 2 * _TURN, 0.01)

@@ -24,6 +24,9 @@ _LINE = {
     "kloss": ("breakdown_torque", "breakdown_slip"),
 }
 _TWO_SPEEDS = "at one speed: a record at another voltage, or speed of the motor, distinguishes them"
+_FIRST_ORDER = (
+    "a current that lags takes k^2 L/R^2 off the inertia, to first order: a column current distinguishes them"
+)
 # of weight alone comes the dry friction of a case: without any it gets this [m/s^2]
 _GRAVITY = 9.81
 
@@ -46,11 +49,12 @@ MOTOR_EFFECTS = {
              confused={"bearing_friction": ("motor", _TWO_SPEEDS)}),
         _row("bearing_friction", "dry friction in the bearing of the crank", "torque over crank speed",
              amplitudes=("bearing_friction",), confused={"motor_line": ("motor", _TWO_SPEEDS)}),
-        _row("crank_inertia", "another inertia of the crank", "inertia of the drive", sizes=("inertia",)),
+        _row("crank_inertia", "another inertia of the crank", "inertia of the drive", sizes=("inertia",),
+             confused={"current_lag": ("motor", _FIRST_ORDER)}),
         _row("lever_inertia", "an inertia of the lever", "inertia of the drive",
              amplitudes=("lever_inertia",)),
         _row("current_lag", "a current that lags behind the voltage", "torque over time",
-             sizes=("inductance",), reach=2.0),
+             sizes=("inductance",), reach=2.0, confused={"crank_inertia": ("motor", _FIRST_ORDER)}),
         _row("viscous", "damping that grows with the speed", "friction over speed", amplitudes=("damping",)),
         _row("coulomb", "dry friction", "friction over speed", amplitudes=("kinetic_coefficient",)),
         _row("stribeck", "friction that falls with the speed", "friction over speed",
