@@ -155,6 +155,27 @@ int separatrix_coordinate_segments(const separatrix_model *model, int chosen_cou
                                    int impact_capacity, int *impact_count, int *impact_segment,
                                    double *impact, char *message, size_t message_size);
 
+/* As separatrix_segments, of a machine with a motor. What differs:
+ *
+ * In:
+ *   start [segment_count][5]
+ *     x [m], crank angle [rad], v [m/s], crank speed [rad/s], and current [A] (motor.law = "dc" with an
+ *     inductance) or integral of the speed control [rad] ("pi"); of other motors the last one is not used. A
+ *     current that is not a number is that which follows the speed, as it does after some time constants.
+ * Out:
+ *   motion [m][5]
+ *     the same at the samples; the crank angle goes on beyond a turn; the current of every dc motor
+ *   jacobian [m][5][direction_count + 5]
+ *     their derivatives along the directions, then by the numbers of the start
+ *
+ * A machine whose voltage or speed rises in a ramp has no segments: code 65. */
+int separatrix_crank_segments(const separatrix_model *model, int chosen_count, const int *chosen,
+                              const double *values, int direction_count, const double *directions,
+                              int segment_count, const double *start, const int *first, const double *times,
+                              int derivatives, double tolerance, double *motion, double *jacobian,
+                              int *impacts, int *steady, int *reason, int impact_capacity, int *impact_count,
+                              int *impact_segment, double *impact, char *message, size_t message_size);
+
 /* Numbers of a sample, an event and the summary of a trajectory, and of an attractor and a label. */
 enum {
   separatrix_sample_numbers = 13,
@@ -183,21 +204,21 @@ enum {
  *     how many there are; those beyond the room are left out
  *   sample [sample_capacity][13]
  *     time [s], x [m], v [m/s], mode (1 slip_plus, 2 slip_minus, 3 stick, 4 upper_barrier, 5 lower_barrier,
- *     6 held); position of the foot of the spring [m] and not a number, of two bodies position [m] and
- *     velocity [m/s] of the driving one; force of soft barriers on the body [N]; energy and kinetic energy
- * [J]; lost since the start to friction, to damping and to contacts, put in by the drive [J] event
- * [event_capacity][7] kind (docs/file-format.md), time [s], x [m], v before and after [m/s]; of two bodies
- * position and velocity of the driving one, otherwise not numbers summary [28] As `points`: x [m], v [m/s],
- * number of impacts, speed before the last [m/s], regime, reason (codes of docs/file-format.md). As
- * `trajectory`, over the cycle that the motion comes to, or the window at the end: amplitude [m], largest and
- * smallest x [m], largest v [m/s], impacts per drive period, mean impact speed [m/s]. The machine: drive
- * period [s], upper and lower barrier [m] (infinite: none), 1 if they are soft, 1 if it has two bodies.
- * Reason of the `trajectory`; its energy [J] at the start, lost to friction, damping and contacts, put in; if
- * it came to its end, energy at the end and what is missing in this book, otherwise not numbers. Period of
- * the cycle in drive periods, 0: none; not a number, and the values are over the window, with a duration
- * other than that of the case. 1 if a drive gives the drive period, which else is a unit of time; 1 if the
- * position is an angle, in rad for m. All of it is written also where the motion was given up, as far as it
- * went: the answer is then 78 */
+ *     6 held); position of the foot of the spring [m] and not a number (with a motor the crank angle since
+ * the start [rad]), of two bodies position [m] and velocity [m/s] of the driving one; force of soft barriers
+ * on the body [N]; energy and kinetic energy [J]; lost since the start to friction, to damping and to
+ *     contacts, put in by the drive [J] event [event_capacity][7] kind (docs/file-format.md), time [s], x
+ * [m], v before and after [m/s]; of two bodies position and velocity of the driving one, otherwise not
+ * numbers summary [28] As `points`: x [m], v [m/s], number of impacts, speed before the last [m/s], regime,
+ * reason (codes of docs/file-format.md). As `trajectory`, over the cycle that the motion comes to, or the
+ * window at the end: amplitude [m], largest and smallest x [m], largest v [m/s], impacts per drive period,
+ * mean impact speed [m/s]. The machine: drive period [s], upper and lower barrier [m] (infinite: none), 1 if
+ * they are soft, 1 if it has two bodies. Reason of the `trajectory`; its energy [J] at the start, lost to
+ * friction, damping and contacts, put in; if it came to its end, energy at the end and what is missing in
+ * this book, otherwise not numbers. Period of the cycle in drive periods, 0: none; not a number, and the
+ * values are over the window, with a duration other than that of the case. 1 if a drive gives the drive
+ * period, which else is a unit of time; 1 if the position is an angle, in rad for m. All of it is written
+ * also where the motion was given up, as far as it went: the answer is then 78 */
 int separatrix_trajectory(const separatrix_model *model, int chosen_count, const int *chosen,
                           const double *values, const double *start, double duration, int samples_per_period,
                           int sample_capacity, int *sample_count, double *sample, int event_capacity,
@@ -223,6 +244,13 @@ void separatrix_catalogue_free(separatrix_catalogue *catalogue);
  * search with code 75. While it runs nothing else may use the catalogue. */
 int separatrix_catalogue_search(separatrix_catalogue *catalogue, int start_count, const double *start,
                                 const int *stop, char *message, size_t message_size);
+
+/* The same from starts of start_size numbers each: 3, or with a motor also 5, the further ones being crank
+ * speed [rad/s], and current [A] or integral of the speed control [rad]. With 3 they are those of the case.
+ * Another size is code 64. */
+int separatrix_catalogue_search_from(separatrix_catalogue *catalogue, int start_count, int start_size,
+                                     const double *start, const int *stop, char *message,
+                                     size_t message_size);
 
 /* Number of attractors. */
 int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
@@ -257,6 +285,11 @@ int separatrix_catalogue_number(int count, separatrix_catalogue *const *catalogu
  * one catalogue. */
 int separatrix_labels(const separatrix_catalogue *catalogue, int start_count, const double *start,
                       double *values, const int *stop, char *message, size_t message_size);
+
+/* The same of starts of start_size numbers each, as in separatrix_catalogue_search_from. */
+int separatrix_labels_from(const separatrix_catalogue *catalogue, int start_count, int start_size,
+                           const double *start, double *values, const int *stop, char *message,
+                           size_t message_size);
 
 /* The resolved case with other values in the parameters chosen[chosen_count]: an ordinary case file. Writes
  * at most text_size characters, the null character included, and the length of the whole text without it. */

@@ -11,7 +11,7 @@ import functools
 import os
 import shutil
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -315,38 +315,51 @@ class Model:
         chosen = self._along(active, values)
         start, first, times = _many(start, 2 * n + 1, first, times)
         directions = _directions(directions, len(active), derivatives)
-        count = len(start)
-        motion = np.empty((times.size, 2 * n))
-        slopes = np.empty((times.size, 2 * n, len(directions) + 2 * n + 1)) if derivatives else None
-        report = np.zeros((3, count), np.int32)
-        room = 4 * count + 64
-        while True:
-            found = ctypes.c_int()
-            impact_segment, impact = np.empty(room, np.int32), np.empty((room, 5))
-            _call(
-                "separatrix_coordinate_segments",
-                self._handle,
-                *chosen,
-                len(directions),
-                _pointer(directions),
-                count,
-                n,
-                *(_pointer(array) for array in (start, first, times)),
-                int(derivatives),
-                ctypes.c_double(tolerance),
-                *(_pointer(array) for array in (motion, slopes, *report)),
-                room,
-                ctypes.byref(found),
-                _pointer(impact_segment),
-                _pointer(impact),
-            )
-            if found.value <= room:
-                break
-            room = found.value
-        time, contact, before, after, side = impact[: found.value].T
-        impacts = Impacts(impact_segment[: found.value], time, before, after, side.astype(int))
+        given = (len(directions), _pointer(directions), len(start), n)
+        more = (int(derivatives), ctypes.c_double(tolerance))
+        arrays = (_pointer(start), _pointer(first), _pointer(times))
+        columns = len(directions) + 2 * n + 1 if derivatives else 0
+        call = functools.partial(
+            _call, "separatrix_coordinate_segments", self._handle, *chosen, *given, *arrays, *more
+        )
+        motion, slopes, report, segment, impact = _flown(call, (times.size, 2 * n), columns, len(start), 5)
+        time, contact, before, after, side = impact.T
+        impacts = Impacts(segment, time, before, after, side.astype(int))
         done = (report[1].astype(bool), report[2])
         return CoordinateSegments(motion, slopes, report[0], impacts, contact.astype(int), *done)
+
+    def crank_segments(
+        self,
+        active: Sequence[str],
+        values: np.ndarray,
+        start: np.ndarray,
+        first: np.ndarray,
+        times: np.ndarray,
+        derivatives: bool = True,
+        tolerance: float = 1e-10,
+        directions: np.ndarray | None = None,
+    ) -> CoordinateSegments:
+        """Fly many segments of a machine with a motor.
+
+        `start` (segments, 5): x [m], crank angle [rad], v [m/s], crank speed [rad/s], and current [A] or
+        integral of the speed control [rad] of a motor that has one as a state; a current that is NaN follows
+        the speed. The `motion` (samples, 5) has the same. All else is as for `segments`; the contact is 0.
+        """
+        chosen = self._along(active, values)
+        start, first, times = _many(start, 5, first, times)
+        directions = _directions(directions, len(active), derivatives)
+        given = (len(directions), _pointer(directions), len(start))
+        more = (int(derivatives), ctypes.c_double(tolerance))
+        arrays = (_pointer(start), _pointer(first), _pointer(times))
+        columns = len(directions) + 5 if derivatives else 0
+        call = functools.partial(
+            _call, "separatrix_crank_segments", self._handle, *chosen, *given, *arrays, *more
+        )
+        motion, slopes, report, segment, impact = _flown(call, (times.size, 5), columns, len(start), 4)
+        time, before, after, side = impact.T
+        impacts = Impacts(segment, time, before, after, side.astype(int))
+        done = (np.zeros(len(segment), int), report[1].astype(bool), report[2])
+        return CoordinateSegments(motion, slopes, report[0], impacts, *done)
 
     def _parameter(self, index: int) -> tuple[str, Parameter]:
         path, unit = ctypes.create_string_buffer(_TEXT), ctypes.create_string_buffer(_TEXT)
@@ -489,6 +502,26 @@ def _directions(directions: np.ndarray | None, parameters: int, derivatives: boo
     if directions is None:
         return np.eye(parameters)
     return _array(directions, (len(directions), parameters), "directions")
+
+
+def _flown(
+    call: Callable[..., None], shape: tuple[int, int], columns: int, count: int, width: int
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, np.ndarray, np.ndarray]:
+    """Return motion of a `shape` and its slopes along `columns`, report, segments and rows of impacts.
+
+    `call` takes the arrays that the library fills, for `count` segments; an impact has `width` numbers.
+    """
+    motion, report = np.empty(shape), np.zeros((3, count), np.int32)
+    slopes = np.empty((*shape, columns)) if columns else None
+    room = 4 * count + 64
+    while True:
+        found = ctypes.c_int()
+        segment, impact = np.empty(room, np.int32), np.empty((room, width))
+        arrays = (_pointer(array) for array in (motion, slopes, *report))
+        call(*arrays, room, ctypes.byref(found), _pointer(segment), _pointer(impact))
+        if found.value <= room:
+            return motion, slopes, report, segment[: found.value], impact[: found.value]
+        room = found.value
 
 
 def _with_force(

@@ -5,7 +5,7 @@
 import contextlib
 import ctypes
 import weakref
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +88,8 @@ class Motion:
     """One motion: columns of its samples and events, and numbers of the motion as a whole.
 
     `samples` and `events` have the columns `SAMPLE_COLUMNS` and `EVENT_COLUMNS` (m, s, rad, N, J).
-    `driver_x` is the foot of the spring where there is one body. The `summary` has the state at the end with
+    `driver_x` is the foot of the spring where there is one body, `driver_v` with a motor the crank angle
+    since the start [rad]. The `summary` has the state at the end with
     the bits of the command `points`, the rest with those of `trajectory`.
     """
 
@@ -180,6 +181,8 @@ def section_points(
 
     `period` in drive periods; one row for each.
     """
+    if "motor.inertia" in model.parameters:
+        raise CaseError("motor: found a machine with a motor, whose turns last no equal times")
     turn = angle % (2 * np.pi)
     length = 2 * np.pi / model.drive_frequency(values or {})
     found = [(float(point[0]), float(point[1]))]
@@ -212,10 +215,13 @@ class Catalogue:
         self._free = weakref.finalize(self, _library().separatrix_catalogue_free, self._handle)
 
     def search(self, starts: np.ndarray | None = None, stop: StopFlag | None = None) -> "Catalogue":
-        """Add the attractors to which `starts` (n, 3) lead; None: the sample of `basin`."""
-        count, starts = (-1, None) if starts is None else _starts(starts)
+        """Add the attractors to which `starts` (n, 3) lead; None: the sample of `basin`.
+
+        With a motor they may be (n, 5): with crank speed, and current or integral of the control.
+        """
+        size, starts = ((-1, 3), None) if starts is None else _starts(starts)
         with _stoppable():
-            _call("separatrix_catalogue_search", self._handle, count, _pointer(starts), _flag(stop))
+            _call("separatrix_catalogue_search_from", self._handle, *size, _pointer(starts), _flag(stop))
         return self
 
     @property
@@ -240,27 +246,34 @@ class Catalogue:
     def labels(self, starts: np.ndarray, stop: StopFlag | None = None) -> dict[str, np.ndarray]:
         """Where `starts` (n, 3) end up: the variables of a map in the types of its file.
 
-        `reason` is 0 where a start is not allowed. Several threads may ask at once.
+        With a motor they may be (n, 5), as in `search`. `reason` is 0 where a start is not allowed. Several
+        threads may ask at once.
         """
-        count, starts = _starts(starts)
-        values = np.empty((count, len(LABEL_VARIABLES)))
+        size, starts = _starts(starts)
+        values = np.empty((len(starts), len(LABEL_VARIABLES)))
+        arrays = (_pointer(starts), _pointer(values))
         with _stoppable():
-            _call("separatrix_labels", self._handle, count, _pointer(starts), _pointer(values), _flag(stop))
+            _call("separatrix_labels_from", self._handle, *size, *arrays, _flag(stop))
         with np.errstate(over="ignore"):
             columns = zip(LABEL_VARIABLES.items(), values.T, strict=True)
             return {name: column.astype(kind) for (name, kind), column in columns}
 
 
 def search_slices(
-    model: Model, slices: list[Mapping[str, float]], shape: tuple[int, ...], stop: StopFlag | None = None
+    model: Model,
+    slices: list[Mapping[str, float]],
+    shape: tuple[int, ...],
+    stop: StopFlag | None = None,
+    others: Sequence[float] = (),
 ) -> list[Catalogue]:
     """Find and number the attractors of all slices of a map as `basin` does.
 
-    `slices` are the values of the parameters, by path, over `shape` values of each, the last fastest.
+    `slices` are the values of the parameters, by path, over `shape` values of each, the last fastest. Starts
+    on the attractors of other slices have the `others`: crank speed, and current or integral of a motor.
     """
     catalogues = [Catalogue(model, values).search(stop=stop) for values in slices]
     if len(catalogues) > 1:
-        sections = [_sections(catalogue) for catalogue in catalogues]
+        sections = [_sections(catalogue, others) for catalogue in catalogues]
         for i, catalogue in enumerate(catalogues):
             starts = [sections[j] for j in _neighbours(i, shape)]
             catalogue.search(np.concatenate(starts), stop)
@@ -268,10 +281,11 @@ def search_slices(
     return catalogues
 
 
-def _sections(catalogue: Catalogue) -> np.ndarray:
+def _sections(catalogue: Catalogue, others: Sequence[float]) -> np.ndarray:
     """Return starts on the attractors of one body: a start has no state of the driving body of two."""
     found = [one for one in catalogue.attractors if not (one.numbers["rests"] or one.numbers["two_bodies"])]
-    return np.array([(*one.points[0], 0.0) for one in found]).reshape(-1, 3)
+    rows = [(*one.points[0][:2], 0.0, *others) for one in found]
+    return np.array(rows).reshape(-1, 3 + len(others))
 
 
 def _neighbours(position: int, shape: tuple[int, ...]) -> list[int]:
@@ -291,11 +305,11 @@ def number(catalogues: Iterable[Catalogue], shape: tuple[int, ...]) -> None:
     _call("separatrix_catalogue_number", len(handles), given, len(shape), (ctypes.c_int * len(shape))(*shape))
 
 
-def _starts(starts: np.ndarray) -> tuple[int, np.ndarray]:
+def _starts(starts: np.ndarray) -> tuple[tuple[int, int], np.ndarray]:
     starts = np.ascontiguousarray(starts, float)
-    if starts.ndim != 2 or starts.shape[1] != 3:
-        raise CaseError(f"starts: found shape {starts.shape}, allowed (n, 3)")
-    return len(starts), starts
+    if starts.ndim != 2 or starts.shape[1] not in (3, 5):
+        raise CaseError(f"starts: found shape {starts.shape}, allowed (n, 3), with a motor (n, 5)")
+    return starts.shape, starts
 
 
 @contextlib.contextmanager

@@ -140,7 +140,10 @@ contains
     call prepare_family(self%the_case%laws, model_options(self, tolerance), self%parameters(chosen), values, directions, &
                         derivatives, family, error)
     if (allocated(error)) return
-    if (.not. allocated(family%bodies)) then
+    if (allocated(family%driven)) then
+      call fail(error, exit_bad_case, 'motor: found a machine with a motor, whose segments separatrix_crank_segments flies')
+      return
+    else if (.not. allocated(family%bodies)) then
       call fail(error, exit_bad_case, 'body.law: found "'//trim(self%the_case%laws(1)%name)//'", allowed for segments of '// &
                 'coordinates structure')
       return

@@ -13,6 +13,7 @@ module c_labels
   use grid, only: grid_t
   use kinds, only: int64, wp
   use model_type, only: model_t
+  use motor_choices, only: has_motor
   use point_columns, only: margin_or_infinite, outcome_values, point_values
   use status, only: exit_resumable, exit_usage
   use text, only: to_text
@@ -23,8 +24,9 @@ module c_labels
   implicit none
   private
 
-  public :: separatrix_catalogue_open, separatrix_catalogue_search, separatrix_catalogue_size, separatrix_catalogue_attractor, &
-    separatrix_catalogue_number, separatrix_catalogue_free, separatrix_labels
+  public :: separatrix_catalogue_open, separatrix_catalogue_search, separatrix_catalogue_search_from, separatrix_catalogue_size, &
+    separatrix_catalogue_attractor, separatrix_catalogue_number, separatrix_catalogue_free, separatrix_labels, &
+    separatrix_labels_from
 
   !> Numbers of an attractor.
   integer, parameter :: of_attractor = 23 + 2*most_coordinates
@@ -76,6 +78,15 @@ contains
     integer(c_int), value :: start_count
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
+    code = separatrix_catalogue_search_from(catalogue, start_count, 3_c_int, start, stop_flag, message, message_size)
+  end function separatrix_catalogue_search
+
+  integer(c_int) function separatrix_catalogue_search_from(catalogue, start_count, start_size, start, stop_flag, message, &
+      message_size) bind(c) result(code)
+    type(c_ptr), value :: catalogue, start, stop_flag
+    integer(c_int), value :: start_count, start_size
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
     type(labeller_t), pointer :: self
     real(c_double), pointer :: given(:, :)
     real(wp), allocatable :: starts(:, :)
@@ -88,8 +99,12 @@ contains
       else if (start_count == 0) then
         allocate (starts(3, 0))
       else
-        call c_f_pointer(start, given, [3, start_count])
-        starts = given
+        call check_size(self%prepared, start_size, error)
+        allocate (starts(3, 0))
+        if (.not. allocated(error)) then
+          call c_f_pointer(start, given, [start_size, start_count])
+          starts = given
+        end if
       end if
       do i = 1, size(starts, 2)
         if (asked_to_stop(stop_flag)) then
@@ -103,7 +118,21 @@ contains
     end associate
     call sort_attractors(self%attractors)
     code = answer(error, message, message_size)
-  end function separatrix_catalogue_search
+  end function separatrix_catalogue_search_from
+
+  !> A start is 3 numbers; of a motor also 5. Code 64.
+  subroutine check_size(prepared, start_size, error)
+    type(prepared_t), intent(in) :: prepared
+    integer(c_int), intent(in) :: start_size
+    type(error_t), allocatable, intent(out) :: error
+    if (start_size == 3) return
+    if (has_motor(prepared%the_case%laws)) then
+      if (start_size /= 5) call fail(error, exit_usage, 'start_size: found '//to_text(int(start_size))// &
+                                     ', allowed with a motor 3, 5')
+    else
+      call fail(error, exit_usage, 'start_size: found '//to_text(int(start_size))//', allowed without a motor 3')
+    end if
+  end subroutine check_size
 
   !> Whether the flag of the caller, who may set it from another thread, is not 0.
   logical function asked_to_stop(stop_flag)
@@ -195,12 +224,24 @@ contains
     real(c_double), intent(inout) :: values(point_values, start_count)
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
+    code = separatrix_labels_from(catalogue, start_count, 3_c_int, start, values, stop_flag, message, message_size)
+  end function separatrix_labels
+
+  integer(c_int) function separatrix_labels_from(catalogue, start_count, start_size, start, values, stop_flag, message, &
+      message_size) bind(c) result(code)
+    type(c_ptr), value :: catalogue, stop_flag
+    integer(c_int), value :: start_count, start_size
+    real(c_double), intent(in) :: start(start_size, start_count)
+    real(c_double), intent(inout) :: values(point_values, start_count)
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
     type(labeller_t), pointer :: self
     type(error_t), allocatable :: error
     integer :: first, last, points
     call c_f_pointer(catalogue, self)
     points = block_size(self%prepared%ensemble)
-    last = 0
+    call check_size(self%prepared, start_size, error)
+    last = merge(start_count, 0_c_int, allocated(error))
     do while (last < start_count)
       first = last + 1
       last = min(last + points, start_count)
@@ -212,7 +253,7 @@ contains
       call label_block(self, start(:, first:last), values(:, first:last))
     end do
     code = answer(error, message, message_size)
-  end function separatrix_labels
+  end function separatrix_labels_from
 
   !> Values of a few starts, in the order of the file; all 0 where a start is not allowed.
   subroutine label_block(self, starts, values)

@@ -51,7 +51,8 @@ contains
     allocate (axes(0))
     do i = 1, size(model%the_case%axes)
       associate (one => model%the_case%axes(i))
-        if (one%name == 'x0' .or. one%name == 'v0' .or. one%name == 'crank_angle') axes = [axes, one]
+        if (any(one%name == [character(len=19) :: 'x0', 'v0', 'crank_angle', 'motor.crank_speed', 'motor.start_current', &
+                             'motor.start_integral'])) axes = [axes, one]
       end associate
     end do
     prepared%grid = grid_of(prepared%the_case, axes)
@@ -83,10 +84,11 @@ contains
     if (len(problem) == 0) problem = 'found bodies beyond a stop of a [contact.NAME], allowed within all of them'
   end function start_problem
 
-  !> Whether a start is one: finite, and not beyond a barrier. Of what is asked of many starts by many threads no text is made.
+  !> Whether a start of 3 numbers or more is one: finite, and not beyond a barrier. Of what is asked of many starts by many
+  !> threads no text is made.
   pure logical function is_start(prepared, start)
     type(prepared_t), intent(in) :: prepared
-    real(wp), intent(in) :: start(3)
+    real(wp), intent(in) :: start(:)
     is_start = all(ieee_is_finite(start))
     if (is_start) is_start = prepared%ensemble%moving%allows(start)
   end function is_start

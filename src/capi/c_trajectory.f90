@@ -16,6 +16,8 @@ module c_trajectory
   use machine_type, only: machine_t
   use model_type, only: model_t
   use motion_state, only: closing_error, log_t, open_log
+  use motor_log, only: foot_row
+  use motor_machine, only: motor_machine_t
   use restoring_law, only: position_is_angle
   use settled_cycle, only: describe_cycle
   use status, only: exit_given_up, exit_usage, is_given_up, reason_name, reason_time_over
@@ -144,8 +146,8 @@ contains
     end associate
   end subroutine fly
 
-  !> Rows: time, x, v, mode, foot or driving body: x and v, contact force, energy, kinetic energy, lost to friction,
-  !> damping and contacts, put in by the drive.
+  !> Rows: time, x, v, mode, foot (and crank angle of a motor) or driving body: x and v, contact force, energy, kinetic energy,
+  !> lost to friction, damping and contacts, put in by the drive.
   subroutine put_samples(moving, crank_angle, log, kept, sample)
     class(machine_t), intent(in) :: moving
     real(wp), intent(in) :: crank_angle
@@ -165,6 +167,11 @@ contains
       if (columns(1)%name == 'drive') sample(5, :kept) = columns(1)%values(:kept)
       sample(6, :kept) = ieee_value(1.0_wp, ieee_quiet_nan)
     end if
+    select type (moving)
+    type is (motor_machine_t)
+      sample(5, :kept) = log%sample_coordinates(foot_row, :kept)
+      sample(6, :kept) = log%sample_driver(1, :kept)
+    end select
     sample(7, :kept) = 0
     stops = moving%stops
     if (stops%soft) then

@@ -16,6 +16,9 @@ module variants
   use machine_type, only: machine_t, scales_t
   use motion, only: motion_t
   use motion_state, only: flight_adaptive, options_t
+  use motor_choices, only: has_motor
+  use motor_machine, only: motor_machine_t, prepare_motor_machine
+  use motor_motion, only: motor_motion_t
   use multibody_machine, only: multibody_machine_t
   use multibody_motion, only: multibody_motion_t
   use natural_scale, only: natural_size
@@ -45,11 +48,14 @@ module variants
   character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
     'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
 
-  !> A machine of which segments are flown: one body, or several.
+  !> A machine of which segments are flown: one body, several, or one with a motor.
   type, public :: flown_t
     type(motion_t) :: moving
     type(multibody_motion_t), allocatable :: bodies
+    type(motor_motion_t), allocatable :: driven
     type(scales_t) :: sizes
+    !> Drive period, or turn of a motor without load [s].
+    real(wp) :: period = 0
     !> No mode is flown adaptively.
     logical :: closed_form = .false.
   end type flown_t
@@ -149,11 +155,17 @@ contains
     type(options_t) :: options
     type(body_machine_t) :: body
     type(multibody_machine_t) :: several
+    type(motor_machine_t) :: driven
     changed = plan%laws
     call put_values(changed, plan%chosen, values)
     options = plan%options
     if (adaptive) options%flight = flight_adaptive
-    if (has_several(changed)) then
+    if (has_motor(changed)) then
+      call prepare_motor_machine(changed, options, driven, error)
+      if (allocated(error)) return
+      call take_facts(driven, flown)
+      flown%driven = driven%motor
+    else if (has_several(changed)) then
       call bodies_of(changed, options, several, error)
       if (allocated(error)) return
       call take_facts(several, flown)
@@ -176,6 +188,7 @@ contains
     budget = most_a_period + most_a_sample*machine%force_samples
     call machine%limit_budgets(budget, budget)
     flown%sizes = machine%sizes
+    flown%period = machine%period
     flown%closed_form = machine%closed_form
   end subroutine take_facts
 

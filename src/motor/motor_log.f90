@@ -14,6 +14,9 @@ module motor_log
 
   public :: add_sample, motor_energy, motor_values, record_motor_event
 
+  !> Row of the position of the foot among the columns of a sample.
+  integer, parameter, public :: foot_row = 6
+
 contains
 
   !> Torque of the motor, torque against it [N m], power of the motor [W], current or integral, kinetic energy, energy [J], position

@@ -31,10 +31,10 @@ module motor_motion
   implicit none
   private
 
-  public :: prepare_motor, start_motor, start_own, advance_motor, check_hold
+  public :: prepare_motor, start_motor, start_own, advance_motor, check_hold, do_events
 
   !> Events without progress in time after which a motion is given up.
-  integer, parameter :: most_idle_events = 32
+  integer, parameter, public :: most_idle_events = 32
 
   !> A machine with a motor, ready to move.
   type, public :: motor_motion_t

@@ -70,21 +70,25 @@ class SimulationError(Exception):
     """Events piled up, or the motion is not finite."""
 
 
-@cache
-def library() -> ctypes.CDLL:
-    """The compiled simulator; compiled once per version of its source."""
-    source = FOLDER / "machine.c"
-    text = source.read_bytes() + (FOLDER / "machine.h").read_bytes() + " ".join(FLAGS).encode()
+def compiled(name: str, sources: list[Path]) -> Path:
+    """A library of the first of its sources; compiled once per version of these."""
+    text = b"".join(source.read_bytes() for source in sources) + " ".join(FLAGS).encode()
     folder = Path(
         os.environ.get("SEPARATRIX_GENERATOR", Path(tempfile.gettempdir()) / f"generator-{os.getuid()}")
     )
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    path = folder / f"machine-{hashlib.sha256(text).hexdigest()[:16]}.so"
+    path = folder / f"{name}-{hashlib.sha256(text).hexdigest()[:16]}.so"
     if not path.is_file():
         draft = folder / f"{path.name}.{os.getpid()}"
-        subprocess.run(["cc", *FLAGS, "-o", draft, source, "-lm"], check=True)
+        subprocess.run(["cc", *FLAGS, "-o", draft, sources[0], "-lm"], check=True)
         draft.rename(path)
-    found = ctypes.CDLL(str(path))
+    return path
+
+
+@cache
+def library() -> ctypes.CDLL:
+    """The compiled simulator."""
+    found = ctypes.CDLL(str(compiled("machine", [FOLDER / "machine.c", FOLDER / "machine.h"])))
     array = np.ctypeslib.ndpointer
     found.machine_size.restype = ctypes.c_long
     if found.machine_size() != ctypes.sizeof(Machine):

@@ -17,6 +17,7 @@ import numpy as np
 from separatrix.arguments import Parser, list_of, positive, whole_number
 from separatrix.discovery.fitting.catalogue import STARTS
 from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
+from separatrix.discovery.fitting.motor_effects import MOTOR_EFFECTS
 from separatrix.discovery.options import COMPARED, Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
@@ -207,7 +208,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--effects",
         metavar="LIST",
-        type=list_of(dict.fromkeys([*STARTS, *JOINT_EFFECTS])),
+        type=list_of(dict.fromkeys([*STARTS, *JOINT_EFFECTS, *MOTOR_EFFECTS])),
         help="only these effects of the catalogue",
     )
     parser.add_argument(

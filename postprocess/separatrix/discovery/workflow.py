@@ -83,6 +83,7 @@ def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) ->
     free = with_values(fitted.problem.free, fitted.fit.values)
     whole = on_other_records(free, held_out.prepared)
     find_phases(held_out, model, whole)
+    held_out.take_zeros(whole)
     problem, fit = fit_stages(held_out, model, whole, np.array([one.value for one in whole]), stages=[0, 1])
     measure_noise(held_out, problem, fit, mass)
     copy_noise(training, held_out)

@@ -24,7 +24,7 @@ from matplotlib.ticker import MaxNLocator
 from separatrix import style
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes, recoloured
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import inset, marks, section, shares
+from separatrix.figures import inset, marks, motor, section, shares
 from separatrix.figures.caption import caption_pieces, describe_case, start_pieces, version_text
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.figures.page import Figures, Page, label
@@ -123,6 +123,10 @@ def basin_map(
         caption += ["markers: points of the attractors on the section", *lacking] if marked else []
         if section.coordinates(result) > 2:
             caption.append("attractors are not marked: they have more coordinates than the picture")
+    if motor.SPEED in axes and len(slices) == 1:
+        upright = across == motor.SPEED
+        handles += motor.mark_speeds(grid[: len(panels)], whole, upright, look.scale(whole, motor.SPEED)[0])
+        caption.append("arrows: mean speeds of the cycles, with their labels")
     caption += _count_caption(result, field, panels, len(slices), look)
     if part is not None:
         caption.append(f"right: the part framed, {count_text(part[field].size)} points")

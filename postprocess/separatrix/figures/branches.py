@@ -51,6 +51,8 @@ def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     makers = {"branches": partial(diagram, result, title, look)}
     if motor.has_motor(result) and "cycle_time" in result:
         makers["speed"] = partial(speeds, result, title, look)
+        if str(result.attrs["parameter"]).startswith("motor.") and _torques(result) is not None:
+            makers["torque"] = partial(torques, result, title, look)
     if result.sizes.get("curve_point"):
         makers["curves"] = partial(chart, result, title, look)
     return Figures(makers)
@@ -171,13 +173,45 @@ def speeds(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     page = Page(look, (style.DOUBLE_COLUMN, 85.0))
     (ax,) = page.axes
     handles = draw(ax, result, look, motor.mean_speed(result))
-    case = resolved_case(result)
-    natural = np.sqrt(case["restoring"].get("stiffness", 0.0) / case["body"]["mass"])
-    handles.append(motor.mark_natural(ax, natural))
+    handles.append(motor.mark_natural(ax, motor.natural_of(result)))
     across = look.selected(result)["parameter"].copy()
     _set_label(across, str(result.attrs["parameter"]), ax.set_xlabel)
     ax.set_ylabel("mean speed of the crank (rad/s)")
     caption = [*caption_pieces(result, look, describe_case(result)), plain(version_text(result))]
+    return page.finish(title, caption, handles, columns=4)
+
+
+def _torques(result: xr.Dataset) -> np.ndarray | None:
+    """Return the torque of the motor at the mean speed of every orbit [N m]; None without a line."""
+    name = str(result.attrs["parameter"]).removeprefix("motor.")
+    law = resolved_case(result)["motor"] | {name: result["parameter"].values}
+    return motor.torque_of(law, motor.mean_speed(result))
+
+
+def torques(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
+    """Return the torque that the machine takes over the mean speed, with lines of the motor across it.
+
+    The orbits of a value of the parameter are where its line crosses the torque of the machine.
+    """
+    page = Page(look, (style.DOUBLE_COLUMN, 85.0))
+    (ax,) = page.axes
+    torque, parameter = _torques(result), str(result.attrs["parameter"])
+    over_speed = result.assign(parameter=(result["parameter"].dims, motor.mean_speed(result)))
+    handles = draw(ax, over_speed, look, torque)
+    top = 1.1 * float(torque.max())
+    ax.set_ylim(0, top)
+    shown = look.selected(result)["parameter"]
+    factor = shown.values[0] / result["parameter"].values[0] if result["parameter"].values[0] else 1.0
+    unit_of = unit(shown)
+    handles.append(
+        motor.torque_lines(ax, result, parameter, lambda value: f"{factor * value:.3g} {unit_of}", top)
+    )
+    handles.append(motor.mark_natural(ax, motor.natural_of(result), upright=True))
+    ax.set_xlabel("mean speed of the crank (rad/s)")
+    ax.set_ylabel("mean torque (N m)")
+    name = parameter.replace("motor.", "").replace("_", " ")
+    text = f"grey: the motor at values of its {name}; black: what the machine takes"
+    caption = [*caption_pieces(result, look, describe_case(result)), text, plain(version_text(result))]
     return page.finish(title, caption, handles, columns=4)
 
 

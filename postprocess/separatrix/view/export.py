@@ -208,7 +208,10 @@ def _small(answer: bytes) -> bytes:
     small = {name: arrays[name].astype(np.float32) for name in arrays if name.startswith("event_")}
     small["event_kind"] = arrays["event_kind"].astype(np.int8)
     small["section"] = arrays["section"]
-    for name in ("x", "v", "driver"):
+    if "crank" in arrays:
+        # an angle is drawn: its turns would take the digits
+        arrays["crank"] = np.mod(arrays["crank"], 2 * np.pi)
+    for name in [one for one in ("x", "v", "driver", "crank") if one in arrays]:
         values = np.nan_to_num(arrays[name].astype(float))
         low, high = values.min(initial=np.inf), values.max(initial=-np.inf)
         step = (high - low) / 65534 or 1.0

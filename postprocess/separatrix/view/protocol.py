@@ -218,13 +218,22 @@ def motion(desk: Desk, parameters: Parameters) -> bytes:
     arrays = {name: column.astype(np.float32) for name, column in columns.items()}
     if found.summary["two_bodies"]:
         arrays["driver_v"] = samples["driver_v"].astype(np.float32)
+    elif "motor" in machine.source.case:
+        arrays["crank"] = samples["driver_v"].astype(np.float32)
     arrays["time"] = samples["time"]
     arrays["energy"] = samples["energy"].astype(np.float32)
     arrays |= {f"event_{name}": column for name, column in found.events.items() if not np.isnan(column).all()}
-    turns = (samples["time"] * (2 * np.pi / period) + start[2]) / (2 * np.pi)
-    whole = np.abs(turns - np.rint(turns)) < 1e-6
-    arrays["section"] = np.flatnonzero(whole).astype(np.int32)
+    arrays["section"] = _on_section(arrays, samples["time"], start[2], period)
     return pack({"summary": found.summary, "start": start, "parameters": changed}, arrays)
+
+
+def _on_section(arrays: dict, time: np.ndarray, angle: float, period: float) -> np.ndarray:
+    """Indices of the samples on the section; of a crank with a motor those next to its passages."""
+    if "crank" in arrays:
+        whole = np.diff(np.floor(arrays["crank"] / (2 * np.pi)), prepend=0.0) > 0
+        return np.flatnonzero(whole).astype(np.int32)
+    turns = (time * (2 * np.pi / period) + angle) / (2 * np.pi)
+    return np.flatnonzero(np.abs(turns - np.rint(turns)) < 1e-6).astype(np.int32)
 
 
 def _fly(machine: Machine, start: tuple, changed: dict[str, float], parameters: Parameters) -> object:

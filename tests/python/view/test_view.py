@@ -60,6 +60,23 @@ def test_packs_and_unpacks() -> None:
         np.testing.assert_array_equal(found[name], array)
 
 
+def test_a_motion_with_a_motor_has_its_crank(source_dir: Path, tmp_path: Path) -> None:
+    """The angle of the crank, which moves the foot, and the samples next to its passages."""
+    case = sx.load(source_dir / "examples" / "motor_impact.toml").with_(
+        {"run.duration": 4.0, "run.window": 1.0, "attractors.sample": 4}
+    )
+    axes = {"motor.crank_speed": (8, 14, 2), "x0": (-0.1, 0.1, 3)}
+    sx.basin(case, axes, output=tmp_path / "map.h5").close()
+    desk = Desk([tmp_path / "map.h5"], tmp_path)
+    header, found = ask(desk, "motion", file=0, at="1,1", x=0.05, v=0, angle=0.5, samples=64)
+    assert header["parameters"] == {"motor.crank_speed": 14.0}
+    np.testing.assert_allclose(found["driver"], 0.03 * np.cos(found["crank"]), atol=1e-6)
+    turns = np.floor(found["crank"] / (2 * np.pi))
+    assert turns[-1] > 5
+    np.testing.assert_array_equal(found["section"], np.flatnonzero(np.diff(turns, prepend=0.0) > 0))
+    desk.close()
+
+
 def test_describes_files(desk: Desk) -> None:
     """Kinds, axes, variables, attractors and parameters of every file."""
     described, _ = ask(desk, "describe")

@@ -19,6 +19,7 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
     """Fit all parameters that the records can determine; sets noise and memory of the records."""
     free = data.unknowns(model)
     find_phases(data, model, free)
+    data.find_zeros(model, free)
     values = np.array([one.value for one in free])
     problem, fit = fit_stages(data, model, free, values, stages=[0, 1])
     measure_noise(data, problem, fit, mass)

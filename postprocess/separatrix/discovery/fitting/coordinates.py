@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The short-segment likelihood of machines of several bodies: any sensors, starts of all coordinates."""
 
+from functools import cached_property
+
 import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
@@ -52,13 +54,19 @@ class CoordinateProblem(Problem):
         """How many sensors the records have in all."""
         return len(self.columns)
 
-    @property
+    @cached_property
     def compared(self) -> np.ndarray:
         """Samples of each sensor that are compared (segments, channels*length)."""
-        has = np.array([[one.sensor(name) is not None for name in self.columns] for one in self.prepared])
-        of_segments = has[self.segments.record]
         inside = self.segments.inside
-        return (of_segments[:, :, None] & inside[:, None, :]).reshape(inside.shape[0], -1)
+        found = np.zeros((inside.shape[0], len(self.columns), inside.shape[1]), bool)
+        for number, prepared in enumerate(self.prepared):
+            rows = np.flatnonzero(self.segments.record == number)
+            for channel, name in enumerate(self.columns):
+                sensor = prepared.sensor(name)
+                if sensor is not None:
+                    known = True if sensor.known is None else sensor.known[self.segments.index[rows]]
+                    found[rows, channel] = inside[rows] & known
+        return found.reshape(inside.shape[0], -1)
 
     def _part(self, number: int) -> dict:
         """The segments of one record as lists for the simulator."""
@@ -158,7 +166,7 @@ class CoordinateProblem(Problem):
         result, motion, jacobian = self._fly(part, active, given, start, directions)
         length = inside.shape[1]
         failed = np.asarray(result.reason) != 0
-        shown = padded_table(motion[0], inside)
+        shown = padded_table(motion[0][:, : 2 * n], inside)
         failed |= np.any(inside[:, :, None] & ~np.isfinite(shown), axis=(1, 2))
         out.failed[rows] = failed
         watched = self.structure.names.index(prepared.observed)
@@ -174,7 +182,7 @@ class CoordinateProblem(Problem):
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
             d = len(directions)
-            out.transition[rows] = padded_table(jacobian[0][:, :, d : d + 2 * n], inside)
+            out.transition[rows] = padded_table(jacobian[0][:, : 2 * n, d : d + 2 * n], inside)
             crank = np.repeat(self._crank_slopes(number, part), np.diff(part["offsets"]), axis=0)
         for channel, name in enumerate(self.columns):
             sensor = prepared.sensor(name)
@@ -182,17 +190,25 @@ class CoordinateProblem(Problem):
                 continue
             columns = slice(channel * length, (channel + 1) * length)
             shows, by_all = self._shown(sensor, part, motion, jacobian, active, given, directions)
-            residual = (sensor.values[part["samples"]] - shows) / sensor.sigma
+            residual = self._missed(sensor, sensor.values[part["samples"]] - shows, values) / sensor.sigma
             out.residual[rows, columns] = np.nan_to_num(padded_table(residual, inside))
             out.used[rows, columns] = self.compared[rows, columns]
             if derivatives:
                 by_parameter = by_all[:, -1:] * crank
                 by_parameter[:, moves] += by_all[:, :d]
+                self._add_slopes(sensor, by_parameter)
                 table = np.nan_to_num(padded_table(by_all[:, d : d + 2 * n] / sensor.sigma, inside))
                 out.by_start[rows, columns] = table
                 out.by_parameter[rows, columns] = np.nan_to_num(
                     padded_table(by_parameter / sensor.sigma, inside)
                 )
+
+    def _missed(self, sensor: Sensor, difference: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """What a sensor shows less what the machine would make it show."""
+        return difference
+
+    def _add_slopes(self, sensor: Sensor, by_parameter: np.ndarray) -> None:
+        """Derivatives of what a sensor shows by what is its own."""
 
     def _fly(self, part: dict, active: list[str], given: np.ndarray, start: np.ndarray, directions) -> tuple:
         """Motion and Jacobian at the samples and, for accelerations, one and two instants later."""

@@ -61,6 +61,12 @@ class Data:
         )
         return free + sensor_zeros(free, len(self.prepared))
 
+    def find_zeros(self, model, free: list[Free]) -> None:
+        """Search the zeros of sensors that no record states; changes the values of `free`."""
+
+    def take_zeros(self, free: list[Free]) -> None:
+        """Take the zeros of sensors from a fit to other records."""
+
     def measured_by_sensor(self, problem: Likelihood, fit: Fit) -> bool:
         """Whether the noise of each sensor was measured by itself."""
         return False

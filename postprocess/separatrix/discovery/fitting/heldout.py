@@ -17,7 +17,7 @@ import numpy as np
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
 from separatrix.discovery.fitting.likelihood import Likelihood
-from separatrix.discovery.fitting.machine import Free, drive_amplitudes, on_other_records
+from separatrix.discovery.fitting.machine import CRANK_ZERO, Free, drive_amplitudes, on_other_records
 from separatrix.discovery.fitting.rescue import suspicious
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
@@ -172,7 +172,7 @@ def _fit_own(
     if settled is None:
         settled, own = model, np.ones(values.size, bool)
     # what the machine has no parameter for
-    own |= np.array([one.is_imperfection for one in free], bool)
+    own |= np.array([one.is_imperfection or one.path == CRANK_ZERO for one in free], bool)
     kept = [one for one, mine in zip(free, own, strict=True) if mine]
     fit = None
     if guess is not None:

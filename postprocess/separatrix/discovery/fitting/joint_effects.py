@@ -7,53 +7,31 @@ case. A row of the table is an effect; its name in a verdict is `EFFECT@LOCATION
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
 from separatrix.discovery.fitting.catalogue import Candidate, Scales, candidate, refuse_unknown
+from separatrix.discovery.fitting.joint_effect import AT, JointEffect
 from separatrix.discovery.fitting.locations import LocationScales, SensedScales
 from separatrix.discovery.fitting.machine import Free, bounds_of
+from separatrix.discovery.fitting.motor_effects import MOTOR_EFFECTS, MOTOR_LOCATIONS, row_with_motor
 from separatrix.discovery.measured.bodies import (
     GROUND,
     Joint,
     Location,
     Structure,
     edited,
+    has_motor,
     structure_of,
 )
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 from separatrix.library import Effect, effects
 
-AT = "@"
 # keys that a spring with free play in series must not have
 _NO_PLAY = ("free_length", "modulation", "modulation_cosine", "modulation_sine")
-
-
-@dataclass(frozen=True)
-class JointEffect:
-    """One effect: its family, its change of a case at a location, and the parameters that this frees.
-
-    `change` (case, location, joint, scales) edits the case and returns the path of the joint whose `keys` are
-    fitted, with one or more values to start from. `of` is the kind and law of the joint that it needs there,
-    '' for none. Parameters of that joint may move to the path that `change` returns.
-    """
-
-    name: str
-    meaning: str
-    family: str
-    change: Callable[[dict, Location, Joint | None, LocationScales], str]
-    keys: Callable[[LocationScales], dict[str, list[float]]]
-    amplitudes: tuple[str, ...]
-    sizes: tuple[str, ...] = ()
-    of: tuple[str, str] = ("", "")
-    acts: str = "flight"
-    # parameters of the joint that move to the returned path
-    moved: tuple[str, ...] = ()
-    # a key and the key with minus its value
-    mirrored: tuple[str, str] = ("", "")
 
 
 def _new(family: str, **law: object) -> Callable[[dict, Location, Joint | None, LocationScales], str]:
@@ -211,8 +189,10 @@ def effect_of(name: str) -> Effect:
     """Properties of an effect of one body, or of one at a location of several."""
     if AT not in name:
         return effects()[name]
-    row = JOINT_EFFECTS[name.partition(AT)[0]]
-    return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", {})
+    kind, _, where = name.partition(AT)
+    row = MOTOR_EFFECTS[kind] if where in MOTOR_LOCATIONS else JOINT_EFFECTS[kind]
+    confused = {f"{other}{AT}{law}": why for other, (law, why) in row.confused.items()}
+    return Effect(name, row.meaning, {}, row.family, row.acts, row.amplitudes, row.sizes, "", confused)
 
 
 def location_of(name: str) -> str:
@@ -252,7 +232,10 @@ def candidate_of(
     if AT not in name:
         return candidate(model, free, names, name, scales)
     kind, _, where = name.partition(AT)
-    row, structure = JOINT_EFFECTS[kind], structure_of(model)
+    row, structure = (
+        row_with_motor(kind, model) if has_motor(model) else JOINT_EFFECTS[kind],
+        structure_of(model),
+    )
     joint = structure.joint(where) if row.of[0] else None
     ends = joint.ends if joint else structure.location(where).ends
     location = Location(where, ends, joint.row if joint else structure.location(where).row, ())
@@ -308,7 +291,8 @@ def _cannot_act(row: JointEffect, size: LocationScales | None, measured: bool) -
 def _free(row: JointEffect, key: str, values: list[float], path: str, model) -> Free:
     """A parameter of an effect, from the first of its usual sizes."""
     if key in row.sizes:
-        ends = np.log([min(values) / FIT.far_joint_start, max(values) * FIT.far_joint_start])
+        reach = row.reach or FIT.far_joint_start
+        ends = np.log([min(values) / reach, max(values) * reach])
         mirror = {"also": f"{path}.{row.mirrored[1]}", "mirrored": True} if key == row.mirrored[0] else {}
         start = float(np.log(values[0]))
         return Free(f"{path}.{key}", start, *ends, 0.1, positive=True, **mirror)

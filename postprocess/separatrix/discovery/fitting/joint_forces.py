@@ -12,6 +12,7 @@ from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.joint_response import columns_of, sigmas_of
 from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.motions import clock_of, knots_of, splines
+from separatrix.discovery.measured.bodies import contact_paths
 from separatrix.discovery.policy import FIT
 
 
@@ -62,8 +63,7 @@ def kicks_of(problem: Likelihood, fit: Fit) -> dict[str, np.ndarray]:
         hit = np.any(table != 0, axis=2)
         if np.count_nonzero(hit) < FIT.impacts_of_kicks:
             continue
-        name = problem.model.contacts[contact]
-        path = name if "." in name else f"contact.{name}"
+        path = contact_paths(problem.model)[contact]
         found[path] = columns_of(problem, fit, table, structure.joint(path).row, kick=True)
     return found
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.likelihood import Likelihood
-from separatrix.discovery.measured.bodies import Structure, structure_of
+from separatrix.discovery.measured.bodies import Structure, contact_paths, has_motor, structure_of
 from separatrix.discovery.policy import FIT
 
 
@@ -58,7 +58,8 @@ def location_scales(problem: Likelihood, fit: Fit) -> SensedScales:
     interval = float(np.median([one.record.interval for one in problem.prepared]))
     rates = steps[both] / interval
     found: dict[str, LocationScales | None] = {}
-    largest = float(np.max(np.std(motion[:, :n], axis=0)))
+    # of an angle and a position none is small beside the other
+    largest = 0.0 if has_motor(problem.model) else float(np.max(np.std(motion[:, :n], axis=0)))
     rows = {one.name: one.row for one in structure.locations}
     rows |= {one.path: one.row for one in structure.joints}
     for name, row in rows.items():
@@ -93,7 +94,7 @@ def _friction(problem: Likelihood, fit: Fit, name: str) -> float:
 
 def _impact_speed(problem: Likelihood, fit: Fit, structure: Structure, name: str) -> float:
     """Usual speed of impacts of a contact, 0 without any."""
-    contacts = [f"contact.{one}" if "." not in one else one for one in problem.model.contacts]
+    contacts = contact_paths(problem.model)
     if name not in contacts:
         return 0.0
     hits = [one for one in fit.evaluation.impacts if one is not None and len(one)]

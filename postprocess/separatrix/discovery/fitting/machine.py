@@ -23,6 +23,8 @@ _FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding")
 _KNOTS = ("speed[", "position[", "extension[", "penetration[")
 SENSOR_BIAS = "effect.sensor_bias.bias"
 SENSOR_ZERO = "nuisance:sensor_zero"
+CRANK_ZERO = "nuisance:crank_zero"
+"""What a sensor of the crank shows at the crank angle 0 of the case [rad]."""
 IMPERFECTION = "nuisance:imperfection_of_rig:"
 _AMPLITUDES = ("drive.amplitude", "drive.cosine", "drive.sine")
 _TIED = {"friction.static_coefficient": "friction.kinetic_coefficient"}

@@ -6,12 +6,21 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from separatrix.discovery.fitting.catalogue import Scales, names_of_body
+from separatrix.discovery.fitting.crank_data import CrankData
 from separatrix.discovery.fitting.data import Data, gather, scales_of
 from separatrix.discovery.fitting.joint_effects import names_at_joints
 from separatrix.discovery.fitting.locations import SensedScales, location_scales
+from separatrix.discovery.fitting.motor_effects import names_with_motor
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.sensed import gather_sensed
-from separatrix.discovery.measured.bodies import is_pair, is_structure, pair_as_structure, structure_of
+from separatrix.discovery.measured.bodies import (
+    has_motor,
+    is_pair,
+    is_structure,
+    pair_as_structure,
+    structure_of,
+)
+from separatrix.discovery.measured.cranks import LAWS, law_of, prepare_crank
 from separatrix.discovery.measured.in_force import prepare_force
 from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import Record
@@ -43,6 +52,8 @@ class Observation(Protocol):
 
 def observation_of(model: Model, compare: str) -> Observation:
     """The observation of a machine; pairs become structures."""
+    if has_motor(model):
+        return OfMotor(model, compare)
     if is_pair(model):
         model = pair_as_structure(model)
     if not is_structure(model):
@@ -129,6 +140,42 @@ class OfBodies:
     def gather(self, prepared: list[Prepared], options: Options) -> Data:
         """Smooth and cut records."""
         return gather_sensed(prepared, options.segment_periods, options.segment_seconds, self.model)
+
+    def scales(self, data: Data, fitted: Fitted) -> SensedScales:
+        """Typical sizes along the fitted motion."""
+        return location_scales(fitted.problem, fitted.fit)
+
+
+@dataclass(frozen=True)
+class OfMotor:
+    """A body and the crank of the motor that drives it."""
+
+    model: Model
+    compare: str = "motion"
+    mass: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse motors whose state no sensor shows."""
+        if law_of(self.model) not in LAWS:
+            raise SeparatrixError(
+                f'motor.law: found "{law_of(self.model)}", allowed for a base machine {", ".join(LAWS)}: the '
+                "integral of a speed control shows in no sensor"
+            )
+        if self.compare == "force":
+            raise SeparatrixError("compare: found force, allowed with a motor motion", USAGE)
+
+    def effects(self, asked: tuple[str, ...] | None) -> list[str]:
+        """Effects with their locations, of those that were asked for."""
+        return names_with_motor(self.model, asked)
+
+    def prepare(self, record: Record, rest: Record | None) -> Prepared:
+        """Find the sensors of body and crank and their noise."""
+        return prepare_crank(record, self.model, rest)
+
+    def gather(self, prepared: list[Prepared], options: Options) -> Data:
+        """Smooth and cut records."""
+        lengths = (options.segment_periods, options.segment_seconds)
+        return gather_sensed(prepared, *lengths, self.model, CrankData)
 
     def scales(self, data: Data, fitted: Fitted) -> SensedScales:
         """Typical sizes along the fitted motion."""

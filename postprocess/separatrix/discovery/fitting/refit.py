@@ -335,7 +335,8 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
         live = screened.live[name]
         if live.any():
             sizes = np.array([candidate.free[i].size for i in candidate.added])
-            guess[live] += screened.step[name] * sizes[live]
+            if live.any():
+                guess[live] += screened.step[name] * sizes[live]
             far = FIT.farthest * np.where(candidate.linear, sizes, np.inf)
             guess = np.clip(np.clip(guess, -far, far), lower, upper)
             # away from zero, where its other parameters could not move

@@ -84,6 +84,10 @@ def _shown(problem: Likelihood, fit: Fit, candidate: Candidate, values: np.ndarr
         columns = (fit.evaluation.residual - shown.residual)[:, :, None]
         steady = good & ~shown.failed
         live = np.zeros(len(added), bool)
+        if np.max(np.abs(columns[steady]), initial=0) < FIT.screen_same:
+            # the base machine has these numbers, which are to be freed
+            shown = problem.evaluate(values, fit.starts)
+            columns, steady = shown.by_parameter[:, :, added], good & ~shown.failed & shown.steady
     else:
         shown = problem.evaluate(values, fit.starts)
         sizes = np.array([candidate.free[i].size for i in added])

@@ -20,7 +20,7 @@ from separatrix.discovery.fitting.rescue import solve_starts
 from separatrix.discovery.measured.bodies import Structure, structure_of
 from separatrix.discovery.measured.segments import cut
 from separatrix.discovery.measured.sensors import SensedPrepared
-from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.discovery.measured.smoother import Smoothed
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
@@ -175,12 +175,20 @@ class SensedData(Data):
                 found[first : first + len(motion), unseen] = motion[:, unseen]
         return found
 
+    def as_recorded(self, prepared: SensedPrepared) -> tuple[np.ndarray, list[str]]:
+        """Values of parameters that differ between records, and their paths."""
+        return np.zeros(0), []
+
+    def fly(self, model, active: list, values: np.ndarray, start: np.ndarray, first, times) -> object:
+        """Segments of a model without derivatives."""
+        return model.coordinate_segments(active, values, start, first, times, derivatives=False)
+
     def _observed(self, prepared: SensedPrepared, known: np.ndarray, unseen: np.ndarray) -> np.ndarray:
         """The motion of the machine of the case, corrected by the measurement."""
         model, t = self.model, prepared.record.t
         period = prepared.period_samples or oscillation_samples(_moving(prepared))
         every = max(1, round(period / FIT.corrections))
-        values, active = np.zeros(0), []
+        values, active = self.as_recorded(prepared)
         if prepared.frequency is not None:
             active = [
                 path for path in model.parameters if path.startswith("drive.") and path.endswith(".frequency")
@@ -194,17 +202,11 @@ class SensedData(Data):
             angle = 0.0
             if prepared.frequency is not None:
                 angle = prepared.phase + prepared.frequency * (t[first] - prepared.origin)
-            flown = model.coordinate_segments(
-                active,
-                values,
-                np.append(state, angle)[None],
-                np.array([0, rows.size]),
-                t[rows] - t[first],
-                derivatives=False,
-            )
+            start, offsets = np.append(state, angle)[None], np.array([0, rows.size])
+            flown = self.fly(model, active, values, start, offsets, t[rows] - t[first])
             if flown.reason[0] == 0:
-                found[np.ix_(rows[:-1], unseen)] = flown.motion[:-1][:, unseen]
-                state = flown.motion[-1]
+                found[np.ix_(rows[:-1], unseen)] = flown.motion[:-1, : state.size][:, unseen]
+                state = flown.motion[-1, : state.size]
             else:
                 # the measurement lies beyond a stop of the case
                 found[np.ix_(rows[:-1], unseen)] = state[unseen]
@@ -212,15 +214,17 @@ class SensedData(Data):
         return found
 
 
-def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float | None, model) -> SensedData:
-    """Smooth and cut records of several sensors, as `gather` those of one body."""
+def gather_sensed(
+    prepared: list[SensedPrepared], periods: float, seconds: float | None, model, kind: type = SensedData
+) -> SensedData:
+    """Smooth and cut records of several sensors, as `gather` those of one body, into data of a kind."""
     structure = structure_of(model)
     bodies, calm, lengths = [], [], []
     for one in prepared:
         record = one.record
         oscillation = oscillation_samples(_moving(one))
         seen = {
-            sensor.name: smooth(record.t, sensor.values, sensor.sigma, one.period_samples or oscillation)
+            sensor.name: one.smoothed(sensor, one.period_samples or oscillation)
             for sensor in one.sensors
             if sensor.kind in "xv"
         }
@@ -242,14 +246,14 @@ def gather_sensed(prepared: list[SensedPrepared], periods: float, seconds: float
     for number, one in enumerate(prepared):
         if not np.any(stages[-1].record == number):
             raise SeparatrixError(f"{one.record.file}{one.record.part}: gaps leave no interval to be fitted")
-    return SensedData(prepared, calm, stages, model=model, bodies=bodies)
+    return kind(prepared, calm, stages, model=model, bodies=bodies)
 
 
 def _moving(one: SensedPrepared) -> np.ndarray:
-    """A signal that oscillates with the machine: the first position, else the first speed."""
+    """A signal that oscillates with the machine: the first position, else the first speed, or what it is."""
     if one.record.has_position:
         return one.record.x
-    return next(sensor.values for sensor in one.sensors if sensor.kind == "v")
+    return next((sensor.values for sensor in one.sensors if sensor.kind == "v"), one.record.x)
 
 
 def _calm(structure: Structure, t: np.ndarray, seen: dict[str, Smoothed]) -> Smoothed:

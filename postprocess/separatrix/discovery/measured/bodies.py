@@ -20,6 +20,8 @@ from separatrix.library import Model
 KINDS = ("spring", "friction", "contact")
 """Tables of a case that are joints."""
 GROUND = "ground"
+BODY, CRANK = CRANKED = "body", "crank"
+"""Coordinates of a machine with a motor."""
 # tables of a case that a base machine does not need
 _OF_RUNS = ("axis", "sweep", "record", "grid", "refine")
 _PAIR = "driving", "driven"
@@ -83,6 +85,11 @@ def is_structure(model: Model) -> bool:
     return "body.in_sequence" in model.parameters
 
 
+def has_motor(model: Model) -> bool:
+    """Whether a motor drives a machine: its coordinates are a body and a crank."""
+    return "motor.inertia" in model.parameters
+
+
 def is_pair(model: Model) -> bool:
     """Whether a machine is a frictional pair."""
     return "body.driven_mass" in model.parameters
@@ -92,6 +99,8 @@ def is_pair(model: Model) -> bool:
 def structure_of(model: Model) -> Structure:
     """The structure of a model; one that no base machine can have is refused."""
     case = tomllib.loads(model.to_text({}))
+    if has_motor(model):
+        return _with_crank(case)
     if case.get("structure"):
         raise SeparatrixError(
             "structure: found a structure of matrices or modes, allowed for a base machine bodies "
@@ -121,6 +130,28 @@ def structure_of(model: Model) -> Structure:
     drives = case.get("drive", {}).values()
     driven = tuple(dict.fromkeys(one["body"] for one in drives if isinstance(one, dict) and "body" in one))
     return Structure(names, mass, tuple(joints), tuple(found), watched, driven)
+
+
+def _with_crank(case: dict) -> Structure:
+    """A body and the crank of a motor; the laws of the body and the motor are joints to the ground."""
+    rows = dict(zip(CRANKED, np.eye(2), strict=True))
+    joints = [
+        Joint(name, case[name]["law"], (GROUND, body), rows[body], case[name])
+        for name, body in (("restoring", BODY), ("friction", BODY), ("contact", BODY), ("motor", CRANK))
+    ]
+    locations = tuple(
+        Location(body, (GROUND, body), row, tuple(one.path for one in joints if one.ends[1] == body))
+        for body, row in rows.items()
+    )
+    mass = np.array([case["body"]["mass"], case["motor"]["inertia"]])
+    return Structure(CRANKED, mass, tuple(joints), locations, BODY, ())
+
+
+def contact_paths(model: Model) -> tuple[str, ...]:
+    """Paths of the joints that are contacts, in the order in which impacts count them."""
+    if has_motor(model):
+        return ("contact",)
+    return tuple(name if "." in name else f"contact.{name}" for name in model.contacts)
 
 
 def _sorted(ends: tuple[str, str], bodies: list[str]) -> tuple[str, str]:

@@ -30,7 +30,10 @@ _FREQUENCY = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6}
 _RATE = {"rad/s": 1.0, "Hz": _TURN, "rpm": _TURN / 60}
 _SPEED = {f"{unit}/s": size for unit, size in (_LENGTH | _ANGLE).items()}
 _ACCELERATION = {f"{unit}/s^2": size for unit, size in (_LENGTH | _ANGLE).items()} | {"g": 9.80665}
+_CURRENT = {"A": 1.0, "mA": 1e-3}
+_VOLTAGE = {"V": 1.0, "mV": 1e-3, "kV": 1e3}
 UNITS = {"t": _TIME, "x": _LENGTH | _ANGLE, "v": _SPEED, "force": _FORCE, "phi": _ANGLE, "a": _ACCELERATION}
+UNITS |= {"current": _CURRENT, "voltage": _VOLTAGE, "pulse": _VOLTAGE | {"1": 1.0}}
 """Units of the columns, over the SI unit."""
 _OF_KEYS = {
     "sampling_rate_hz": _FREQUENCY,
@@ -42,6 +45,8 @@ _OF_KEYS = {
     "drive_frequency_rad_s": _RATE,
     "phase": _ANGLE,
     "sensor_delay_s": _TIME,
+    "motor_voltage_v": _VOLTAGE,
+    "motor_speed_rad_s": _RATE,
 }
 # other ways to write a unit
 _SAME = {"°": "deg", "degrees": "deg", "µm": "um", "μm": "um", "micrometre": "um", "µs": "us", "μs": "us"}
@@ -257,7 +262,7 @@ def _units(path: Path, table: Table) -> dict[str, str]:
             _refuse(path, text)
         found[name] = unit
     known = {kind_of(name) for name in [*found, *table.units] if name in columns or name in UNITS}
-    if "t" not in known or not known & ({"x"} if has_position(columns) else {"x", "v"}):
+    if "t" not in known or not known & ({"x"} if has_position(columns) else {"x", "v", "a"}):
         _refuse(path, text)
     return found
 

@@ -14,7 +14,7 @@ from separatrix.discovery.measured.clock import pieces_of
 from separatrix.discovery.measured.formats import read_table
 from separatrix.discovery.measured.header import numbers_of, to_si
 from separatrix.discovery.measured.sensor_imperfections import check_clipping, left_out
-from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_sensor
+from separatrix.discovery.measured.tables import CHANNELS, Table, is_column, is_kind, is_sensor
 from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 
@@ -93,16 +93,14 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     if kept.size < RECORDS.fewest_samples:
         raise SeparatrixError(f"{path}: {kept.size} samples, at least {RECORDS.fewest_samples} are needed")
     sensors = [name for name in columns if is_sensor(name)]
-    positions = [name for name in sensors if name[0] == "x"]
+    positions = [name for name in sensors if is_kind(name, "x")]
     own_x = "x" in columns
     if own_x:
         positions.insert(0, "x")
     elif positions:
         columns["x"] = columns[positions[0]]
     else:
-        speed = next(name for name in ("v", *sensors) if name in columns and name[0] == "v")
-        columns["x"] = cumulative_trapezoid(columns[speed], columns["t"], initial=0)
-        notes.append(f"no position: x is the integral of {speed} from 0 and is not compared")
+        columns["x"] = _integrated(columns, sensors, notes)
     t, x = columns["t"], columns["x"]
     steps = np.diff(t)
     back = np.flatnonzero(steps <= 0)
@@ -134,6 +132,22 @@ def _checked(path: Path, table: Table, at_rest: bool) -> Record:
     of_bodies = {name: columns[name] for name in sensors}
     described = {"header": numbers, "pieces": pieces, "notes": notes, "file": str(path)}
     return Record(path.stem, t, sensors=of_bodies, own_x=own_x, **described, **channels)
+
+
+def _integrated(columns: dict[str, np.ndarray], sensors: list[str], notes: list[str]) -> np.ndarray:
+    """A position where none was measured: the integral of a speed, else of an acceleration."""
+    speeds = [name for name in ("v", *sensors) if name in columns and is_kind(name, "v")]
+    if speeds:
+        notes.append(f"no position: x is the integral of {speeds[0]} from 0 and is not compared")
+        return cumulative_trapezoid(columns[speeds[0]], columns["t"], initial=0)
+    name = next(name for name in sensors if is_kind(name, "a"))
+    notes.append(
+        f"no position and no speed: x is integrated from {name} without its drift and is not compared"
+    )
+    t = columns["t"]
+    once = cumulative_trapezoid(columns[name] - np.mean(columns[name]), t, initial=0)
+    twice = cumulative_trapezoid(once - np.polyval(np.polyfit(t, once, 1), t), t, initial=0)
+    return twice - np.polyval(np.polyfit(t, twice, 3), t)
 
 
 def unique_names(records: Iterable[Record]) -> None:

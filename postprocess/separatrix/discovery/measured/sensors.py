@@ -15,6 +15,7 @@ from separatrix.discovery.measured.bodies import Structure, structure_of
 from separatrix.discovery.measured.preflight import Prepared, check_periods, from_measured_angle
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.smoother import Smoothed, smooth
 from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
@@ -25,7 +26,10 @@ FORCES = ("linear", "polynomial", "kelvin_voigt")
 
 @dataclass
 class Sensor:
-    """One column: kind (x, v, a, F), body or path of the joint, values [SI], noise, whether it is known."""
+    """One column: kind (x, v, a, F, i), body or path of the joint, values [SI], noise, whether it is known.
+
+    `known`: the samples that were measured, where others are interpolated.
+    """
 
     name: str
     kind: str
@@ -33,6 +37,7 @@ class Sensor:
     values: np.ndarray
     sigma: float
     stated: bool
+    known: np.ndarray | None = None
 
 
 @dataclass
@@ -67,6 +72,10 @@ class SensedPrepared(Prepared):
     def sensor_noise(self) -> dict[str, float]:
         """Noise of each sensor."""
         return {one.name: one.sigma for one in self.sensors}
+
+    def smoothed(self, sensor: Sensor, period: float) -> Smoothed:
+        """Smooth what a sensor of position or speed shows."""
+        return smooth(self.record.t, sensor.values, sensor.sigma, period)
 
     def sensor(self, name: str) -> Sensor | None:
         """The sensor of a column, if this record has it."""

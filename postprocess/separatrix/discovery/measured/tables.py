@@ -36,16 +36,20 @@ NUMBERS = {
     "phase",
     "phi_noise_sigma_rad",
     "force_noise_sigma_n",
+    "motor_voltage_v",
+    "motor_speed_rad_s",
 }
 """Header keys with one number."""
-_SENSOR = re.compile(r"[xvaF]\.[A-Za-z_][\w.]*")
+OF_MOTOR = ("pulse", "current", "voltage")
+"""Columns of a machine with a motor: a pulse per turn of the crank, current and voltage of the motor."""
+_SENSOR = re.compile(r"[xvaF]\.[A-Za-z_][\w.]*|" + "|".join(OF_MOTOR))
 _NOISE = "noise."
 KEYS = NUMBERS | {"units"}
 """All known header keys."""
 
 
 def is_sensor(name: str) -> bool:
-    """Whether a column is named by its body or joint: `x.BODY`, `v.BODY`, `a.BODY`, `F.JOINT`."""
+    """Whether a column is of a sensor: `x.BODY`, `v.BODY`, `a.BODY`, `F.JOINT`, or one of a motor."""
     return _SENSOR.fullmatch(name) is not None
 
 
@@ -56,8 +60,14 @@ def is_column(name: str) -> bool:
 
 def kind_of(name: str) -> str:
     """Kind of a column: `x` of `x.BODY`, `force` of `F.JOINT`."""
-    kind = name.partition(".")[0] if is_sensor(name) else name
+    kind = name.partition(".")[0]
+    kind = kind if is_sensor(name) else name
     return SAME.get(kind, kind)
+
+
+def is_kind(name: str, kind: str) -> bool:
+    """Whether a column, of a body or not, is of this kind."""
+    return kind_of(name) == kind
 
 
 def has_position(names: Iterable[str]) -> bool:
@@ -66,8 +76,8 @@ def has_position(names: Iterable[str]) -> bool:
 
 
 def has_motion(names: Iterable[str]) -> bool:
-    """Whether a position or a speed is among the columns."""
-    return any(kind_of(name) in ("x", "v") for name in names)
+    """Whether a position, a speed or an acceleration is among the columns."""
+    return any(kind_of(name) in ("x", "v", "a") for name in names)
 
 
 def is_noise(key: str) -> bool:

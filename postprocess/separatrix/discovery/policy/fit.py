@@ -30,6 +30,7 @@ class Fit:
         "share of the gain of free forces at which one variable closes most")
     # fitting/coordinates.py
     tolerance_of_bodies: float = row(1e-10, "1", "rounding", "tolerance of the motion of several bodies")
+    tolerance_of_cranks: float = row(1e-8, "1", "rounding", "tolerance of the motion of body and crank")
     slope_share: float = row(0.25, "1", "rounding",
         "share of an interval over which an acceleration is a slope")
     slope_angle: float = row(1e-3, "rad", "rounding", "the same of the drive")
@@ -179,6 +180,7 @@ class Fit:
     screen_seed: int = row(22, "1", "effort", "seed of the bootstrap of the null")
     screen_draws: int = row(4000, "1", "effort", "its draws")
     screen_tail: float = row(0.05, "1", "test", "level at which independent tests are counted")
+    screen_same: float = row(1e-3, "noise", "rounding", "difference below which two machines are the same")
     screen_rounding: float = row(1e-100, "1", "rounding", "size of a signature that is rounding")
     screen_nothing: float = row(1e-7, "1", "rounding",
         "share of a signature below which nothing is left of it")

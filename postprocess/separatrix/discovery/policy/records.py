@@ -92,6 +92,8 @@ class Records:
     fewest_inside: int = row(20, "sample", "test", "samples inside the limits of a force")
     # measured/sensors.py
     most_of_bodies: int = row(50_000, "sample", "effort", "longest record of several bodies")
+    # measured/cranks.py
+    steady_voltage: float = row(0.01, "1", "rig", "slow change of a voltage over its mean in one record")
     # measured/signals.py
     quiet: float = row(1e-6, "1", "rounding", "noise that is assumed where none is found, over the scatter")
     off_grid: float = row(0.05, "1", "rounding",

@@ -7,7 +7,7 @@ import { INK, SOFT, hatch, line } from "./plot.js";
 
 const DRIVER = "#8a949c";
 
-/** Draws a machine. `state`: x, driver, hit (0 to 1, fading after an impact), side of it. `range` of positions. */
+/** Draws a machine. `state`: x, driver, crank (angle of one with a motor, else null), hit (0 to 1, fading after an impact), side of it. `range` of positions. */
 export function drawMachine(context, width, height, machine, summary, range, state) {
   const law = (machine.restoring || {}).law;
   if (law === "pendulum") return drawPendulum(context, width, height, summary, state);
@@ -37,9 +37,48 @@ export function drawMachine(context, width, height, machine, summary, range, sta
     context.fillStyle = DRIVER;
     context.fillRect(foot - 5, ground - size * 0.95, 6, size * 0.9);
     spring(context, foot, x - size / 2, middle);
+    if (state.crank !== null && (machine.drive || {}).law !== "unbalance") drawCrank(context, foot - 5, middle, ground - 1.75 * size, size, state.crank);
   }
   box(context, x, ground, size, state);
+  if (state.crank !== null && (machine.drive || {}).law === "unbalance") drawRotor(context, x, ground - size / 2, size * 0.36, state.crank);
   return undefined;
+}
+
+/** The crank above the foot that it moves, and what links them: at the angle 0 it points to the body. */
+function drawCrank(context, foot, middle, y, size, angle) {
+  const radius = size * 0.4, axis = Math.max(radius + 3, foot - size);
+  const end = [axis + radius * Math.cos(angle), y - radius * Math.sin(angle)];
+  context.strokeStyle = INK;
+  context.lineWidth = 1;
+  circle(context, axis, y, radius + 2);
+  context.strokeStyle = SOFT;
+  context.lineWidth = 2;
+  line(context, ...end, foot, middle);
+  drawArm(context, axis, y, end);
+}
+
+/** The rotor on the body, its heavy side at the angle. */
+function drawRotor(context, x, y, radius, angle) {
+  context.strokeStyle = INK;
+  context.lineWidth = 1;
+  circle(context, x, y, radius);
+  drawArm(context, x, y, [x + radius * Math.cos(angle), y - radius * Math.sin(angle)]);
+}
+
+function drawArm(context, x, y, end) {
+  context.strokeStyle = INK;
+  context.lineWidth = 3;
+  line(context, x, y, ...end);
+  context.fillStyle = INK;
+  context.beginPath();
+  context.arc(...end, 3.5, 0, 2 * Math.PI);
+  context.fill();
+}
+
+function circle(context, x, y, radius) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.stroke();
 }
 
 function box(context, x, ground, size, state) {

@@ -238,8 +238,9 @@ export class MotionPanel {
       hit = Math.max(0, 1 - (this.time - arrays.event_time[k]) / (FLASH * this.period));
       side = arrays.event_kind[k] % 2 ? 1 : -1;
     }
-    drawMachine(context, width, height, this.machine, summary, this.reach, { x: arrays.x[i], driver: arrays.driver[i] - this.apart, hit, side });
-    this.canvases.machine.setAttribute("aria-label", `The machine at ${number(this.time, 4)} s: x = ${quantity(arrays.x[i], units(this.machine)[0], 4)}`);
+    drawMachine(context, width, height, this.machine, summary, this.reach, { x: arrays.x[i], driver: arrays.driver[i] - this.apart, crank: arrays.crank ? arrays.crank[i] : null, hit, side });
+    const turned = arrays.crank ? `, crank at ${number(((arrays.crank[i] * 180) / Math.PI) % 360, 3)} degrees` : "";
+    this.canvases.machine.setAttribute("aria-label", `The machine at ${number(this.time, 4)} s: x = ${quantity(arrays.x[i], units(this.machine)[0], 4)}${turned}`);
   }
 
   listEvents() {

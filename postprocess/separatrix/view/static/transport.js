@@ -104,7 +104,7 @@ function inflate(answer) {
   const { arrays, packed } = answer, time = new Float64Array(arrays.x.length);
   for (let i = 0; i < time.length; i++) time[i] = packed.first + i * packed.step;
   arrays.time = time;
-  for (const name of ["x", "v", "driver"]) {
+  for (const name of ["x", "v", "driver", "crank"].filter((one) => one in arrays)) {
     const [low, step] = packed[name], values = new Float32Array(time.length), sum = new Int16Array(1);
     for (let i = 0; i < time.length; i++) {
       sum[0] += arrays[name][i];
