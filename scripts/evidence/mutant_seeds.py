@@ -3,6 +3,7 @@
 """Good inputs of every reader, small and soon computed, which scripts/evidence/mutants changes."""
 
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -43,7 +44,10 @@ def cases(folder: Path) -> list[Path]:
 
 
 def accepted(program: Path, paths: list[Path]) -> dict[str, list[str]]:
-    """Return the cases that each command accepts."""
+    """Return the cases that each command accepts; they are tried once."""
+    known = paths[0].parent / "accepted.json"
+    if known.exists():
+        return json.loads(known.read_text())
     found: dict[str, list[str]] = {}
     for name in ("basin", "trajectory", "sweep", "stability", "branches"):
         more = ["--parameter", "drive.ratio"] if name == "branches" else []
@@ -51,6 +55,7 @@ def accepted(program: Path, paths: list[Path]) -> dict[str, list[str]]:
             command = [program, name, path.name, *more, "--validate", "-q"]
             if subprocess.run(command, cwd=path.parent, capture_output=True).returncode == 0:
                 found.setdefault(name, []).append(path.read_text())
+    known.write_text(json.dumps(found))
     return found
 
 
