@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damage in what a result file stores: checksums of arrays and attributes, and arrays that cannot be decompressed."""
+"""Damage in a result file: checksums of arrays and attributes, arrays that cannot be decompressed."""
 
 import zlib
 from pathlib import Path
@@ -80,7 +80,7 @@ def _bytes_of(value: object) -> bytes:
 
 
 class NamedErrors(H5netcdfBackendEntrypoint):
-    """The reader of xarray for HDF5; an array that cannot be read raises a SeparatrixError with file and name."""
+    """The reader of xarray for HDF5; an unreadable array raises a SeparatrixError with file and name."""
 
     def open_dataset(self, filename_or_obj: str | Path, **options: object) -> xr.Dataset:
         """Open a group of a file."""

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-#: What takes the place of a number or of any other value.
+#: What replaces a number, or any value.
 NUMBERS = [
     *("0", "-1", "1", "2", "1e308", "-1e308", "1e-308", "nan", "inf", "-inf", "1e999", "9223372036854775807"),
     *("2147483648", "1e6", "1e-6", "0.5", "3.25", "1000", "-0.1", "1_000", "0x10", "1,5", "1e5 N/m", "-3 mm"),
@@ -60,15 +60,15 @@ def changed_text(text: str, chance: random.Random, lines: list[str], words: list
         del kept[at:]
     else:
         line = kept[at]
-        place = chance.randrange(len(line) + 1)
+        cut = chance.randrange(len(line) + 1)
         kept[at] = (
-            line[:place] + chance.choice(["\0", "\udcff", '"', "[", "=", "#", "\t", "\u03c0"]) + line[place:]
+            line[:cut] + chance.choice(["\0", "\udcff", '"', "[", "=", "#", "\t", "\u03c0"]) + line[cut:]
         )
     return "".join(kept)
 
 
 def replaced(text: str, pattern: re.Pattern, chance: random.Random, new: Callable[[str], str]) -> str:
-    """Replace one place where the pattern is found."""
+    """Replace one match of the pattern."""
     found = list(pattern.finditer(text))
     if not found:
         return text

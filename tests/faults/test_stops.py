@@ -245,7 +245,7 @@ def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, 
 @pytest.mark.parametrize("share", [0.1, 0.95])
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_working_file_that_is_truncated_keeps_what_is_whole(mpi_separatrix, tmp_path, ranks, share):
-    """The run reports it, writes the description of the file back, and --resume goes on with the other tiles."""
+    """The run reports it, writes the description back, and --resume goes on with the other tiles."""
     life.write_case(tmp_path)
     long = ["--set", "run.duration=2000"]
     process = life.launch(mpi_separatrix, tmp_path, ranks, *long)
