@@ -3,7 +3,6 @@
 """Open a result file: HDF5 -> xarray, codes -> text."""
 
 import importlib
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
 from separatrix.locks import lock_options
+from separatrix.stored import NamedErrors, compare_checksums, first_line
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED, RENAMED_EVENTS
 from separatrix.version import __version__
@@ -73,7 +73,7 @@ def reading(path: str | Path) -> Iterator[None]:
     except KeyError as error:
         raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
     except DAMAGE as error:
-        raise SeparatrixError(f"{path}: is damaged ({_first_line(error)})") from error
+        raise SeparatrixError(f"{path}: is damaged ({first_line(error)})") from error
 
 
 def table(result: xr.Dataset, name: str) -> xr.Dataset:
@@ -148,7 +148,7 @@ def _close(parts: list[xr.Dataset]) -> None:
 
 def _open_group(path: str | Path, name: str | None) -> xr.Dataset:
     options = lock_options(path)
-    return xr.open_dataset(path, engine="h5netcdf", group=name, decode_times=False, driver_kwds=options)
+    return xr.open_dataset(path, engine=NamedErrors, group=name, decode_times=False, driver_kwds=options)
 
 
 def _open_table(path: str | Path, name: str) -> xr.Dataset:
@@ -174,10 +174,10 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
         with h5py.File(path, "r", **lock_options(path)) as file:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
             _check_header(path, attributes)
-            _compare_checksums(path, file)
+            compare_checksums(path, file)
             return attributes, _read_provenance(file), [name for name in TABLES if name in file]
     except OSError as error:
-        reason = _first_line(error)
+        reason = first_line(error)
         if path.suffix == ".toml" and not h5py.is_hdf5(path):
             reason = CASE_GIVEN
         raise SeparatrixError(f"{path}: cannot be read as HDF5 ({reason})", BAD_DATA) from error
@@ -198,23 +198,6 @@ def _check_header(path: Path, attributes: dict) -> None:
         )
     if attributes.get("complete") != 1:
         raise SeparatrixError(f"{path}: is not complete; resume the run that writes it")
-
-
-def _compare_checksums(path: Path, file: h5py.File) -> None:
-    """Compare small arrays with their checksums; of compressed ones the library notices damage itself."""
-
-    def compare(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if not isinstance(item, h5py.Dataset) or "checksum" not in item.attrs or item.dtype.kind not in "iuf":
-            return
-        if item.id.get_create_plist().get_nfilters() > 0:
-            return
-        values = np.ascontiguousarray(item[()], item.dtype.newbyteorder("<"))
-        if zlib.crc32(values.tobytes()) != np.ravel(item.attrs["checksum"])[0]:
-            raise SeparatrixError(
-                f"{path}: is damaged (/{name}: its values do not match their checksum)", BAD_DATA
-            )
-
-    file.visititems(compare)
 
 
 def _read_provenance(file: h5py.File) -> dict:
@@ -239,7 +222,3 @@ def _plain(value: object) -> object:
 def _text(value: object) -> str:
     # Fortran pads fixed-length strings with blanks
     return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).rstrip(" \0")
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__

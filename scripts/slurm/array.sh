@@ -25,6 +25,7 @@ if [[ ! -e $found ]]; then
   echo "$found is missing; search.sh makes it" >&2
   exit 66
 fi
+set_stripes "$output"
 start_ranks basin "$case_file" -o "$output" --shard "$share/$shares" --resume \
   --catalogue "$found" --log "$name.log.jsonl" "$@"
 end_job $? "$name.part"

@@ -28,6 +28,19 @@ tiles_done() {
   fi
 }
 
+# set_stripes OUTPUT: with SEPARATRIX_STRIPES=N new files in the folder of OUTPUT are spread over N servers of Lustre.
+set_stripes() {
+  local folder
+  folder=$(dirname "$1")
+  if [[ -z ${SEPARATRIX_STRIPES:-} ]]; then
+    return
+  fi
+  if ! lfs setstripe -c "$SEPARATRIX_STRIPES" -S "${SEPARATRIX_STRIPE_SIZE:-4M}" "$folder"; then
+    echo "lfs cannot set $SEPARATRIX_STRIPES stripes for '$folder': unset SEPARATRIX_STRIPES where it is not on Lustre" >&2
+    exit 73
+  fi
+}
+
 # Launches in a row that may fail without a new tile.
 failures_allowed=${SEPARATRIX_RETRIES:-3}
 

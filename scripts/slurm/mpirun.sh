@@ -17,6 +17,7 @@ source "$SEPARATRIX_ROOT/scripts/slurm/common.sh"
 case_file=$1 output=$2
 shift 2
 
+set_stripes "$output"
 # The signal goes to this script alone, which hands it on; wait returns then, and is called again for the code.
 mpirun -n "$SLURM_NTASKS" "$separatrix" basin "$case_file" -o "$output" --resume --log "$output.log.jsonl" "$@" &
 run=$!

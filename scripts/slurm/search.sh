@@ -16,6 +16,7 @@ source "$SEPARATRIX_ROOT/scripts/slurm/common.sh"
 shares=$1 case_file=$2 output=$3
 shift 3
 
+set_stripes "$output"
 start_ranks basin "$case_file" -o "$output" --shard "1/$shares" --resume \
   --search-only --log "$output.search.log.jsonl" "$@"
 end_job $? "$output.shard-1-of-$shares.part"

@@ -17,6 +17,7 @@ source "$SEPARATRIX_ROOT/scripts/slurm/common.sh"
 case_file=$1 output=$2
 shift 2
 
+set_stripes "$output"
 # The signal goes to the ranks, which stop cleanly.
 start_ranks basin "$case_file" -o "$output" --resume --log "$output.log.jsonl" "$@"
 end_job $? "$output.part"

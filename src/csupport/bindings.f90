@@ -17,7 +17,7 @@ module bindings
     c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
     c_core_list, c_may_use_core, c_online_cores, c_core_quota, c_cpu_name, c_environment, &
     c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_has_name, &
-    c_close_bytes
+    c_length_of, c_close_bytes
 
   interface
     integer(c_int32_t) function c_crc32_combine(first, second, size) bind(c, name='separatrix_crc32_combine')
@@ -71,6 +71,11 @@ module bindings
       integer(c_int), value :: descriptor
       character(kind=c_char), intent(in) :: path(*)
     end function c_has_name
+
+    integer(c_int64_t) function c_length_of(descriptor) bind(c, name='separatrix_length_of')
+      import :: c_int, c_int64_t
+      integer(c_int), value :: descriptor
+    end function c_length_of
 
     integer(c_int) function c_close_bytes(descriptor, sync) bind(c, name='separatrix_close_bytes')
       import :: c_int

@@ -4,7 +4,7 @@
 !> Bytes at offsets of a file that exists. Errors have code 74.
 module byte_file
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char
-  use bindings, only: c_close_bytes, c_has_name, c_open_bytes, c_read_bytes, c_write_bytes
+  use bindings, only: c_close_bytes, c_has_name, c_length_of, c_open_bytes, c_read_bytes, c_write_bytes
   use errors, only: error_t
   use files, only: test_status
   use kinds, only: int64, int8
@@ -22,6 +22,7 @@ module byte_file
     procedure :: write => write_bytes
     procedure :: close => close_bytes
     procedure :: has_name
+    procedure :: length
   end type byte_file_t
 
 contains
@@ -45,6 +46,13 @@ contains
     has_name = .true.
     if (self%descriptor >= 0) has_name = c_has_name(self%descriptor, self%path//c_null_char) /= 0
   end function has_name
+
+  !> Bytes of the file, -1 if it is not open or the file system does not answer.
+  integer(int64) function length(self)
+    class(byte_file_t), intent(in) :: self
+    length = -1
+    if (self%descriptor >= 0) length = c_length_of(self%descriptor)
+  end function length
 
   !> Reads what lies at an offset (from 0).
   subroutine read_bytes(self, bytes, offset, error)

@@ -228,6 +228,12 @@ int separatrix_has_name(int descriptor, const char *path) {
   return own.st_dev == other.st_dev && own.st_ino == other.st_ino;
 }
 
+/* Bytes of the open file, -1 if it cannot be known. */
+int64_t separatrix_length_of(int descriptor) {
+  struct stat own;
+  return fstat(descriptor, &own) != 0 ? -1 : (int64_t)own.st_size;
+}
+
 /* `sync`: what was written is durable afterwards. */
 int separatrix_close_bytes(int descriptor, int sync) {
   const int status = sync && fsync(descriptor) != 0 ? errno : 0;

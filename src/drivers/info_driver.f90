@@ -9,7 +9,7 @@ module info_driver
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_reader, only: open_final, reader_t, variable_info_t
-  use map_verify, only: probe_file
+  use map_verify, only: probe_file, verify_plain
   use status, only: exit_io, reason_names
   use tile_record, only: tile_records
   use text, only: interval_text, join, to_text
@@ -38,6 +38,7 @@ contains
     character(len=:), allocatable :: body
     call probe_file(path, error)
     if (.not. allocated(error)) call open_final(path, reader, error)
+    if (.not. allocated(error)) call verify_plain(path, error)
     if (allocated(error)) return
     call reader%variables(variables, error)
     if (allocated(error)) return

@@ -271,7 +271,7 @@ contains
     now = monotonic_seconds()
     if (self%session%team%is_root() .and. now - self%last_check > check_interval) then
       self%last_check = now
-      call self%file%check_name(error)
+      call self%file%check(error)
       call self%session%abort_if(error)
     end if
     stop_now = self%scheduler%stop_requested()

@@ -19,7 +19,7 @@ module attribute_seal
   implicit none
   private
 
-  public :: seal_attributes, verify_attributes
+  public :: seal_attributes, verify_attributes, is_sealed
 
   character(len=*), parameter :: group = '/provenance', seal_name = 'attributes_checksum'
   !> The seals, and what the dimension scales consist of.
@@ -47,8 +47,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(real64), allocatable :: expected(:)
     integer(int64) :: found
-    if (.not. h5_exists(file, group)) return
-    if (.not. h5_has_attribute(file, group, seal_name)) return
+    if (.not. is_sealed(file)) return
     call h5_get_numbers(file, group, seal_name, expected, error)
     found = 0
     if (.not. allocated(error)) call add_object(file, '/', found, error)
@@ -59,6 +58,13 @@ contains
       call fail(error, exit_io, 'the attributes of '''//file%path//''' do not match their checksum')
     end if
   end subroutine verify_attributes
+
+  !> Whether a file has a checksum of its attributes.
+  logical function is_sealed(file)
+    type(h5_file_t), intent(in) :: file
+    is_sealed = h5_exists(file, group)
+    if (is_sealed) is_sealed = h5_has_attribute(file, group, seal_name)
+  end function is_sealed
 
   !> Adds the attributes of an object, by name, and of what is below it, in the order of the file.
   recursive subroutine add_object(file, object, value, error)

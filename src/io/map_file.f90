@@ -53,7 +53,7 @@ module map_file
     procedure :: read_tile
     procedure :: flush => flush_tiles
     procedure :: count_left
-    procedure :: check_name
+    procedure :: check => check_part
     procedure :: open => open_part
     procedure :: close => close_part
   end type map_file_t
@@ -255,17 +255,26 @@ contains
     call team%broadcast_integers(first)
     call self%store%set_offset(first(1))
     call self%store%open(working_path(self%path), self%writable, error)
+    if (team%is_root() .and. self%writable .and. .not. allocated(error)) call self%store%keep_head(error)
     call team%agree(error)
   end subroutine open_part
 
-  !> Code 74 if the working file has been removed or moved: what is written then is lost to whoever looks for it by its name.
-  subroutine check_name(self, error)
+  !> Code 74 if another program has removed, moved or truncated the working file: what is written then is lost to whoever looks for
+  !> it by its name. After a truncation the file can be resumed. Only rank 0 notices it.
+  subroutine check_part(self, error)
     class(map_file_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
-    if (self%store%has_name()) return
-    call fail(error, exit_io, "'"//working_path(self%path)//"' has been removed or moved while the run writes it; with the "// &
-              'file back under this name the same command with --resume (without --force) goes on')
-  end subroutine check_name
+    logical :: was_damaged
+    if (.not. self%store%has_name()) then
+      call fail(error, exit_io, "'"//working_path(self%path)//"' has been removed or moved while the run writes it; with the "// &
+                'file back under this name the same command with --resume (without --force) goes on')
+      return
+    end if
+    call self%store%restore_head(was_damaged, error)
+    if (was_damaged .and. .not. allocated(error)) call fail(error, exit_io, "'"//working_path(self%path)// &
+      "' has been truncated or overwritten while the run writes it; the same command with --resume (without --force) computes "// &
+      'the lost tiles again')
+  end subroutine check_part
 
   !> Writes what waits and closes the working file; it can be opened again. Collective.
   subroutine close_part(self, team, error)

@@ -44,6 +44,9 @@ contains
     real(real64) :: waited
     integer :: left
     if (present(alone)) alone = 0
+    if (team%is_root()) call file%check(error)
+    call team%agree(error)
+    if (allocated(error)) return
     left = file%count_left(team)
     call file%close(team, error)
     if (.not. allocated(error) .and. left > 0) call fail(error, exit_resumable, to_text(left)//' tiles of '''// &

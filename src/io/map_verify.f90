@@ -3,13 +3,13 @@
 
 !> Checksums of datasets: computed, written, verified.
 module map_verify
-  use attribute_seal, only: verify_attributes
+  use attribute_seal, only: is_sealed, verify_attributes
   use checksum, only: crc32, crc32_text
   use errors, only: error_t, fail
   use guard, only: end_guard
   use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_read
   use h5_attributes, only: h5_get_numbers, h5_has_attribute, h5_put_numbers, h5_read_strings
-  use h5_stored, only: h5_check_stored
+  use h5_stored, only: h5_check_stored, h5_count_filters
   use h5_list, only: h5_children
   use h5_trap, only: trap
   use kinds, only: int64, int8, real64
@@ -22,7 +22,7 @@ module map_verify
   implicit none
   private
 
-  public :: seal, verify_file, probe_file
+  public :: seal, verify_file, verify_plain, probe_file
 
 contains
 
@@ -124,6 +124,36 @@ contains
     if (present(count)) count = verified
   end subroutine verify_file
 
+  !> Code 74 if an attribute, or a dataset that is stored without compression, is damaged. HDF5 notices damage of compressed values
+  !> itself, when they are read. An incomplete file has no checksums yet and passes.
+  subroutine verify_plain(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: ignored
+    type(h5_file_t) :: file
+    integer :: verified
+    verified = 0
+    call h5_open(path, file, error)
+    if (allocated(error)) return
+    call verify_attributes(file, error)
+    if (.not. allocated(error)) call verify_group(file, '', verified, error, plain=.true.)
+    if (.not. allocated(error) .and. verified > 0) call check_sealed(file, error)
+    call trap('its end', path, endless=.true.)
+    call h5_close(file, ignored)
+    call end_guard()
+  end subroutine verify_plain
+
+  !> Code 74 if a file with checksums of its datasets lacks that of its attributes, which files of version 1 need not have.
+  subroutine check_sealed(file, error)
+    type(h5_file_t), intent(in) :: file
+    type(error_t), allocatable, intent(out) :: error
+    real(real64), allocatable :: version(:)
+    if (is_sealed(file)) return
+    call h5_get_numbers(file, '/', 'format_version', version, error)
+    if (allocated(error)) return
+    if (any(version >= 2)) call fail(error, exit_io, "'"//file%path//"' is damaged: the checksum of its attributes is missing")
+  end subroutine check_sealed
+
   !> Reads all texts of a file in a process of its own: HDF5 1.10 itself breaks on some damaged ones, and may spoil the
   !> memory before it does. Code 74 then. Not for a process that uses MPI.
   subroutine probe_file(path, error)
@@ -146,13 +176,16 @@ contains
     if (crashed) call fail(error, exit_io, "'"//path//"' is damaged: reading its texts breaks the HDF5 library")
   end subroutine probe_file
 
-  recursive subroutine verify_group(file, group, verified, error, skipped)
+  !> `plain`: only datasets without compression.
+  recursive subroutine verify_group(file, group, verified, error, skipped, plain)
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: group
     integer, intent(inout) :: verified
     type(error_t), allocatable, intent(out) :: error
     character(len=*), intent(in), optional :: skipped(:)
+    logical, intent(in), optional :: plain
     character(len=:), allocatable :: names(:), path
+    logical :: compressed
     logical, allocatable :: are_groups(:)
     integer :: i
     call h5_children(file, '/'//group, names, are_groups, error)
@@ -163,14 +196,31 @@ contains
         if (any(skipped == path)) cycle
       end if
       if (are_groups(i)) then
-        call verify_group(file, path(2:), verified, error, skipped)
+        call verify_group(file, path(2:), verified, error, skipped, plain)
       else if (h5_has_attribute(file, path, 'checksum')) then
-        call verify_dataset(file, path, error)
+        compressed = .false.
+        if (present(plain)) call find_compression(file, path, compressed, error)
+        if (.not. (compressed .or. allocated(error))) call verify_dataset(file, path, error)
         verified = verified + 1
       end if
       if (allocated(error)) return
     end do
   end subroutine verify_group
+
+  subroutine find_compression(file, name, compressed, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    logical, intent(out) :: compressed
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: ignored
+    type(h5_dataset_t) :: dataset
+    integer :: filters
+    filters = 0
+    call h5_open_dataset(file, name, dataset, error)
+    if (.not. allocated(error)) call h5_count_filters(dataset, filters, error)
+    call h5_close_dataset(dataset, ignored)
+    compressed = filters > 0
+  end subroutine find_compression
 
   subroutine verify_dataset(file, name, error)
     type(h5_file_t), intent(in) :: file

@@ -27,6 +27,9 @@ module tile_store
     type(byte_file_t), private :: file
     !> Where the first record begins.
     integer(int64), private :: first = 0
+    !> What lies in front of the records, and the length of the file, on the rank that watches over them.
+    integer(int8), allocatable, private :: head(:)
+    integer(int64), private :: length = 0
     !> Records that wait to be written, one behind the other, and their slots; when this rank wrote last.
     integer(int8), allocatable, private :: waiting(:)
     integer, allocatable, private :: slots(:)
@@ -40,6 +43,8 @@ module tile_store
     procedure :: open => open_store
     procedure :: close => close_store
     procedure :: has_name
+    procedure :: keep_head
+    procedure :: restore_head
     procedure :: put
     procedure :: flush_due
     procedure :: flush => flush_records
@@ -88,6 +93,39 @@ contains
     class(tile_store_t), intent(in) :: self
     has_name = self%file%has_name()
   end function has_name
+
+  !> Keeps what lies in front of the records, for `restore_head`. Code 74.
+  subroutine keep_head(self, error)
+    class(tile_store_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    if (allocated(self%head)) deallocate (self%head)
+    allocate (self%head(self%first))
+    self%length = self%file%length()
+    call self%file%read(self%head, 0_int64, error)
+  end subroutine keep_head
+
+  !> Writes back what another program has cut off or overwritten in front of the records, and the length of the file, so that it can
+  !> be resumed. `was_damaged`: whether there was something. Code 74.
+  subroutine restore_head(self, was_damaged, error)
+    class(tile_store_t), intent(in) :: self
+    logical, intent(out) :: was_damaged
+    type(error_t), allocatable, intent(out) :: error
+    integer(int8), allocatable :: found(:)
+    integer(int64) :: length
+    was_damaged = .false.
+    length = self%file%length()
+    if (.not. allocated(self%head) .or. length < 0) return
+    was_damaged = length < self%length
+    if (length >= self%first) then
+      allocate (found(self%first))
+      call self%file%read(found, 0_int64, error)
+      if (allocated(error)) return
+      was_damaged = was_damaged .or. any(found /= self%head)
+    end if
+    if (.not. was_damaged) return
+    call self%file%write(self%head, 0_int64, error)
+    if (.not. allocated(error) .and. length < self%length) call self%file%write([0_int8], self%length - 1, error)
+  end subroutine restore_head
 
   !> Writes what waits and closes the file; one that is not open stays so.
   subroutine close_store(self, error)

@@ -4,8 +4,9 @@
 /* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
    call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
    write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
-   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. `unlockable`: no
-   such file can be locked, as on file systems without locks. `arrive`: the first barrier of MPI without
+   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. `slow`: each
+   such call takes $FAULT_AT milliseconds. `unlockable`: no such file can be locked, as on file systems
+   without locks. `arrive`: the first barrier of MPI without
    waiting takes $FAULT_AT seconds, once there is such a file. Without $FAULT_AT the number of calls is added
    as a line to the file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
@@ -56,6 +57,10 @@ static int fault(const char *path, int writes) {
   if (name == NULL || strstr(path, name) == NULL)
     return 0;
   const long call = ++calls;
+  if (at > 0 && strcmp(action, "slow") == 0) {
+    usleep(1000 * (useconds_t)at);
+    return 0;
+  }
   if (at == 0 || call < at || strcmp(action, "late") == 0 || strcmp(action, "unlockable") == 0 ||
       strcmp(action, "arrive") == 0)
     return 0;

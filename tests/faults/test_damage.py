@@ -182,6 +182,26 @@ def test_verify_finds_damage(separatrix, final, tmp_path, amount, figures):
     figures.update(seed=SEED, flips=sum(ends.values()), ends=ends)
 
 
+def test_info_shows_no_damaged_value(separatrix, final, tmp_path, amount, figures):
+    chance = random.Random(SEED)
+    original = final.read_bytes()
+    copy = tmp_path / "copy.h5"
+    copy.write_bytes(original)
+    shown = life.succeed(separatrix, "info", copy.name, folder=tmp_path).out
+    written = [i for i in range(len(original)) if original[i]]
+    ends = Counter()
+    for _ in range(amount(60, 200)):
+        copy.write_bytes(original)
+        flip(copy, chance.choice(written), chance.randrange(8))
+        outcome = life.run(separatrix, "info", copy.name, folder=tmp_path)
+        if outcome.code == 0:
+            assert outcome.out == shown
+        else:
+            assert outcome.code == 74 and copy.name in outcome.messages[0], outcome
+        ends["same" if outcome.code == 0 else "refused"] += 1
+    figures.update(seed=SEED, flips=sum(ends.values()), ends=ends)
+
+
 def test_verify_names_the_tile(separatrix, final, tmp_path, amount, figures):
     chance = random.Random(SEED)
     copy = tmp_path / "copy.h5"

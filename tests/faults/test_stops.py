@@ -240,3 +240,26 @@ def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, 
         process = life.launch(mpi_separatrix, tmp_path, ranks, *long, "--resume", "--time-limit", "8")
         assert process.wait(60) == 75
         assert "tiles were done before" in (tmp_path / "log").read_text()
+
+
+@pytest.mark.parametrize("share", [0.1, 0.95])
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_working_file_that_is_truncated_keeps_what_is_whole(mpi_separatrix, tmp_path, ranks, share):
+    """The run reports it, writes the description back, and --resume goes on with the other tiles."""
+    life.write_case(tmp_path)
+    long = ["--set", "run.duration=2000"]
+    process = life.launch(mpi_separatrix, tmp_path, ranks, *long)
+    part = tmp_path / f"{life.NAME}.part"
+    while not part.exists() or life.tiles_of(tmp_path)[0] < 5:
+        assert process.poll() is None
+        time.sleep(0.01)
+    size = part.stat().st_size
+    # The last tile of the file may be one of those that are done: it is computed again.
+    os.truncate(part, int(share * size))
+    assert process.wait(60) == 74
+    log = (tmp_path / "log").read_text()
+    assert f"'{life.NAME}.part' has been truncated or overwritten" in log and "--resume" in log
+    assert part.stat().st_size == size
+    outcome = life.run(mpi_separatrix, *life.RUN, *long, "--resume", "--time-limit", "8", folder=tmp_path)
+    assert outcome.code == 75, outcome
+    assert "tiles were done before" in outcome.out
