@@ -51,7 +51,7 @@ contains
     allocate (axes(0))
     do i = 1, size(model%the_case%axes)
       associate (one => model%the_case%axes(i))
-        if (any(one%name == [character(len=19) :: 'x0', 'v0', 'crank_angle', 'motor.crank_speed', 'motor.start_current', &
+        if (any(one%name == [character(len=20) :: 'x0', 'v0', 'crank_angle', 'motor.crank_speed', 'motor.start_current', &
                              'motor.start_integral'])) axes = [axes, one]
       end associate
     end do

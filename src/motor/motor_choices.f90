@@ -161,8 +161,8 @@ contains
     if (allocated(error)) return
     if (drive%name == 'slider_crank') then
       if (.not. value_of(drive, 'rod') > (1 + dead_point)*value_of(drive, 'crank')) then
-        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully, and '// &
-                  'one as long has a dead point')
+        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully, '// &
+                  'and one as long has a dead point')
       end if
     end if
   end subroutine refuse_laws
