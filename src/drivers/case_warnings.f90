@@ -13,6 +13,7 @@ module case_warnings
   use errors, only: error_t
   use friction_law, only: power
   use grid, only: grid_t, slice_motion
+  use idle_inputs, only: idle_input_t, idle_inputs_of
   use machine_type, only: machine_t
   use motor_choices, only: cannot_start
   use multibody, only: joint_contact, multibody_t
@@ -52,6 +53,7 @@ contains
     if (any(index(the_case%laws%name, 'structure:') == 1)) call warn_about_modes(the_case, journal)
     call warn_about_impulses(the_case, journal)
     call warn_about_standstill(the_case, journal)
+    call warn_about_idle_inputs(the_case, journal)
     if (any(the_case%laws%family == 'body' .and. the_case%laws%name == 'structure')) call note_row(grid, moving, journal)
     if (moving%presses_by_steps) call warn_about_steps(the_case, moving, journal)
   end subroutine warn_about
@@ -78,6 +80,18 @@ contains
     if (remains) call journal%line('warning', 'warning: the motor cannot start: at standstill its torque is '//to_text(torque)// &
       ' N m, motor.bearing_friction = '//to_text(parameter_value(the_case%laws, 'motor.bearing_friction', 0.0_wp))//' N m')
   end subroutine warn_about_standstill
+
+  !> Warns of parameters that change nothing.
+  subroutine warn_about_idle_inputs(the_case, journal)
+    type(case_t), intent(in) :: the_case
+    type(journal_t), intent(inout) :: journal
+    type(idle_input_t), allocatable :: idle(:)
+    integer :: i
+    idle = idle_inputs_of(the_case%laws)
+    do i = 1, size(idle)
+      call journal%line('warning', 'warning: '//trim(idle(i)%key)//' has no effect: '//trim(idle(i)%reason))
+    end do
+  end subroutine warn_about_idle_inputs
 
   !> Warns of impulses of a structure that come after the end.
   subroutine warn_about_impulses(the_case, journal)

@@ -388,9 +388,11 @@ contains
       if (len(allowed) > 0) allowed = allowed//', '
       allowed = allowed//'pi'
     end if
-    ! Two letters are as near to any others.
+    ! Few letters are as near to any others.
     if (len(name) <= 2) meant = ''
+    if (len(name) == 3 .and. verify(name, meant) > 0) meant = ''
     if (len(meant) > 0) meant = ' (did you mean "'//meant//'"?)'
+    if (is_function .and. (name == 'pow' .or. name == 'power')) meant = ' (a power is written with ^)'
     call fail(error, exit_bad_case, 'column '//to_text(reader%at)//': found '//trim(merge('function', 'name    ', is_function))// &
               " '"//name//"'"//meant//', allowed: '//allowed)
   end subroutine report_name
