@@ -54,6 +54,7 @@ module map_file
     procedure :: flush => flush_tiles
     procedure :: count_left
     procedure :: check => check_part
+    procedure :: keep_description
     procedure :: open => open_part
     procedure :: close => close_part
   end type map_file_t
@@ -275,6 +276,13 @@ contains
       "' has been truncated or overwritten while the run writes it; the same command with --resume (without --force) computes "// &
       'the lost tiles again')
   end subroutine check_part
+
+  !> What describes the working file is as it is now: after this run itself has changed it. On rank 0. Code 74.
+  subroutine keep_description(self, error)
+    class(map_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    call self%store%keep_head(error)
+  end subroutine keep_description
 
   !> Writes what waits and closes the working file; it can be opened again. Collective.
   subroutine close_part(self, team, error)

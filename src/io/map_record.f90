@@ -101,6 +101,7 @@ contains
       if (.not. allocated(error)) call h5_close_dataset(dataset, error)
       if (allocated(error)) call h5_close(part, ignored)
       if (.not. allocated(error)) call h5_close(part, error)
+      if (.not. allocated(error)) call file%keep_description(error)
     end if
     call team%agree(error)
     if (.not. allocated(error)) call keep_row(file%schema, group, name, row, values)
