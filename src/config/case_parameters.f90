@@ -72,7 +72,11 @@ contains
     character(len=*), intent(in) :: name
     is_left_out = .false.
     if (.not. (moves_foot(laws(i)%name) .and. is_speed(name))) return
-    is_left_out = has_motor(laws) .or. .not. is_given(laws(i), name)
+    ! Neither is given where the value of one of them is refused.
+    is_left_out = has_motor(laws)
+    if (is_given(laws(i), 'ratio') .or. is_given(laws(i), 'frequency')) then
+      is_left_out = is_left_out .or. .not. is_given(laws(i), name)
+    end if
   end function is_left_out
 
   !> Bounds and unit of a row of the law table, where a position is an angle or not.

@@ -56,6 +56,7 @@ contains
     at = 1
     zero%values = [0]
     do i = 1, size(choices)
+      if (at > len(text)) return
       if (text(at:at) /= law_end) then
         call take(text, at, word)
         choices(i)%label = word

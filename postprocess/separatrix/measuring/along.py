@@ -278,6 +278,9 @@ def _write(data: xr.Dataset, target: Path) -> None:
         plain = data.drop_attrs(deep=False).assign_attrs(
             {key: value for key, value in data.attrs.items() if key != "resolved_case"}
         )
+        # of the map, not of what is written here
+        for variable in plain.variables.values():
+            variable.attrs.pop("checksum", None)
         plain.to_netcdf(
             part, engine="h5netcdf", encoding={name: {"_FillValue": None} for name in plain.variables}
         )

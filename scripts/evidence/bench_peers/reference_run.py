@@ -60,7 +60,8 @@ class Reference:
             return [table["kinetic_coefficient"]]
         if name == "lower":
             return [-np.finfo(float).max]
-        return [parameter["default"]]
+        # What may be left out altogether has no default: the largest number stands for it.
+        return [np.finfo(float).max if parameter["default"] is None else parameter["default"]]
 
     def run(self, starts: np.ndarray) -> Outcomes:
         """Run every start (x0, v0) at crank angle 0."""
@@ -70,8 +71,8 @@ class Reference:
         failed = self.entry(
             ctypes.c_int(len(self.rows)),
             self.rows,
-            # no law of these cases is an expression
-            ctypes.c_char_p(b""),
+            # no law of these cases has a label or an expression: one end of a law for each
+            ctypes.c_char_p(b"\x02" * len(self.rows)),
             self.lengths,
             self.values,
             ctypes.c_int(0),
