@@ -199,7 +199,10 @@ LIMITS = [
 
 @pytest.mark.parametrize(
     "limit",
-    [pytest.param(one, marks=pytest.mark.long if i in (1, 3) else ()) for i, one in enumerate(LIMITS)],
+    [
+        pytest.param(one, marks=pytest.mark.long if i in (1, 3) or one[4] == "neimark_sacker" else ())
+        for i, one in enumerate(LIMITS)
+    ],
     ids=[f"{one[0]}_{one[2]}_{one[4]}" for one in LIMITS],
 )
 def test_sweep_names_its_limits(separatrix, yoke, tmp_path, limit):
@@ -244,7 +247,9 @@ PLANE = (
 )
 
 
-@pytest.mark.parametrize("more", [SMALL, (PLANE, *SMALL[2:])], ids=["starts", "plane"])
+@pytest.mark.parametrize(
+    "more", [SMALL, pytest.param((PLANE, *SMALL[2:]), marks=pytest.mark.long)], ids=["starts", "plane"]
+)
 def test_maps_are_the_same_bits(separatrix, mpi_separatrix, tmp_path, more):
     """Serial, on 1 to 4 ranks, and stopped and gone on with other ranks."""
     command = ["basin", IMPACT, *(f"--set={word}" for word in more)]

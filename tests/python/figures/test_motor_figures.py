@@ -52,6 +52,7 @@ def test_a_speed_control_has_no_line() -> None:
     assert motor.torque_of({"law": "pi"}, np.ones(3)) is None
 
 
+@pytest.mark.long
 def test_torque_over_speed_has_orbits_and_lines(tmp_path: Path) -> None:
     """The orbit of a voltage lies on the line of that voltage; its torque is the mean of its motion."""
     (tmp_path / "yoke.toml").write_text(YOKE)
