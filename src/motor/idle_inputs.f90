@@ -3,7 +3,7 @@
 
 !> Parameters that are given and change nothing: of parts that a mechanism does not have, and those that no expression names.
 module idle_inputs
-  use law_table, only: law_choice_t, motor_family, path_of, value_of
+  use law_table, only: law_choice_t, motor_family, path_of, state_family, value_of
   use motor_choices, only: has_motor, number_of_family
   implicit none
   private
@@ -32,7 +32,7 @@ contains
       if (.not. allocated(choices(i)%own)) cycle
       do k = 1, size(choices(i)%own)
         name = trim(choices(i)%own(k)%name)
-        if (name == 'start' .or. is_named(choices, i, name)) cycle
+        if (is_key(choices(i)%family, name) .or. is_named(choices, i, name)) cycle
         key = path_of(choices(i))//'.'//name
         call add(key, 'no expression names it', idle)
       end do
@@ -66,6 +66,12 @@ contains
     one%reason = reason
     idle = [idle, one]
   end subroutine add
+
+  !> Whether a law by expressions uses the number itself: the start of a state, the period of a drive.
+  pure logical function is_key(family, name)
+    character(len=*), intent(in) :: family, name
+    is_key = (family == state_family .and. name == 'start') .or. (family == 'drive' .and. name == 'period')
+  end function is_key
 
   !> Whether a parameter of choice number `own` stands in an expression: of its own table by its name, of any by its path.
   pure logical function is_named(choices, own, name)
