@@ -256,7 +256,13 @@ def test_a_working_file_that_is_truncated_keeps_what_is_whole(mpi_separatrix, tm
     size = part.stat().st_size
     # The last tile of the file may be one of those that are done: it is computed again.
     os.truncate(part, int(share * size))
-    assert process.wait(60) == 74
+    code = process.wait(60)
+    if share > 0.5 and code == 0:
+        # The last tile was written behind the cut before anyone looked: nothing that was done is lost.
+        life.succeed(mpi_separatrix, *life.RUN[:-1], "whole.h5", *long, folder=tmp_path)
+        assert not life.differences(tmp_path / life.NAME, tmp_path / "whole.h5")
+        return
+    assert code == 74
     log = (tmp_path / "log").read_text()
     assert f"'{life.NAME}.part' has been truncated or overwritten" in log and "--resume" in log
     assert part.stat().st_size == size
