@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`exponents_along`: Lyapunov exponents over a parameter, and the sections of the same motions."""
 
-from collections.abc import Callable
+import tempfile
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures.parts import several_bodies
 from separatrix.maps import Values, axis_numbers
 from separatrix.motions import trajectory
-from separatrix.orbits import Stability, stability
+from separatrix.orbits import Stability, stability_by, stability_command
 from separatrix.progress import Progress, Report
 from separatrix.sections import section
 from separatrix.version import __version__
@@ -71,7 +71,7 @@ def exponents_along(
     Examples
     --------
     >>> case = sx.load("examples/basin_coulomb.toml")
-    >>> along = sx.exponents_along(case, "drive.ratio", [1.1, 1.2], x0=0.4, v0=0, periods=64, points=4)
+    >>> along = sx.exponents_along(case, "drive.ratio", [1.1, 1.2], x0=0.4, v0=0, periods=256, points=4)
     >>> sx.decode_flags(along["motion"]).values.tolist()
     ['periodic', 'periodic']
     """
@@ -86,19 +86,18 @@ def exponents_along(
         path, numbers, sections = parameter, axis_numbers(case, parameter, values), None
         starts = [{"x0": x0, "v0": v0, "crank_angle": crank_angle}] * len(numbers)
     cases = [case.with_({path: float(one)}) for one in numbers]
-    drawn = sections is None and _is_driven(cases[0], starts[0])
-
-    def one(index: int) -> tuple[Stability, np.ndarray | None]:
-        found = stability(cases[index], **starts[index], periods=periods)
-        if not drawn:
-            return found, None
-        seen = section(cases[index], **starts[index], periods=points, transient=periods // 4)
-        return found, seen["x"].values
-
-    rows = _computed(one, len(numbers), threads or cores(), progress)
-    if drawn:
-        sections = np.array([seen for _, seen in rows])
-    return _dataset(cases[0], path, numbers, [found for found, _ in rows], sections)
+    if sections is None and _is_driven(cases[0], starts[0]):
+        each = zip(cases, starts, strict=True)
+        drawn = [section(one, **start, periods=points, transient=periods // 4) for one, start in each]
+        sections = np.array([one["x"].values for one in drawn])
+    with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
+        commands = []
+        for number, (one, start) in enumerate(zip(cases, starts, strict=True)):
+            own = Path(folder) / str(number)
+            own.mkdir()
+            commands.append(stability_command(one, start, periods, own))
+        rows = _computed(commands, threads or cores(), progress)
+    return _dataset(cases[0], path, numbers, rows, sections)
 
 
 def _of_sweep(sweep: xr.Dataset, direction: str) -> tuple[Case, str, np.ndarray, list[dict], np.ndarray]:
@@ -134,16 +133,14 @@ def _is_driven(case: Case, start: dict) -> bool:
     return bool(trajectory(case, **start, duration=period, samples=2, partial=True).attrs["driven"])
 
 
-def _computed(
-    one: Callable[[int], tuple], count: int, threads: int, progress: bool | Report | None
-) -> list[tuple]:
+def _computed(commands: list[tuple], threads: int, progress: bool | Report | None) -> list[Stability]:
     """The rows in their order; what has not begun when one fails, or at Ctrl-C, is not computed."""
     with Progress(progress) as report, ThreadPoolExecutor(threads) as pool:
-        tasks = [pool.submit(one, index) for index in range(count)]
+        tasks = [pool.submit(stability_by, command) for command in commands]
         try:
             for done, task in enumerate(as_completed(tasks), 1):
                 task.result()
-                report("values", done, count)
+                report("values", done, len(tasks))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -4,7 +4,7 @@
 
 import math
 import tempfile
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -151,14 +151,27 @@ def stability(
     >>> found.motion, round(found.exponents[0], 3)
     ('periodic', -1.337)
     """
-    given = {"start.x0": x0, "start.v0": v0, "start.crank_angle": crank_angle}
-    case = as_case(case).with_(
-        {name: quantity(name, value) for name, value in given.items() if value is not None}
-    )
-    events: list[dict] = []
-    options = [] if periods is None else ["--periods", str(periods)]
+    start = {"x0": x0, "v0": v0, "crank_angle": crank_angle}
     with tempfile.TemporaryDirectory(prefix="separatrix-") as folder:
-        _run("stability", case, Path(folder), options, False, events.append)
+        return stability_by(stability_command(as_case(case), start, periods, Path(folder)))
+
+
+def stability_command(
+    case: Case, start: Mapping[str, float | str | None], periods: int | None, folder: Path
+) -> tuple[list[str], dict[str, str]]:
+    """Return the command of `stability`, and what it is to call the file that it is given."""
+    given = {f"start.{name}": value for name, value in start.items()}
+    case = case.with_({name: quantity(name, value) for name, value in given.items() if value is not None})
+    named = case.on_command_line(folder)
+    options = [] if periods is None else ["--periods", str(periods)]
+    return ["stability", *named, *options, "--json"], {named[0]: case.name, **_IN_PYTHON}
+
+
+def stability_by(work: tuple[list[str], dict[str, str]]) -> Stability:
+    """Run a command of `stability`, which several threads may do: they do not meet in the library."""
+    events: list[dict] = []
+    with Progress(False) as reporter:
+        run_at_once(work[0], reporter, rename=work[1], take=events.append)
     return _stability(events)
 
 
@@ -225,13 +238,12 @@ def _run(
     folder: Path,
     options: list[str],
     progress: bool | Report | None,
-    take: Callable[[dict], object] | None = None,
 ) -> None:
     """Run a command that keeps nothing when it is stopped."""
     named = case.on_command_line(folder)
     with Progress(progress) as reporter:
         rename = {named[0]: case.name, **_IN_PYTHON}
-        run_at_once([command, *named, *options, "--json"], reporter, rename=rename, take=take)
+        run_at_once([command, *named, *options, "--json"], reporter, rename=rename)
 
 
 def _stability(events: list[dict]) -> Stability:
