@@ -3,6 +3,7 @@
 
 !> Parameters that are given and change nothing: of parts that a mechanism does not have, and those that no expression names.
 module idle_inputs
+  use expression_names, only: has_name
   use law_table, only: law_choice_t, motor_family, path_of, state_family, value_of
   use motor_choices, only: has_motor, number_of_family
   implicit none
@@ -14,8 +15,6 @@ module idle_inputs
     character(len=160) :: key = ''
     character(len=80) :: reason = ''
   end type idle_input_t
-
-  character(len=*), parameter :: in_words = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.'
 
 contains
 
@@ -86,28 +85,11 @@ contains
       if (.not. allocated(choices(i)%texts)) cycle
       do k = 1, size(choices(i)%texts)
         associate (text => choices(i)%texts(k)%text)
-          is_named = is_named .or. has_word(text, path)
-          if (i == own) is_named = is_named .or. has_word(text, name)
+          is_named = is_named .or. has_name(text, path)
+          if (i == own) is_named = is_named .or. has_name(text, name)
         end associate
       end do
     end do
   end function is_named
-
-  pure logical function has_word(text, word)
-    character(len=*), intent(in) :: text, word
-    integer :: at, length
-    has_word = .false.
-    at = 1
-    do while (at <= len(text))
-      length = scan(text(at:), in_words) - 1
-      if (length < 0) return
-      at = at + length
-      length = verify(text(at:), in_words) - 1
-      if (length < 0) length = len(text) - at + 1
-      has_word = text(at:at + length - 1) == word
-      if (has_word) return
-      at = at + length
-    end do
-  end function has_word
 
 end module idle_inputs
