@@ -77,8 +77,9 @@ contains
     real(wp) :: torque
     logical :: remains
     call cannot_start(the_case%laws, torque, remains)
-    if (remains) call journal%line('warning', 'warning: the motor cannot start: at standstill its torque is '//to_text(torque)// &
-      ' N m, motor.bearing_friction = '//to_text(parameter_value(the_case%laws, 'motor.bearing_friction', 0.0_wp))//' N m')
+    if (remains) call journal%line('warning', 'warning: the motor cannot start: its torque at standstill is at most '// &
+      to_text(torque)//' N m, motor.bearing_friction = '// &
+      to_text(parameter_value(the_case%laws, 'motor.bearing_friction', 0.0_wp))//' N m')
   end subroutine warn_about_standstill
 
   !> Warns of parameters that change nothing.
