@@ -90,7 +90,7 @@ contains
       name = trim(choice%own(i)%name)
       path = path_of(choice)//'.'//name
       if (has_name(text_of(choice, 'load'), name) .or. has_name(text_of(choice, 'load'), path)) cycle
-      call report(source, path, 'unknown; allowed keys of the law, and parameters that load names')
+      call report(source, path, 'unknown; allowed keys of the law, and parameters that load contains')
     end do
   end subroutine refuse_unnamed
 

@@ -107,7 +107,7 @@ contains
     do i = 1, size(machine%impulses)
       if (machine%impulses(i)%time <= the_case%run%duration) cycle
       call journal%line('warning', 'warning: the impulse at '//to_text(machine%impulses(i)%time)//' s is after the end, '// &
-        'run.duration = '//to_text(the_case%run%duration)//' s: it does not fall')
+        'run.duration = '//to_text(the_case%run%duration)//' s: it does not act')
     end do
   end subroutine warn_about_impulses
 
@@ -189,7 +189,7 @@ contains
     lasts = the_case%integrator%step_budget/rate
     if (lasts >= the_case%run%duration) return
     call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &
-      to_text(the_case%integrator%step_budget)//' lasts a body that leans on it about '//to_text(lasts, 2)//' s of '// &
+      to_text(the_case%integrator%step_budget)//' suffices a body that rests against it for about '//to_text(lasts, 2)//' s of '// &
       to_text(the_case%run%duration)//' s; it then ends as step_budget. A softer barrier, or a rigid one '// &
       '(contact.law = "newton"), is faster')
   end subroutine warn_about_steps

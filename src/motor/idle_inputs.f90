@@ -33,7 +33,7 @@ contains
         name = trim(choices(i)%own(k)%name)
         if (is_key(choices(i)%family, name) .or. is_named(choices, i, name)) cycle
         key = path_of(choices(i))//'.'//name
-        call add(key, 'no expression names it', idle)
+        call add(key, 'no expression contains it', idle)
       end do
     end do
   end function idle_inputs_of
@@ -49,7 +49,7 @@ contains
       call add('motor.'//trim(of_lever(k)), 'drive.law = "'//trim(drive%name)//'" has no lever', idle)
     end do
     if (drive%name == 'unbalance' .and. abs(value_of(motor, 'foot_mass')) > 0) then
-      call add('motor.foot_mass', 'an unbalance moves no foot of the spring', idle)
+      call add('motor.foot_mass', 'with an unbalance the foot of the spring is fixed', idle)
     end if
     if (motor%name /= 'dc') return
     if (abs(value_of(motor, 'start_current')) > 0 .and. .not. abs(value_of(motor, 'inductance')) > 0) then

@@ -186,9 +186,9 @@ contains
     character(len=:), allocatable :: problem
     problem = knots_problem(list_of(motor, 'speed'), size(list_of(motor, 'torque')))
     if (len(problem) > 0) then
-      call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque has its values there')
+      call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque is given at these speeds')
     else if (.not. speed_of(motor) > 0) then
-      call fail(error, exit_bad_case, 'motor.torque: allowed values that fall through 0 at a speed above 0; a turn at that '// &
+      call fail(error, exit_bad_case, 'motor.torque: allowed values that fall below 0 at a speed above 0; a turn at that '// &
                 'speed is the unit of time')
     else if (steepest(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')))*two_pi > &
              most_decay*value_of(motor, 'inertia')*speed_of(motor)) then

@@ -137,7 +137,7 @@ contains
       do i = 1, size(choices)
         if (choices(i)%family /= state_family) cycle
         if (any(names%names == choices(i)%label)) then
-          call fail(error, exit_bad_case, path_of(choices(i))//': found a state with the name of a variable, allowed any other')
+          call fail(error, exit_bad_case, path_of(choices(i))//': found the name of a variable, allowed any other')
           return
         end if
         call add_variable(sheet, 'state '//to_text(i))
