@@ -64,6 +64,8 @@ contains
       end if
       call expand(flight%tape, z, parameters, series, fault)
     end associate
+    ! Coefficients that are too large count as not defined.
+    fault = abs(fault)
     if (fault == 0 .and. .not. fits) fault = -1
   end subroutine low_series
 
