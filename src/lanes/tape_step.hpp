@@ -188,8 +188,8 @@ inline vec change_of(const vec *c, vec length) {
 
 // Where a function has values, over the range of its argument in the step, that its series does not show: the
 // series of a function that is nearly constant here knows nothing of a change nearby. A divisor must not lose
-// most of its size, nor must the argument of a root, a power or a logarithm: far from a corner that it rounds,
-// the root of a square is a straight line.
+// most of its size, nor must the argument of a root, a power or a logarithm: far from a corner that these
+// round, they are a straight line.
 [[gnu::noinline]] inline mask hides_change(const tape_machine &m, vec length, const tape_group &g) {
   mask hides = {};
   for (int i = 0; i < m.checks; i++) {
