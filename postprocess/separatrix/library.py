@@ -18,7 +18,15 @@ import numpy as np
 
 from separatrix.binding import TEXT, array_of, call, library_path, loaded, pointer, size_of
 from separatrix.errors import USAGE, CaseError
-from separatrix.segments import Impacts, Segments, checked_starts, propagate, segment_numbers, with_force
+from separatrix.segments import (
+    Impacts,
+    Segments,
+    checked_directions,
+    checked_starts,
+    propagate,
+    segment_numbers,
+    with_force,
+)
 from separatrix.structures.inline import inlined
 
 __all__ = [
@@ -169,10 +177,16 @@ class Model:
         replaces the measured force of the case; the crank angles of `start` are not used.
         """
         chosen = self._along(active, values)
-        start, first, times = checked_starts(start, segment_numbers(self._handle)[0], first, times)
+        start_numbers, sample_numbers = self._segment_numbers
+        along = checked_directions(directions, len(active)) if derivatives else None
+        start, first, times = checked_starts(start, start_numbers, first, times)
         start, *record = with_force(start, first, times, force)
         given = (start, first, times)
-        return propagate(self._handle, chosen, directions, given, record, derivatives, tolerance)
+        return propagate(self._handle, chosen, along, given, record, sample_numbers, tolerance)
+
+    @functools.cached_property
+    def _segment_numbers(self) -> tuple[int, int]:
+        return segment_numbers(self._handle)
 
     @functools.cached_property
     def coordinates(self) -> tuple[str, ...]:

@@ -111,27 +111,28 @@ def propagate(
     directions: np.ndarray | None,
     starts: tuple[np.ndarray, np.ndarray, np.ndarray],
     force: list,
-    derivatives: bool,
+    sample_numbers: int,
     tolerance: float,
 ) -> Segments:
     """Fly segments of a model from starts, first samples and times that `checked_starts` returned.
 
-    `force` is the interval [s] and the samples [N] of a measured force, none of which leave that of the case.
+    `directions` None: without derivatives. `force` is the interval [s] and the samples [N] of a measured
+    force; no samples: that of the case.
     """
     start, first, times = starts
     interval, series = force
-    rows, count = segment_numbers(handle)[1], len(start)
-    directions = _directions(directions, chosen[0], derivatives)
+    rows, count = sample_numbers, len(start)
+    along = 0 if directions is None else len(directions)
     motion, report = np.empty((times.size, rows)), np.zeros((3, count), np.int32)
-    columns = len(directions) + start.shape[1]
-    jacobian = np.empty((times.size, rows, columns)) if derivatives else None
+    jacobian = None if directions is None else np.empty((times.size, rows, along + start.shape[1]))
     given = SegmentsCall(
         chosen_count=chosen[0], chosen=ctypes.addressof(chosen[1]), values=ctypes.addressof(chosen[2]),
-        direction_count=len(directions), directions=pointer(directions),
+        direction_count=along, directions=pointer(directions),
         segment_count=count, start_numbers=start.shape[1], sample_numbers=rows,
         start=pointer(start), first=pointer(first), times=pointer(times),
         force_count=len(series), force_interval=interval, force=pointer(series),
-        derivatives=int(derivatives), tolerance=tolerance, motion=pointer(motion), jacobian=pointer(jacobian),
+        derivatives=int(directions is not None), tolerance=tolerance,
+        motion=pointer(motion), jacobian=pointer(jacobian),
         impacts=pointer(report[0]), steady=pointer(report[1]), reason=pointer(report[2]),
         impact_capacity=4 * count + 64,
     )  # fmt: skip
@@ -161,10 +162,8 @@ def checked_starts(
     return start, first, array_of(times, (int(first[-1]),), "times")
 
 
-def _directions(directions: np.ndarray | None, parameters: int, derivatives: bool) -> np.ndarray:
+def checked_directions(directions: np.ndarray | None, parameters: int) -> np.ndarray:
     """Return the directions to differentiate along, a row each: as given, else each parameter by itself."""
-    if not derivatives:
-        return np.zeros((0, parameters))
     if directions is None:
         return np.eye(parameters)
     return array_of(directions, (len(directions), parameters), "directions")
