@@ -73,8 +73,9 @@ contains
       call add_ways(jobs, seed)
       do i = 1, size(search%expected)
         if (size(jobs) + 2 > search%workers%count()) exit
-        if (.not. (is_same(search%expected(i), seed) .or. is_traced(search, search%expected(i), found))) &
+        if (.not. (is_same(search%expected(i), seed) .or. is_traced(search, search%expected(i), found))) then
           call add_ways(jobs, search%expected(i))
+        end if
       end do
       call share(search, jobs, results)
       do i = 1, size(jobs), 2
