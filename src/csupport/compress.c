@@ -16,10 +16,11 @@ int64_t separatrix_compress_bound(int64_t size) { return (int64_t)compressBound(
 static int64_t deflate_fast(const void *bytes, int64_t size, void *out, int64_t room) {
   if (size > UINT32_MAX || room > UINT32_MAX)
     return 0;
-  void *work = malloc(ISAL_DEF_LVL1_DEFAULT);
+  /* Zeroed, as ISA-L looks at bytes that it has not written, without effect. */
+  void *work = calloc(1, ISAL_DEF_LVL1_DEFAULT);
   if (!work)
     return 0;
-  struct isal_zstream stream;
+  struct isal_zstream stream = {0};
   isal_deflate_stateless_init(&stream);
   stream.level = 1;
   stream.level_buf = work;
