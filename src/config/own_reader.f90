@@ -6,6 +6,7 @@ module own_reader
   use case_source, only: case_source_t, description, find, know, report
   use case_values, only: take_text
   use composed_units, only: composed_unit_t, read_unit
+  use expression_names, only: has_name
   use kinds, only: wp
   use law_row, only: any_value, unit_length
   use law_table, only: force_family, label_length, law_choice, law_choice_t, law_text_t, own_law, parameter_row_t, &
@@ -83,11 +84,13 @@ contains
   subroutine refuse_unnamed(source, choice)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: name, path
     integer :: i
     do i = 1, size(choice%own)
-      if (index(text_of(choice, 'load'), trim(choice%own(i)%name)) > 0) cycle
-      call report(source, path_of(choice)//'.'//trim(choice%own(i)%name), 'unknown; allowed keys of the law, and parameters '// &
-                  'that load names')
+      name = trim(choice%own(i)%name)
+      path = path_of(choice)//'.'//name
+      if (has_name(text_of(choice, 'load'), name) .or. has_name(text_of(choice, 'load'), path)) cycle
+      call report(source, path, 'unknown; allowed keys of the law, and parameters that load contains')
     end do
   end subroutine refuse_unnamed
 

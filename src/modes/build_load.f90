@@ -6,6 +6,7 @@
 !> parameters of its own table by their names, and those of every table by their paths.
 module build_load
   use errors, only: error_t, fail
+  use expression_names, only: has_name
   use expression_text, only: read_expression
   use kinds, only: wp
   use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_kind, part_law, path_of, rows_of, text_of, &
@@ -24,7 +25,6 @@ module build_load
   public :: set_normal_force
 
   integer, parameter :: name_length = 64
-  character(len=*), parameter :: name_letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.'
   !> Points of a period at which a normal force is compared with that a period later, and the share that rounding may change.
   integer, parameter :: points = 24
   real(wp), parameter :: same = 1e-9_wp
@@ -244,24 +244,6 @@ contains
       call add_name(names, path_of(choices(i)), nodes(1))
     end do
   end subroutine add_contacts
-
-  !> Whether a text has a name, not as a part of another one.
-  pure logical function has_name(text, name)
-    character(len=*), intent(in) :: text, name
-    character(len=len(text) + 2) :: padded
-    integer :: from, at
-    padded = ' '//text
-    has_name = .false.
-    from = 1
-    do
-      at = index(padded(from:), name)
-      if (at == 0) return
-      at = from + at - 1
-      has_name = scan(padded(at - 1:at - 1), name_letters) == 0 .and. scan(padded(at + len(name):at + len(name)), name_letters) == 0
-      if (has_name) return
-      from = at + 1
-    end do
-  end function has_name
 
   !> The expression is in N, if its parameters have units.
   pure subroutine check_unit(machine, load, names, node, error)
