@@ -93,7 +93,12 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "records do not distinguish the two.",
     )
     _show_fits(by_key, details)
-    return parts
+    contacts = any(path.startswith("contact.") for path in verdict["base_parameters"])
+    return [one for one in parts if one.key != "impacts" or contacts or _has_pictures(one)]
+
+
+def _has_pictures(section: Section) -> bool:
+    return any(isinstance(one, Picture) for one in section.body)
 
 
 def _show_fits(by_key: dict[str, Section], details: h5py.File) -> None:

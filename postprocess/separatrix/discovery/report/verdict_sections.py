@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sections of the report of a verdict in words and tables; every number is one of verdict.json."""
 
+from separatrix.discovery.decision.stages.in_part import NEAREST
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.wording import (
@@ -237,7 +238,12 @@ def _missing(verdict: dict) -> Section:
             Table(["gate", "meaning", ""], rows),
         ]
     else:
-        body.append("No effect gained enough to be put to the gates, or none passed them.")
+        nearest = [one for one in verdict["reasons"] if NEAREST in one]
+        body.append(
+            f"No effect passed every gate: {nearest[0]}."
+            if nearest
+            else "No effect gained enough to be put to the gates, or none passed them."
+        )
     if verdict["alternatives"]:
         body.append(
             "Not distinguished from: " + ", ".join(_pair(name) for name in verdict["alternatives"]) + "."
