@@ -3,6 +3,7 @@
 """The sections of the report of a verdict in words and tables; every number is one of verdict.json."""
 
 from separatrix.discovery.decision.stages.in_part import NEAREST
+from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.wording import (
@@ -67,6 +68,12 @@ def depends_on(verdict: dict) -> str:
     return ", or ".join(" and ".join(one["depends_on"]) for one in verdict["character"])
 
 
+def cause(verdict: dict) -> str:
+    """What makes a gap without a name, as words."""
+    found = depends_on(verdict)
+    return f"a {found}" if found == LOW_PASS else f"a force that depends on {found}"
+
+
 def _summary(verdict: dict) -> Section:
     others = ", ".join(_pair(name) for name in verdict["alternatives"])
     text = {
@@ -81,7 +88,7 @@ def _summary(verdict: dict) -> Section:
         "none": "No effect is missing that these records could show.",
         "not-in-catalogue": f"Something is missing, and no effect of {searched(verdict)} explains it.",
         "characterised": f"Something is missing, and no effect of {searched(verdict)} explains it; "
-        f"it is known on what it depends: {depends_on(verdict)}.",
+        f"it looks like {cause(verdict)}.",
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {text}"]
     for index, one in enumerate(verdict["character"]):
