@@ -25,6 +25,8 @@ module marched_load
     integer, allocatable :: phase(:)
     real(wp), allocatable :: touch_speed(:)
     real(wp) :: frequency = 0
+    !> Time of the section, where the time is counted from the start [s].
+    real(wp) :: clock = 0
   end type marched_load_t
 
 contains
@@ -38,6 +40,7 @@ contains
     integer :: i
     marched%load = machine%joints(j)%load
     marched%frequency = machine%frequency
+    if (marched%load%by_clock) marched%clock = state%clock
     associate (sources => marched%load%sources)
       allocate (marched%position(size_of_rows, size(sources)), marched%speed(size_of_rows, size(sources)), source=0.0_wp)
       allocate (marched%contacts(size(sources)), marched%phase(size(sources)), marched%touch_speed(size(sources)))
@@ -99,7 +102,7 @@ contains
     real(wp) :: variables(size(marched%load%rates)), force
     integer :: i
     variables = 0
-    variables(:2) = [time, marched%frequency*time]
+    variables(:2) = [marched%clock + time, marched%frequency*time]
     do i = 1, size(marched%load%sources)
       associate (motion => variables(4*i - 1:4*i))
         motion = [sum(marched%position(:, i)*z), sum(marched%speed(:, i)*z)]

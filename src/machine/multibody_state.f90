@@ -150,6 +150,7 @@ contains
     integer :: i, n
     n = machine%n
     variables(:2) = [state%time, machine%frequency*state%time]
+    if (load%by_clock) variables(1) = state%clock + state%time
     do i = 1, size(load%sources)
       associate (source => load%sources(i))
         call wave_value(source%offset, machine%frequency, state%time, turning, motion(0), motion(1), motion(2))
