@@ -8,7 +8,7 @@ module marched_load
   use kinds, only: wp
   use multibody, only: joint_t, load_t, multibody_t, wave_t
   use multibody_state, only: load_branches, load_variables, multibody_state_t
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate, sizes_of_nodes
   implicit none
   private
 
@@ -141,12 +141,13 @@ contains
     type(marched_load_t), intent(in) :: marched
     integer, intent(in) :: number
     real(wp), intent(in) :: time, z(:)
-    real(wp) :: value(marched%load%tape%count)
+    real(wp), dimension(marched%load%tape%count) :: value, sizes
     integer :: fault(marched%load%tape%count)
     call values_at(marched, time, z, value, fault)
+    sizes = sizes_of_nodes(marched%load%tape, value)
     associate (argument => marched%load%tape%switches(number)%argument)
       associate (node => marched%load%tape%nodes(argument))
-        total = maxval(abs(value([argument, max(node%first, 1), max(node%second, 1)])))
+        total = max(sizes(argument), maxval(abs(value([argument, max(node%first, 1), max(node%second, 1)]))))
       end associate
     end associate
   end function sizes_of_switch
