@@ -67,18 +67,26 @@ contains
       call read_text(source, 'position', .false., choice)
       call read_period(source, choice)
     case default
-      call read_text(source, merge('load ', 'force', has_load(choice)), .true., choice)
+      call read_text(source, trim(force_key(choice)), .true., choice)
     end select
     call read_parameters(source, choice)
-    if (has_load(choice)) call refuse_unnamed(source, choice)
+    if (has_load(choice) .or. choice%family == part_family) call refuse_unnamed(source, choice)
     if (choice%family == state_family .and. all(choice%own%name /= 'start')) call add_own(choice, 'start', '1', 0.0_wp)
   end subroutine read_own_law
 
   !> Whether a law is friction of the catalogue, whose normal force is an expression.
   pure logical function has_load(choice)
     type(law_choice_t), intent(in) :: choice
-    has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%family == part_family
+    has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%name == 'friction:coulomb_load'
   end function has_load
+
+  !> The key of the expression of a force.
+  pure function force_key(choice) result(key)
+    type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: key
+    key = 'force'
+    if (has_load(choice)) key = 'load'
+  end function force_key
 
   !> Beside keys of the catalogue a parameter that no expression names is a misspelt key.
   subroutine refuse_unnamed(source, choice)
@@ -89,8 +97,8 @@ contains
     do i = 1, size(choice%own)
       name = trim(choice%own(i)%name)
       path = path_of(choice)//'.'//name
-      if (has_name(text_of(choice, 'load'), name) .or. has_name(text_of(choice, 'load'), path)) cycle
-      call report(source, path, 'unknown; allowed keys of the law, and parameters that load contains')
+      if (has_name(text_of(choice, force_key(choice)), name) .or. has_name(text_of(choice, force_key(choice)), path)) cycle
+      call report(source, path, 'unknown; allowed keys of the law, and parameters that '//force_key(choice)//' contains')
     end do
   end subroutine refuse_unnamed
 

@@ -44,7 +44,7 @@ contains
     if (trial%n > most_equations/2 .and. (.not. moving%machine%linear .or. moving%options%flight == flight_adaptive)) then
       why = 'it has too many coordinates for a law that is not linear'
     end if
-    if (acts_on_time(moving%machine)) why = 'impulses, or samples of a controller, come at times of their own'
+    if (acts_on_time(moving%machine)) why = 'impulses, samples of a controller or forces depend on the time since the start'
     if (integral_of(moving%machine) > 0) why = 'a controller adds up what it sees'
     do j = 1, count_joints(moving%machine)
       associate (joint => moving%machine%joints(j))
@@ -53,7 +53,7 @@ contains
           why = 'a stop or a spring runs on with its surface'
         end if
         if (allocated(joint%memory)) why = 'friction has a memory'
-        if (allocated(joint%load)) why = 'the normal force of friction is an expression'
+        if (allocated(joint%load)) why = 'a force is an expression'
         if (joint%kind /= joint_friction) cycle
         if (joint%friction%excess > 0 .and. joint%friction%stribeck_exponent < 1) why = 'a Stribeck law is vertical at rest'
         if (joint%friction%second_excess > 0 .and. joint%friction%second_exponent < 1) why = 'a Stribeck law is vertical at rest'
