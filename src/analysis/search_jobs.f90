@@ -73,9 +73,8 @@ contains
       call add_ways(jobs, seed)
       do i = 1, size(search%expected)
         if (size(jobs) + 2 > search%workers%count()) exit
-        if (.not. (is_same(search%expected(i), seed) .or. is_traced(search, search%expected(i), found))) then
-          call add_ways(jobs, search%expected(i))
-        end if
+        if (is_same(search%expected(i), seed)) cycle
+        if (.not. is_traced(search, search%expected(i), found)) call add_ways(jobs, search%expected(i))
       end do
       call share(search, jobs, results)
       do i = 1, size(jobs), 2

@@ -98,7 +98,7 @@ contains
       name = trim(choice%own(i)%name)
       path = path_of(choice)//'.'//name
       if (has_name(text_of(choice, force_key(choice)), name) .or. has_name(text_of(choice, force_key(choice)), path)) cycle
-      call report(source, path, 'unknown; allowed keys of the law, and parameters that '//force_key(choice)//' contains')
+      call report(source, path, 'unknown; allowed keys of the law, and parameters that '//trim(force_key(choice))//' contains')
     end do
   end subroutine refuse_unnamed
 
