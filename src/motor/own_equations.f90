@@ -358,7 +358,7 @@ contains
   !> Accelerations, powers and energies, and what they depend on.
   pure subroutine add_motion(system)
     type(motor_system_t), intent(inout) :: system
-    integer :: time
+    integer :: time, i
     associate (sheet => system%sheet)
       call define(sheet, 'zero', '0')
       call define(sheet, 'one', '1')
@@ -382,7 +382,8 @@ contains
       system%current = node_of(sheet, 'zero')
       system%body_hold = node_of(sheet, 'hold')
       associate (depends => depends_on(sheet%tape, 1))
-        time = count(depends([node_of(sheet, 'v_rate'), system%foot]))
+        time = count(depends([node_of(sheet, 'v_rate'), system%foot, (node_of(sheet, 'rate '//to_text(i)), &
+                                                                      i=1, system%variables - v_at)]))
         if (system%restitution > 0) time = time + count([depends(system%restitution)])
       end associate
     end associate
