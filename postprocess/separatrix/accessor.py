@@ -157,8 +157,8 @@ class Accessor:
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
         "phase", "section", "energy", "impacts" and "contact", of points "regime", of branches "branches" and
-        "curves", of boundaries "boundary", of measures along a parameter "erosion", of survival "survival", of
-        a section "section", of exponents "exponents".
+        "curves", of boundaries "boundary", of measures along a parameter "erosion", of survival "survival",
+        of a section "section", of exponents "exponents".
         Notebooks show the figure; `savefig` writes it, `save` in several formats.
 
         `ax`: axes of matplotlib to draw into; a sequence of them for a figure of several panels. The figure
