@@ -17,7 +17,7 @@ module own_equations
   use law_table, only: effect_family, force_family, law_choice_t, own_law, path_of, state_family, text_of, value_of
   use motor_choices, only: number_of_family
   use motor_state, only: most_own
-  use motor_system, only: far, motor_system_t
+  use motor_system, only: far, motor_system_t, v_at
   use own_checks, only: check_period, check_values, set_scales
   use own_flights, only: add_own_flights
   use own_friction, only: add_friction, add_restitution
