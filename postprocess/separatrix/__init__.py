@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from separatrix.cases import load as load
     from separatrix.discovery.api import Discovery as Discovery
     from separatrix.discovery.api import discover as discover
+    from separatrix.exponents import exponents_along as exponents_along
     from separatrix.library import effects as effects
     from separatrix.maps import basin as basin
     from separatrix.maps import points as points
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from separatrix.orbits import branches as branches
     from separatrix.orbits import stability as stability
     from separatrix.orbits import stability_of_map as stability_of_map
+    from separatrix.sections import section as section
 
 _HOME = {
     "Case": "separatrix.cases",
@@ -56,6 +58,7 @@ _HOME = {
     "decode_words": "separatrix.open",
     "discover": "separatrix.discovery.api",
     "effects": "separatrix.library",
+    "exponents_along": "separatrix.exponents",
     "flag_names": "separatrix.open",
     "linspace": "separatrix.cases",
     "load": "separatrix.cases",
@@ -63,6 +66,7 @@ _HOME = {
     "measures_along": "separatrix.measuring.along",
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
+    "section": "separatrix.sections",
     "stability": "separatrix.orbits",
     "stability_of_map": "separatrix.orbits",
     "survival": "separatrix.measuring.survival",

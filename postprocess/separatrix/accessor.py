@@ -157,7 +157,8 @@ class Accessor:
         Names are those of `separatrix-figures`: of a map its fields ("attractor", "regime",
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
         "phase", "section", "energy", "impacts" and "contact", of points "regime", of branches "branches" and
-        "curves", of boundaries "boundary", of measures along a parameter "erosion", of survival "survival".
+        "curves", of boundaries "boundary", of measures along a parameter "erosion", of survival "survival",
+        of a section "section", of exponents "exponents".
         Notebooks show the figure; `savefig` writes it, `save` in several formats.
 
         `ax`: axes of matplotlib to draw into; a sequence of them for a figure of several panels. The figure
@@ -170,7 +171,18 @@ class Accessor:
         shade=True, attractors=False, colours=[...], colour_map, limits, size=(120, 90), caption="full",
         crank_angle=1.5 and transient=500 of a section.
         """
-        from separatrix.figures import basin, boundary, branches, erosion, points, survival, sweep, trajectory
+        from separatrix.figures import (
+            basin,
+            boundary,
+            branches,
+            erosion,
+            exponents,
+            motion_section,
+            points,
+            survival,
+            sweep,
+            trajectory,
+        )
 
         kind = self.kind
         look = _look(wishes)
@@ -185,7 +197,8 @@ class Accessor:
             else:
                 modules = {
                     "sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches,
-                    "measures": erosion, "survival": survival,
+                    "measures": erosion, "survival": survival, "section": motion_section,
+                    "exponents": exponents,
                 }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
             return made[name or next(iter(made))]

@@ -392,6 +392,14 @@ def _even(case: Case, parameter: str, axis: dict[str, object]) -> dict[str, obje
     return even
 
 
+def axis_numbers(case: Case, name: str, values: Values) -> np.ndarray:
+    """Return the values of an axis over a parameter in SI units."""
+    axis = _axis_values(name, values, None)
+    if "values" in axis:
+        return np.array([case.in_si(name, value) for value in axis["values"]])
+    return axis_values({**axis, **{end: case.in_si(name, axis[end]) for end in ("from", "to")}})
+
+
 def _size(axis: Mapping[str, object]) -> int:
     return int(axis["count"]) if "count" in axis else len(axis["values"])
 

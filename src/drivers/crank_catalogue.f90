@@ -4,7 +4,8 @@
 !> What the crank of a motor does on each cycle of the catalogues of a map: columns of the catalogue in its file.
 module crank_catalogue
   use basin, only: catalogue_t
-  use crank_summary, only: crank_numbers, crank_outcomes, crank_summary_t, crank_table, crank_values, last_crank_outcome
+  use crank_summary, only: crank_numbers, crank_outcomes, crank_summary_t, crank_table, crank_values, last_crank_outcome, &
+    no_summary
   use crank_turns, only: summarize_attractor
   use errors, only: error_t
   use grid, only: grid_t, slice_motion
@@ -77,7 +78,8 @@ contains
       end do
     end do
     call team%allgather(mine, gathered)
-    allocate (values(1 + crank_numbers, entry), source=0.0_wp)
+    ! What no rank could summarise is not known.
+    values = spread([0.0_wp, crank_values(no_summary())], 2, entry)
     do i = 1, size(gathered), 2 + crank_numbers
       values(:, nint(gathered(i))) = gathered(i + 1:i + 1 + crank_numbers)
     end do

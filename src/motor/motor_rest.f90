@@ -16,8 +16,8 @@ module motor_rest
   implicit none
   private
 
-  public :: choose_body, choose_crank, equation_mode, hold_without_room, size_of_forces, slips, chatter_dies_out, low_series, &
-    zero_order
+  public :: choose_body, choose_crank, equation_mode, hold_without_room, is_over, size_of_forces, slips, chatter_dies_out, &
+    low_series, zero_order
 
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
@@ -64,6 +64,8 @@ contains
       end if
       call expand(flight%tape, z, parameters, series, fault)
     end associate
+    ! Coefficients that are too large count as not defined.
+    fault = abs(fault)
     if (fault == 0 .and. .not. fits) fault = -1
   end subroutine low_series
 
@@ -131,7 +133,8 @@ contains
     end associate
   end subroutine choose_crank
 
-  !> Whether a force with the Taylor coefficients `c` overcomes what holds against it.
+  !> Whether a force with the Taylor coefficients `c` overcomes what holds against it: where both are equal to rounding, the next
+  !> terms decide.
   pure logical function is_over(c, level, rounding)
     real(wp), intent(in) :: c(0:), level, rounding
     integer :: k
