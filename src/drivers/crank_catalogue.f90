@@ -33,6 +33,8 @@ contains
     if (.not. has_motor(grid%laws)) return
     call summarize_entries(team, grid, catalogues, values)
     if (size(values, 2) == 0) return
+    call schema%add_variable('crank_angle', type_float64, ['entry'], units='rad', group='catalogue', data=angles_of(catalogues), &
+                             long_name='angle of the crank at the section, or where it is at rest')
     call schema%add_variable('crank_outcome', type_int8, ['entry'], units='1', group='catalogue', data=values(1, :), &
                              long_name='outcome of a run-up of the crank', flag_values=[(i, i=0, last_crank_outcome)], &
                              flag_meanings=join(crank_outcomes, ' '))
@@ -41,6 +43,17 @@ contains
                                long_name=trim(crank_table(i)%meaning), data=values(1 + i, :), group='catalogue')
     end do
   end subroutine add_crank_catalogue
+
+  !> Angle of the crank of every entry, slice after slice.
+  pure function angles_of(catalogues) result(angles)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    real(wp), allocatable :: angles(:)
+    integer :: i
+    allocate (angles(0))
+    do i = 1, size(catalogues)
+      angles = [angles, catalogues(i)%attractors%section(3)]
+    end do
+  end function angles_of
 
   !> Outcome and numbers of every entry (columns), slice after slice.
   subroutine summarize_entries(team, grid, catalogues, values)

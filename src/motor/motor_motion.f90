@@ -254,6 +254,7 @@ contains
       if (crossed(guard_standstill)) then
         crank%w = 0
         call choose_crank(system, state, crank)
+        if (crank%turning == 0) crank%held_since = state%time
       else if (crossed(guard_crank_up) .or. crossed(guard_crank_down)) then
         crank%turning = merge(1, -1, crossed(guard_crank_up))
       end if
