@@ -57,58 +57,84 @@ int separatrix_find_parameter(const separatrix_model *model, const char *path, i
 int separatrix_drive_frequency(const separatrix_model *model, int chosen_count, const int *chosen,
                                const double *values, double *frequency, char *message, size_t message_size);
 
-/* Flies segments of the motion, each from its own start, and samples them. Arrays are contiguous.
+/* Segments of a motion, each from its own start: what separatrix_propagate is given and what it fills. Arrays
+ * are contiguous, the last index runs fastest. Sizes come first; m = first[segment_count] is the number of
+ * all samples. Set all members; those that a call does not use are 0 or NULL.
  *
- * In:
- *   chosen, values [chosen_count]
- *     parameters with values of their own
- *   directions [direction_count][chosen_count]
- *     directions along which the samples are differentiated: the change of each chosen parameter per unit.
- *     One that has no room for a step either way within the bounds is an error.
- *   start [segment_count][3]
- *     x [m], v [m/s] and crank angle [rad] at the time 0 of each segment
- *   first [segment_count + 1]
- *     samples of segment i are first[i] ... first[i + 1] - 1; m = first[segment_count] in all
- *   times [m]
- *     seconds since the start of the segment, ascending within it, >= 0
- *   force_count, force_interval, force [force_count]
- *     with drive.law = "measured_force": samples [N] every force_interval [s] in place of those of the
- *     case, 0: those of the case. They are one turn of the crank: a segment that starts t seconds after
- *     the first has the crank angle 2 pi t/((force_count - 1) force_interval).
- *   derivatives
- *     0: none; direction_count must be 0, and jacobian and velocity_jacobian may be NULL
- *   tolerance
- *     relative tolerance of the adaptive flight, 1e-15 to 1e-3; exact flights need none
- *
- * Out:
- *   x, v [m]
- *     position as the sensor shows it, and velocity
- *   jacobian, velocity_jacobian [m][direction_count + 3]
- *     their derivatives along the directions, then by x, v and crank angle of the start
- *   impacts [segment_count]
- *     number of impacts
- *   steady [segment_count]
- *     1 if the neighbours that the derivatives are taken from meet the same barriers in the same order and
- *     none is grazed; 0: do not trust the derivatives
- *   reason [segment_count]
- *     0, or why the segment could not be flown and has samples that are not numbers: 3 left the domain,
- *     4 not finite, 5 too many events, 6 step size, 7 too many steps, 65 its start is not finite or beyond
- *     a rigid barrier. Too many: over 20 000 within a drive period, and 32 more for each sample of a
- *     measured force, or over integrator.event_budget or step_budget of the case if those are less.
- *   impact_capacity, impact_count
- *     room for impacts, and how many there were; those beyond the room are left out
- *   impact_segment [impact_capacity], impact [impact_capacity][4]
- *     segment; time since its start [s], speed before and after [m/s], +1 upper or -1 lower barrier. After
- *     a soft contact: the speed when it ends, not a number if it lasts.
- *
- * Results depend on a segment and the arguments common to all, not on the other segments. */
-int separatrix_segments(const separatrix_model *model, int chosen_count, const int *chosen,
-                        const double *values, int direction_count, const double *directions,
-                        int segment_count, const double *start, const int *first, const double *times,
-                        int force_count, double force_interval, const double *force, int derivatives,
-                        double tolerance, double *x, double *v, double *jacobian, double *velocity_jacobian,
-                        int *impacts, int *steady, int *reason, int impact_capacity, int *impact_count,
-                        int *impact_segment, double *impact, char *message, size_t message_size);
+ * The numbers of a start and of a sample are
+ *   of one body
+ *     start: x [m], v [m/s], crank angle [rad]; sample: x as the sensor shows it, v
+ *   of a structure of n coordinates (separatrix_coordinate)
+ *     start: n positions [m], n velocities [m/s], crank angle [rad]; sample: positions, velocities. The
+ *     spring of elastic friction carries all of the friction at the start.
+ *   with a motor
+ *     start and sample: x [m], crank angle [rad], v [m/s], crank speed [rad/s], and current [A] (motor.law =
+ *     "dc" with an inductance) or integral of the speed control [rad] ("pi"); of other motors the last one is
+ *     not used at the start. A current that is not a number is that which follows the speed, as it does after
+ *     some time constants; derivatives by it are 0. The crank angle goes on beyond a turn; a sample has the
+ *     current of every dc motor. */
+typedef struct separatrix_segments {
+  int chosen_count;    /* parameters with values of their own */
+  int direction_count; /* 0 without derivatives */
+  int segment_count;
+  int start_numbers;  /* as separatrix_segment_numbers has them */
+  int sample_numbers; /* the same of a sample */
+  int force_count;    /* 0: the measured force of the case */
+  int derivatives;    /* 0: none, and jacobian may be NULL */
+  int impact_capacity;
+  double tolerance;      /* relative, of the adaptive flight, 1e-15 to 1e-3; exact flights need none */
+  double force_interval; /* [s] */
+
+  const int *chosen;    /* [chosen_count] indices of parameters */
+  const double *values; /* [chosen_count] */
+
+  /* [direction_count][chosen_count] along which the samples are differentiated: the change of each chosen
+   * parameter per unit. One that has no room for a step either way within the bounds is an error. */
+  const double *directions;
+  const double *start; /* [segment_count][start_numbers] at the time 0 of each segment */
+  const int *first;    /* [segment_count + 1]: samples of segment i are first[i] ... first[i + 1] - 1 */
+  const double *times; /* [m] since the start of the segment [s], ascending within it, >= 0 */
+
+  /* [force_count] with drive.law = "measured_force": samples [N] every force_interval in place of those of
+   * the case. They are one turn of the crank: a segment that starts t seconds after the first has the crank
+   * angle 2 pi t/((force_count - 1) force_interval). */
+  const double *force;
+
+  double *motion; /* out [m][sample_numbers] */
+
+  /* out [m][sample_numbers][direction_count + start_numbers]: derivatives of motion along the directions,
+   * then by the numbers of the start */
+  double *jacobian;
+  int *impacts; /* out [segment_count]: number of impacts */
+
+  /* out [segment_count]: 1 if the neighbours that the derivatives are taken from meet the same stops in the
+   * same order, none is grazed, and every sample has derivatives; 0: do not trust the derivatives */
+  int *steady;
+
+  /* out [segment_count]: 0, or why the segment could not be flown and has samples that are not numbers: 3
+   * left the domain, 4 not finite, 5 too many events, 6 step size, 7 too many steps, 65 its start is not
+   * finite or beyond a rigid barrier. Too many: over 20 000 within a drive period, and 32 more for each
+   * sample of a measured force, or over integrator.event_budget or step_budget of the case if those are less.
+   */
+  int *reason;
+  int *impact_segment; /* out [impact_capacity] */
+
+  /* out [impact_capacity][5]: time since the start of the segment [s], number of the contact from 0 (0 of one
+   * body and with a motor), its speed before and after [m/s], +1 upper or -1 lower stop. After a soft
+   * contact: the speed when it ends, not a number if it lasts. */
+  double *impact;
+  int impact_count; /* out: how many impacts there were; those beyond the room are left out */
+} separatrix_segments;
+
+/* Numbers of a start and of a sample of segments of a model. */
+int separatrix_segment_numbers(const separatrix_model *model, int *start_numbers, int *sample_numbers,
+                               char *message, size_t message_size);
+
+/* Flies segments of the motion and samples them. Results depend on a segment and the arguments common to all,
+ * not on the other segments. Code 64 also for a pointer that is NULL where an array is needed; 65 for a
+ * machine whose motion a start does not determine, as one with a ramp of the motor. */
+int separatrix_propagate(const separatrix_model *model, separatrix_segments *segments, char *message,
+                         size_t message_size);
 
 /* Name of coordinate `index`, from 0, of a structure: a body, or a point or an inner coordinate of one of its
  * parts. Code 64 beyond the last; other machines have none. */
@@ -132,49 +158,6 @@ int separatrix_joint_force(const separatrix_model *model, int chosen_count, cons
                            const double *values, const char *joint, int sample_count, const double *extension,
                            const double *speed, double *force, double *by_extension, double *by_speed,
                            char *message, size_t message_size);
-
-/* As separatrix_segments, of a structure with coordinate_count coordinates. What differs:
- *
- * In:
- *   start [segment_count][2*coordinate_count + 1]
- *     positions [m], then velocities [m/s] of all coordinates, crank angle [rad]; the spring of
- *     elastic friction carries all of the friction
- * Out:
- *   motion [m][2*coordinate_count]
- *     positions, then velocities at the samples
- *   jacobian [m][2*coordinate_count][direction_count + 2*coordinate_count + 1]
- *     their derivatives along the directions, then by positions, velocities and crank angle of the start
- *   impact [impact_capacity][5]
- *     time since the start of the segment [s], number of the contact from 0, speed of its ends against each
- *     other before and after [m/s], +1 upper or -1 lower stop */
-int separatrix_coordinate_segments(const separatrix_model *model, int chosen_count, const int *chosen,
-                                   const double *values, int direction_count, const double *directions,
-                                   int segment_count, int coordinate_count, const double *start,
-                                   const int *first, const double *times, int derivatives, double tolerance,
-                                   double *motion, double *jacobian, int *impacts, int *steady, int *reason,
-                                   int impact_capacity, int *impact_count, int *impact_segment,
-                                   double *impact, char *message, size_t message_size);
-
-/* As separatrix_segments, of a machine with a motor. What differs:
- *
- * In:
- *   start [segment_count][5]
- *     x [m], crank angle [rad], v [m/s], crank speed [rad/s], and current [A] (motor.law = "dc" with an
- *     inductance) or integral of the speed control [rad] ("pi"); of other motors the last one is not used. A
- *     current that is not a number is that which follows the speed, as it does after some time constants.
- * Out:
- *   motion [m][5]
- *     the same at the samples; the crank angle goes on beyond a turn; the current of every dc motor
- *   jacobian [m][5][direction_count + 5]
- *     their derivatives along the directions, then by the numbers of the start
- *
- * A machine whose voltage or speed rises in a ramp has no segments: code 65. */
-int separatrix_crank_segments(const separatrix_model *model, int chosen_count, const int *chosen,
-                              const double *values, int direction_count, const double *directions,
-                              int segment_count, const double *start, const int *first, const double *times,
-                              int derivatives, double tolerance, double *motion, double *jacobian,
-                              int *impacts, int *steady, int *reason, int impact_capacity, int *impact_count,
-                              int *impact_segment, double *impact, char *message, size_t message_size);
 
 /* Numbers of a sample, an event and the summary of a trajectory, and of an attractor and a label. */
 enum {

@@ -26,7 +26,7 @@ done
 packages=(
   gfortran gcc g++ cmake ninja-build git
   openmpi-bin libopenmpi-dev libhdf5-openmpi-dev libhdf5-dev hdf5-tools
-  libgsl-dev libtoml11-dev zlib1g-dev python3-venv libpangoft2-1.0-0 libpangocairo-1.0-0
+  libgsl-dev libtoml11-dev zlib1g-dev libisal-dev python3-venv libpangoft2-1.0-0 libpangocairo-1.0-0
 )
 
 if $browser && ! command -v chromium > /dev/null; then

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from separatrix.errors import GIVEN_UP, GivenUpError
-from separatrix.library import CaseError, Model, _call, _library, _pointer
+from separatrix.binding import call, loaded, pointer
+from separatrix.errors import GIVEN_UP, CaseError, GivenUpError
+from separatrix.library import Model
 from separatrix.variables import MAP
 
 __all__ = [
@@ -134,16 +135,16 @@ def trajectory(
             "separatrix_trajectory",
             model._handle,
             *chosen,
-            _pointer(start),
+            pointer(start),
             ctypes.c_double(duration),
             int(samples_per_period),
             room[0],
             ctypes.byref(counts[0]),
-            _pointer(samples),
+            pointer(samples),
             room[1],
             ctypes.byref(counts[1]),
-            _pointer(events),
-            _pointer(summary),
+            pointer(events),
+            pointer(summary),
         )
         found = (counts[0].value, counts[1].value)
         if found[0] <= room[0] and found[1] <= room[1]:
@@ -162,7 +163,7 @@ def trajectory(
 def _call_or_given_up(name: str, *arguments: object) -> str:
     """Call a function; its message if a motion was given up, else ''."""
     try:
-        _call(name, *arguments)
+        call(name, *arguments)
     except CaseError as error:
         if error.code != GIVEN_UP:
             raise
@@ -206,13 +207,13 @@ class Catalogue:
     def __init__(self, model: Model, values: Mapping[str, float] | None = None) -> None:
         """Prepare the machine of a model with other `values` of parameters by path; no attractors yet."""
         self._handle = ctypes.c_void_p()
-        _call(
+        call(
             "separatrix_catalogue_open",
             model._handle,
             *model._chosen(values or {}),
             ctypes.byref(self._handle),
         )
-        self._free = weakref.finalize(self, _library().separatrix_catalogue_free, self._handle)
+        self._free = weakref.finalize(self, loaded().separatrix_catalogue_free, self._handle)
 
     def search(self, starts: np.ndarray | None = None, stop: StopFlag | None = None) -> "Catalogue":
         """Add the attractors to which `starts` (n, 3) lead; None: the sample of `basin`.
@@ -221,20 +222,20 @@ class Catalogue:
         """
         size, starts = ((-1, 3), None) if starts is None else _starts(starts)
         with _stoppable():
-            _call("separatrix_catalogue_search_from", self._handle, *size, _pointer(starts), _flag(stop))
+            call("separatrix_catalogue_search_from", self._handle, *size, pointer(starts), _flag(stop))
         return self
 
     @property
     def attractors(self) -> list[Attractor]:
         """The attractors, in the order of their numbers within the machine."""
-        return [self._attractor(index) for index in range(_library().separatrix_catalogue_size(self._handle))]
+        return [self._attractor(index) for index in range(loaded().separatrix_catalogue_size(self._handle))]
 
     def _attractor(self, index: int) -> Attractor:
         numbers, room = np.empty(len(ATTRACTOR) + 2 * _COORDINATES), 64
         while True:
             points, count = np.empty((room, _COORDINATES)), ctypes.c_int()
-            arrays = (_pointer(numbers), room, ctypes.byref(count), _pointer(points))
-            _call("separatrix_catalogue_attractor", self._handle, index, *arrays)
+            arrays = (pointer(numbers), room, ctypes.byref(count), pointer(points))
+            call("separatrix_catalogue_attractor", self._handle, index, *arrays)
             if count.value <= room:
                 break
             room = count.value
@@ -251,9 +252,9 @@ class Catalogue:
         """
         size, starts = _starts(starts)
         values = np.empty((len(starts), len(LABEL_VARIABLES)))
-        arrays = (_pointer(starts), _pointer(values))
+        arrays = (pointer(starts), pointer(values))
         with _stoppable():
-            _call("separatrix_labels_from", self._handle, *size, *arrays, _flag(stop))
+            call("separatrix_labels_from", self._handle, *size, *arrays, _flag(stop))
         with np.errstate(over="ignore"):
             columns = zip(LABEL_VARIABLES.items(), values.T, strict=True)
             return {name: column.astype(kind) for (name, kind), column in columns}
@@ -302,7 +303,7 @@ def number(catalogues: Iterable[Catalogue], shape: tuple[int, ...]) -> None:
     """Number the attractors of the slices of a map so that branches keep their labels; last axis fastest."""
     handles = [catalogue._handle for catalogue in catalogues]
     given = (ctypes.c_void_p * len(handles))(*(handle.value for handle in handles))
-    _call("separatrix_catalogue_number", len(handles), given, len(shape), (ctypes.c_int * len(shape))(*shape))
+    call("separatrix_catalogue_number", len(handles), given, len(shape), (ctypes.c_int * len(shape))(*shape))
 
 
 def _starts(starts: np.ndarray) -> tuple[tuple[int, int], np.ndarray]:

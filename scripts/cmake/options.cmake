@@ -4,6 +4,7 @@ option(SEPARATRIX_MPI "Build with MPI and parallel HDF5 (OFF: one process, seria
 option(SEPARATRIX_TESTS "Build the tests" ON)
 option(SEPARATRIX_GPU "Let maps run on NVIDIA GPUs as well (needs nvcc)" OFF)
 option(SEPARATRIX_STATIC "Link HDF5, GSL and zlib statically, as wheels do" OFF)
+option(SEPARATRIX_ISAL "Compress final files with ISA-L where it is installed" ON)
 set(SEPARATRIX_LANES all CACHE STRING "Vector kernels: all (for any processor), or native (for this one; the build is shorter)")
 set_property(CACHE SEPARATRIX_LANES PROPERTY STRINGS all native)
 option(SEPARATRIX_FUZZ "Build the fuzzer of the readers (GCC)" OFF)

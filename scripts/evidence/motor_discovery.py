@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hides effects in records of machines with a motor (tests/generator/cranks.py) and counts what is named.
 
-    python scripts/evidence/motor_discovery.py --seed S [--first N] [--cases N] [--limit SECONDS] --out DIR
+    python scripts/evidence/motor_discovery.py --seed S [--first N] [--step N] [--cases N] [--limit SECONDS]
+        [--quick] --out DIR
 
-Prints a line for each case and a table of the counts. Started again it goes on where it was.
+Runs the cases with the numbers first, first + step, ... below --cases. Prints a line for each case and a
+table of the counts. Started again it goes on where it was.
 """
 
 import argparse
@@ -60,12 +62,15 @@ def ask(seed: int, number: int, limit: float, quick: bool, folder: Path) -> dict
 
 
 def scored(answer: dict) -> str:
-    """Whether a verdict is right, a set with the truth in it, silent, or wrong."""
+    """Whether a verdict is right, a set with the truth in it, silent, or wrong.
+
+    Where no effect of the catalogue is hidden, a set is a false one.
+    """
     truth, outcome, names = answer["truth"], answer["outcome"], answer["names"]
     if outcome == "no verdict":
         return "no verdict"
     if truth in ("", *cranks.MIMICS):
-        return "silent" if not names else "in a set" if outcome == "ambiguous" else "wrong"
+        return "silent" if not names else "false set" if outcome == "ambiguous" else "wrong"
     if outcome == "ambiguous":
         return "in a set" if truth in names or [truth] in answer["sets"] else "wrong"
     if not names:
@@ -98,7 +103,7 @@ def main() -> None:
             flush=True,
         )
         table.setdefault(answer["truth"] or "none", Counter())[word] += 1
-    words = ("right", "in a set", "silent", "wrong", "no verdict")
+    words = ("right", "in a set", "silent", "false set", "wrong", "no verdict")
     print(f"| hidden | {' | '.join(words)} |")
     for truth, counts in table.items():
         print(f"| {truth} | {' | '.join(str(counts[word]) for word in words)} |")

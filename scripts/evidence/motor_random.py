@@ -40,15 +40,15 @@ PAGE = """\
 # Random machines with a motor against SciPy
 
 Written by `scripts/evidence/motor_random.py`; do not edit. Each machine has a random motor, mechanism or
-unbalance, friction and stops, bearing, and start; a third of the motors have a ramp. The other program
-integrates its own equations by SciPy's DOP853 with a relative tolerance of 1e-13, and finds the events by
-Newton's method. A difference is the largest of time, angle, speed, position and velocity of an event over
-6 s (SI units). It may be 1e-9, or ten times what another tolerance changes in the reference. The balance of
-energy may be open by 1e-8.
+unbalance, friction and stops, bearing, and start; some motors have a ramp. The reference integrates equations
+of its own with SciPy's DOP853 at a relative tolerance of 1e-13, and finds the events by Newton's method. A
+difference is the largest of time, angle, speed, position and velocity of an event over 6 s (SI units).
+Allowed is 1e-9, plus ten times what another tolerance changes in the reference. The table lists the
+differences of events that the tolerance changes by less than 1e-10. The energy balance must close to 1e-8.
 
 {rows}
 
-## Not as it must be
+## Failures
 
 {wrong}
 """
@@ -276,7 +276,7 @@ def main() -> None:
             apart, closing = max(one.difference for one in found), max(one.closing for one in found)
             rows.append((motor, drive, str(len(found)), str(events), f"{apart:.1e}", f"{closing:.1e}"))
             print(*rows[-1], *wrong[-1:], sep=" | ", flush=True)
-    names = ["motor", "drive", "machines", "events", "largest difference", "energy"]
+    names = ["motor", "drive", "machines", "events", "largest difference", "error of the energy balance"]
     listed = "\n".join(f"* {item}" for item in wrong) if wrong else "None."
     (SOURCE / "docs" / "motor_random.md").write_text(PAGE.format(rows=table(names, rows), wrong=listed))
     sys.exit(1 if wrong else 0)

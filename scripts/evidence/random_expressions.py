@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes tests/expressions/test_random_expressions.pf: values, derivatives and Taylor coefficients.
+"""Writes two suites of tests/expressions: values, derivatives and Taylor coefficients of expressions.
+
+One has every function and functions of random expressions, the other has operators between them.
 
 The expected numbers are of mpmath, which must be installed: values, and derivatives as differences
 with 450 digits.
@@ -15,7 +17,7 @@ from pathlib import Path
 
 import mpmath
 
-SUITE = Path(__file__).resolve().parents[2] / "tests" / "expressions" / "test_random_expressions.pf"
+FOLDER = Path(__file__).resolve().parents[2] / "tests" / "expressions"
 ORDERS = 8
 POINT = (mpmath.mpf(3) / 4, mpmath.mpf(-5) / 4)
 SPEED = (mpmath.mpf(1), mpmath.mpf(-1) / 2)
@@ -50,9 +52,9 @@ EXPONENTS = {"2": 2, "3": 3, "-1": -1, "-2": -2, "1.5": mpmath.mpf("1.5"), "0.37
 HEADER = """! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Random expressions and every function, against values, derivatives and Taylor coefficients of mpmath.
+!> {what}, against values, derivatives and Taylor coefficients of mpmath.
 !> Written by scripts/evidence/random_expressions.py.
-module test_random_expressions
+module {suite}
   use errors, only: error_t
   use expression_text, only: read_expression
   use funit
@@ -214,7 +216,21 @@ def main() -> None:
         numbers = numbers_of(meaning)
         if numbers is not None and any(numbers[0]):
             rows.append((text, *numbers))
-    parts = [HEADER]
+    write_suite("test_function_expressions", "Functions, also of random expressions", [
+        row for row in rows if has_function_outside(row[0])
+    ])  # fmt: skip
+    write_suite("test_random_expressions", "Operators between random expressions", [
+        row for row in rows if not has_function_outside(row[0])
+    ])  # fmt: skip
+
+
+def has_function_outside(text: str) -> bool:
+    """Whether the last thing done is a function."""
+    return text[0].isalpha() and text.endswith(")")
+
+
+def write_suite(suite: str, what: str, rows: list[tuple[str, list[Number], list[Number]]]) -> None:
+    parts = [HEADER.replace("{suite}", suite).replace("{what}", what)]
     for first in range(0, len(rows), 10):
         name = f"expressions_{first + 1}_to_{min(first + 10, len(rows))}"
         parts.append(f"\n  @test\n  subroutine {name}()\n")
@@ -222,9 +238,9 @@ def main() -> None:
             numbers = f"[ &\n      {wrapped(slopes)}], [ &\n      {wrapped(coefficients)}]"
             parts.append(f"    call expect('{text}', {numbers})\n")
         parts.append(f"  end subroutine {name}\n")
-    parts.append("\nend module test_random_expressions\n")
-    SUITE.write_text("".join(parts), encoding="utf-8")
-    print(f"{len(rows)} expressions in {SUITE.name}")
+    parts.append(f"\nend module {suite}\n")
+    (FOLDER / f"{suite}.pf").write_text("".join(parts), encoding="utf-8")
+    print(f"{len(rows)} expressions in {suite}")
 
 
 if __name__ == "__main__":

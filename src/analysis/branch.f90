@@ -25,7 +25,7 @@ module branch
   implicit none
   private
 
-  public :: trace_branch
+  public :: join_ways, trace_branch, trace_one_way
 
   !> Turn of the tangent in one step [cosine], and Newton steps from which on a step is thought long.
   real(wp), parameter :: least_cosine = 0.97_wp
@@ -55,17 +55,29 @@ contains
     type(branch_t), intent(out) :: found
     class(search_watch_t), intent(inout), optional :: watch
     type(point_t), allocatable :: back(:), further(:)
-    integer :: i
-    call trace_one_way(family, plan, seed, -1, back, found%ending(1), watch)
-    if (found%ending(1) == label_closed) then
-      found%ending(2) = label_closed
-      allocate (further(0))
-    else
-      call trace_one_way(family, plan, seed, 1, further, found%ending(2), watch)
-    end if
-    found%points = [[(back(i), i=size(back), 1, -1)], further(min(2, size(further) + 1):)]
-    call mark_turns(family%parameter_size, found%points)
+    integer :: ending(2)
+    call trace_one_way(family, plan, seed, -1, back, ending(1), watch)
+    allocate (further(0))
+    if (ending(1) /= label_closed) call trace_one_way(family, plan, seed, 1, further, ending(2), watch)
+    call join_ways(family, back, further, ending, found)
   end subroutine trace_branch
+
+  !> The branch whose points and endings `back` and `further` are, each from the seed on; one way is all of a closed one.
+  subroutine join_ways(family, back, further, ending, found)
+    type(family_t), intent(in) :: family
+    type(point_t), intent(in) :: back(:), further(:)
+    integer, intent(in) :: ending(2)
+    type(branch_t), intent(out) :: found
+    integer :: i
+    found%ending = ending
+    found%points = [(back(i), i=size(back), 1, -1)]
+    if (ending(1) == label_closed) then
+      found%ending(2) = label_closed
+    else
+      found%points = [found%points, further(min(2, size(further) + 1):)]
+    end if
+    call mark_turns(family%parameter_size, found%points)
+  end subroutine join_ways
 
   !> Where the parameter turns there is a bifurcation, even if it could not be located; such a point is labelled accordingly. Two
   !> steps each way distinguish a turn from rounding.

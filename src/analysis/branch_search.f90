@@ -5,10 +5,9 @@
 !> yet is followed, and so is what bifurcates where a period doubles. The result depends on the seeds and need not be complete.
 module branch_search
   use body_family, only: family_t
-  use branch, only: trace_branch
   use branch_ends, only: join_ends
-  use branch_point, only: branch_t, label_bp, label_gr, label_gr_fold, label_hb, label_pd, label_sn, plan_t, point_t, set_sizes
-  use equilibrium_branch, only: equilibria_t, find_equilibria
+  use branch_point, only: branch_t, label_bp, label_gr, label_gr_fold, label_hb, label_pd, label_sn, point_t, set_sizes
+  use equilibrium_branch, only: find_equilibria
   use errors, only: error_t
   use hopf_cycles, only: begin_cycle, mark_births
   use kinds, only: wp
@@ -16,49 +15,26 @@ module branch_search
   use machine_family, only: machine_neighbourhood, machine_of_family
   use matrices, only: solve
   use multipliers, only: is_neutral
-  use orbit_search, only: find_orbits, found_t
+  use orbit_search, only: found_t
   use orbit_sections, only: section_points
   use orbit_symmetry, only: mark_symmetry
   use part_of_branch, only: lies_on
   use orbit_motion, only: is_admissible, orbit_of_motion, same_sequence
-  use periodic_orbit, only: correct_orbit, crossing_direction, depends_on_parameter, direct, move_along, orbit_t, &
+  use periodic_orbit, only: correct_orbit, crossing_direction, direct, move_along, orbit_t, &
     scales_of_orbit
-  use search_watch, only: search_watch_t
+  use search_jobs, only: trace
+  use search_state, only: search_t
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: prepare_search, search_value, follow_seeds
+  public :: prepare_search, follow_seeds
 
   !> How far along the critical direction the doubled orbit is looked for, in natural sizes; largest number of drive periods of an
   !> orbit that is followed after a doubling.
   real(wp), parameter :: doubled_at = 3e-3_wp
   !> The same of a branch that crosses.
   real(wp), parameter :: crossed_at = 4e-3_wp
-
-  type, public :: search_t
-    type(family_t) :: family
-    type(plan_t) :: plan
-    !> Values at which orbits are searched, and those found at each that are on a branch or a seed.
-    real(wp), allocatable :: values(:)
-    type(found_t), allocatable :: found(:)
-    !> Starts of the searches (columns x, v), longest period looked for, and the longest that is followed.
-    real(wp), allocatable :: starts(:, :)
-    integer :: longest = 4, longest_followed = 4
-    !> Branches that are followed at most.
-    integer :: most_branches = 60
-    integer :: seeds = 0
-    !> Whether any orbit that was found depends on the parameter.
-    logical :: depends = .false.
-    type(branch_t), allocatable :: branches(:)
-    !> Branches of equilibria of a machine without a clock.
-    type(equilibria_t), allocatable :: equilibria(:)
-    !> Rows that give position and speed of what is watched from a section point; whether the section is a time of the drive.
-    real(wp), allocatable :: watch(:, :)
-    logical :: has_clock = .true.
-    !> Receives the progress of the search, if any.
-    class(search_watch_t), pointer :: watcher => null()
-  end type search_t
 
 contains
 
@@ -81,22 +57,6 @@ contains
     allocate (search%found(values), search%branches(0))
   end subroutine prepare_search
 
-  !> Searches orbits at the value number `i`.
-  subroutine search_value(search, i)
-    type(search_t), intent(inout) :: search
-    integer, intent(in) :: i
-    type(neighbourhood_t) :: machines
-    type(error_t), allocatable :: error
-    integer :: k
-    allocate (search%found(i)%orbits(0))
-    call machine_neighbourhood(search%family, search%values(i), machines, error)
-    if (allocated(error)) return
-    call find_orbits(search%family, machines, search%values(i), search%starts, search%longest, search%found(i), search%watcher)
-    do k = 1, size(search%found(i)%orbits)
-      search%depends = search%depends .or. depends_on_parameter(machines, search%found(i)%orbits(k))
-    end do
-  end subroutine search_value
-
   !> Follows every seed that is on no branch yet, value by value, and the doubled orbits of what is found.
   subroutine follow_seeds(search)
     type(search_t), intent(inout) :: search
@@ -109,11 +69,15 @@ contains
       allocate (search%found(i)%orbits(0))
     end do
     do i = 1, size(seeds)
+      if (allocated(search%traced)) deallocate (search%traced)
       do k = 1, size(seeds(i)%orbits)
         if (size(search%branches) >= search%most_branches) exit
-        if (.not. is_known(search, i, seeds(i)%orbits(k))) call follow_new(search, seeds(i)%orbits(k))
+        if (is_known(search, i, seeds(i)%orbits(k))) cycle
+        search%expected = seeds(i)%orbits(k + 1:)
+        call follow_new(search, seeds(i)%orbits(k))
       end do
     end do
+    search%expected = seeds(1)%orbits(:0)
     call follow_births(search)
     call leave_out_parts(search)
     call join_ends(search%family, search%branches)
@@ -185,7 +149,7 @@ contains
     type(orbit_t) :: other
     integer :: i, side
     logical :: ok
-    call trace_branch(search%family, search%plan, seed, found, search%watcher)
+    call trace(search, seed, found)
     if (is_of_family(found)) then
       i = minloc(abs(search%values - seed%parameter), 1)
       search%found(i)%families = search%found(i)%families + 1

@@ -56,7 +56,7 @@ contains
     miss = misses_at_rest(structure, point%mode, point%y)
     near = 0
     do i = 1, 4
-      select type (other => machines%near(i))
+      select type (other => machines%near(i)%machine)
       type is (structure_t)
         near(:, i) = misses_at_rest(other, point%mode, point%y)
       end select

@@ -3,7 +3,7 @@
 
 !> The event words of periodic orbits.
 module orbit_words
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use build_motion, only: period_of
   use errors, only: error_t
   use event_words, only: canonical_word

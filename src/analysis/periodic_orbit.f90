@@ -148,7 +148,7 @@ contains
     integer :: i
     call shoot_only(machines%centre, orbit, own)
     do i = 1, 4
-      call shoot_only(machines%near(i), orbit, near(:, i))
+      call shoot_only(machines%near(i)%machine, orbit, near(:, i))
     end do
     slopes = by_difference(machines, own, near)
   end function parameter_slopes
@@ -392,7 +392,7 @@ contains
     call shoot_only(machines%centre, orbit, own)
     depends = .false.
     do i = 1, size(machines%near)
-      call shoot_only(machines%near(i), orbit, near)
+      call shoot_only(machines%near(i)%machine, orbit, near)
       depends = depends .or. any(abs(near - own) > 0)
     end do
   end function depends_on_parameter

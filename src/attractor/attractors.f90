@@ -64,7 +64,8 @@ module attractors
     !> neighbouring motions drift apart.
     complex(wp) :: multipliers(most_coordinates) = 0
     real(wp) :: multiplier = 0
-    !> State at the first section point, for the reader: x, v, and those of the driving body of two.
+    !> State at the first section point, for the reader: x, v, and those of the driving body of two, or the angle of a crank that
+    !> is at rest [rad].
     real(wp) :: section(4) = 0
     !> Number of coordinates on the section.
     integer :: coordinates = 2

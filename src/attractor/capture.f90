@@ -13,6 +13,9 @@ module capture
 
   public :: attractor_reached, attractor_reached_at, stays_in_family
 
+  !> Relative change of the speed of a crank in a turn below which it is steady.
+  real(wp), parameter :: steady = 1e-9_wp
+
 contains
 
   !> Index of the attractor to which the motion has converged at the end of a drive period, 0 if none. `slipped`: whether the body
@@ -25,14 +28,34 @@ contains
     type(section_state_t) :: later
     type(tally_t) :: unused
     integer :: reason
+    logical :: rests
     found = 0
     if (size(catalogue) == 0) return
-    found = attractor_reached_at(moving, catalogue, moving%point_of(section), slipped .or. .not. moving%rest_lasts)
+    if (.not. (moving%timed .or. section%passed)) then
+      if (moving%bound_to_rest(section)) found = rest_set_of(moving, catalogue, moving%point_of(section))
+      return
+    end if
+    rests = moving%rest_lasts .and. .not. slipped
+    if (rests .and. .not. moving%timed) rests = goes_on_turning(moving, section)
+    found = attractor_reached_at(moving, catalogue, moving%point_of(section), .not. rests)
     if (found > 0 .or. .not. any(catalogue%by_event)) return
     later = copy_of(section)
     call moving%advance_to_turn(later, unused, reason)
     if (reason == 0) found = find_capture(catalogue, moving%turn_point(later), .true., by_event=.true.)
   end function attractor_reached
+
+  !> Whether a crank beside a body at rest keeps its speed, or gains: all that follows is then no slower.
+  pure logical function goes_on_turning(moving, section) result(goes_on)
+    class(machine_t), intent(in) :: moving
+    class(section_state_t), intent(in) :: section
+    type(section_state_t) :: later
+    type(tally_t) :: tally
+    integer :: reason
+    later = copy_of(section)
+    call moving%begin_tally(later, tally)
+    call moving%advance_to_section(later, tally, reason)
+    goes_on = reason == 0 .and. tally%slips == 0 .and. later%motor%w >= section%motor%w*(1 - steady)
+  end function goes_on_turning
 
   !> The same of a section point; of one at rest the positions of rest to which it belongs come first.
   pure integer function attractor_reached_at(moving, catalogue, point, slipped) result(found)

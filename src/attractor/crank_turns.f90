@@ -4,16 +4,19 @@
 !> What the crank of a motor does over turns from a section point on.
 module crank_turns
   use attractors, only: attractor_t, kind_cycle
-  use crank_summary, only: crank_summary_t, summarize_crank
+  use constants, only: two_pi
+  use crank_summary, only: crank_stalled, crank_summary_t, summarize_crank
   use kinds, only: wp
-  use law_table, only: law_choice_t
+  use law_table, only: law_choice_t, value_of
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: log_t, open_log, tally_t
+  use motor_choices, only: number_of_family
   use motor_machine, only: motor_machine_t
+  use held_crank, only: torque_when_held
   implicit none
   private
 
-  public :: summarize_attractor, summarize_turns
+  public :: summarize_attractor, summarize_held, summarize_turns
 
   !> Samples of a turn of mean length.
   integer, parameter :: samples = 256
@@ -60,17 +63,41 @@ contains
     call machine%sample(section, log)
   end subroutine log_turns
 
-  !> Summary of a cycle; not numbers of an attractor that is none.
+  !> Summary of a crank that its bearing holds for good.
+  pure subroutine summarize_held(machine, section, summary)
+    class(machine_t), intent(in) :: machine
+    type(section_state_t), intent(in) :: section
+    type(crank_summary_t), intent(out) :: summary
+    summary%outcome = crank_stalled
+    select type (machine)
+    type is (motor_machine_t)
+      summary%torque = torque_when_held(machine%motor%system, section%state, section%motor)
+      summary%torque_max = abs(summary%torque)
+      associate (motor => machine%laws(number_of_family(machine%laws, 'motor')))
+        if (motor%name == 'dc') summary%heat = value_of(motor, 'resistance')*(summary%torque/value_of(motor, 'torque_constant'))**2
+      end associate
+    end select
+  end subroutine summarize_held
+
+  !> Summary of a cycle or of rest; not numbers of any other attractor.
   pure subroutine summarize_attractor(machine, attractor, summary)
     class(machine_t), intent(in) :: machine
     type(attractor_t), intent(in) :: attractor
     type(crank_summary_t), intent(out) :: summary
+    type(section_state_t) :: at_rest
     integer :: turns
-    turns = merge(attractor%period, 0, attractor%kind == kind_cycle)
-    if (turns == 0) then
+    real(wp) :: lasts
+    turns = merge(attractor%period, 0, attractor%kind == kind_cycle .or. attractor%rests)
+    lasts = attractor%duration
+    if (attractor%rests) lasts = two_pi/max(attractor%points(3, 1), tiny(lasts))
+    if (attractor%rests .and. .not. attractor%points(3, 1) > 0) then
+      at_rest%state%x = attractor%section(1)
+      at_rest%motor%own(1) = attractor%points(4, 1)
+      call summarize_held(machine, machine%resume(at_rest, attractor%section(3)), summary)
+    else if (turns == 0) then
       call summarize_turns(machine, section_state_t(), 0, 0.0_wp, summary)
     else
-      call summarize_turns(machine, machine%state_at(attractor%points(:, 1)), turns, attractor%duration, summary)
+      call summarize_turns(machine, machine%state_at(attractor%points(:, 1)), turns, lasts, summary)
     end if
   end subroutine summarize_attractor
 

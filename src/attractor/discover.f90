@@ -17,6 +17,7 @@ module discover
   use motion_features, only: cycle_word, features_over
   use motion_state, only: tally_t
   use single_trajectory, only: span_t
+  use crank_rests, only: add_crank_rest
   implicit none
   private
 
@@ -61,6 +62,7 @@ contains
       patience = span%duration
       do
         call settle(moving, catalogue, patience, section, segment)
+        if (.not. segment%ok) call add_crank_rest(moving, section, catalogue)
         if (segment%known .or. .not. segment%ok) exit
         call identify(moving, section, segment%returns, max_period, found, ok)
         if (ok) then

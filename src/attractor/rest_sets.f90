@@ -41,7 +41,9 @@ contains
     real(wp) :: from(moving%coordinates()), to(moving%coordinates())
     integer :: i
     joined = moving%one_rest_set
-    if (joined) return
+    ! A crank is held, wherever that is, or turns beside a body at rest.
+    if (.not. moving%timed) joined = (abs(one(3)) > 0) .eqv. (abs(other(3)) > 0)
+    if (joined .or. .not. moving%timed) return
     to = other(:size(to))
     from = point_near(one(:size(from)), to, moving%turn_on_section())
     joined = .not. any(abs(to - from) > 0)

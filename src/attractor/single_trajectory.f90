@@ -60,10 +60,8 @@ module single_trajectory
     real(wp) :: until = 0, since = 0
     !> Counts before the last reset of the tally.
     integer(int64) :: impacts = 0
-    real(wp) :: last_impact_speed = 0
-    real(wp) :: grazing_margin = huge(1.0_wp)
-    integer :: converged = 0
-    integer :: reason = 0
+    real(wp) :: last_impact_speed = 0, grazing_margin = huge(1.0_wp)
+    integer :: converged = 0, reason = 0
   end type trajectory_state_t
 
 contains
@@ -240,9 +238,10 @@ contains
     phase_end = end_of_phase(span, trajectory%phase)
     if (trajectory%reason == 0) then
       if (.not. moving%timed) then
-        trajectory%elapsed = trajectory%elapsed + (merge(trajectory%lasted, trajectory%until, trajectory%passed) - trajectory%since)
-        if (trajectory%passed) call note_section(moving, catalogue, slipped, trajectory, outcome)
-        if (.not. trajectory%passed) trajectory%elapsed = phase_end
+        trajectory%elapsed = merge(trajectory%elapsed + (trajectory%lasted - trajectory%since), phase_end, trajectory%passed)
+        if (trajectory%passed .or. moving%bound_to_rest(trajectory)) then
+          call note_section(moving, catalogue, slipped .or. trajectory%since > 0, trajectory, outcome)
+        end if
       else if (trajectory%until >= moving%period) then
         trajectory%elapsed = trajectory%elapsed + (moving%period - trajectory%since)
         call note_section(moving, catalogue, slipped .or. trajectory%since > 0, trajectory, outcome)
@@ -298,7 +297,8 @@ contains
     if (trajectory%converged == 0) then
       outcome%settle_time = -1
     else if (outcome%settle_time < 0) then
-      outcome%settle_time = trajectory%elapsed
+      outcome%settle_time = trajectory%elapsed - merge(0.0_wp, trajectory%state%time - trajectory%motor%held_since, &
+                                                       moving%timed .or. trajectory%passed)
     end if
   end subroutine note_section
 

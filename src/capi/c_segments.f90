@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The function of include/separatrix.h that flies segments.
+!> The functions of include/separatrix.h that fly segments.
 module c_segments
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
   use c_text, only: answer
@@ -9,6 +9,7 @@ module c_segments
   use kinds, only: wp
   use law_table, only: law_choice_t
   use model_type, only: check_values, laws_with_force, model_options, model_t
+  use segment_machine, only: impact_contact, impact_numbers
   use segments, only: propagate, report_t, samples_t
   use status, only: exit_bad_case, exit_usage
   use text, only: to_text
@@ -17,97 +18,219 @@ module c_segments
   implicit none
   private
 
-  public :: separatrix_segments, check_directions, check_length, check_samples, check_tolerance
+  public :: separatrix_segment_numbers, separatrix_propagate
 
   !> Drive periods that a segment may last.
   real(wp), parameter :: most_periods = 1e5_wp
 
+  !> `separatrix_segments` of the header, member by member.
+  type, bind(c) :: segments_t
+    integer(c_int) :: chosen_count
+    integer(c_int) :: direction_count
+    integer(c_int) :: segment_count
+    integer(c_int) :: start_numbers
+    integer(c_int) :: sample_numbers
+    integer(c_int) :: force_count
+    integer(c_int) :: derivatives
+    integer(c_int) :: impact_capacity
+    real(c_double) :: tolerance
+    real(c_double) :: force_interval
+    type(c_ptr) :: chosen
+    type(c_ptr) :: values
+    type(c_ptr) :: directions
+    type(c_ptr) :: start
+    type(c_ptr) :: first
+    type(c_ptr) :: times
+    type(c_ptr) :: force
+    type(c_ptr) :: motion
+    type(c_ptr) :: jacobian
+    type(c_ptr) :: impacts
+    type(c_ptr) :: steady
+    type(c_ptr) :: reason
+    type(c_ptr) :: impact_segment
+    type(c_ptr) :: impact
+    integer(c_int) :: impact_count
+  end type segments_t
+
+  !> What a call is given, as Fortran has it.
+  type :: given_t
+    integer(c_int), pointer :: chosen(:), first(:)
+    real(c_double), pointer :: values(:), directions(:, :), start(:, :), times(:), force(:)
+  end type given_t
+
 contains
 
-  integer(c_int) function separatrix_segments(model, chosen_count, chosen, values, direction_count, directions, segment_count, &
-      start, first, times, force_count, force_interval, force, derivatives, tolerance, x, v, jacobian, velocity_jacobian, &
-      impacts, steady, reason, impact_capacity, impact_count, impact_segment, impact, message, message_size) bind(c) result(code)
-    type(c_ptr), value :: model, force
-    integer(c_int), value :: chosen_count, direction_count, segment_count, force_count, derivatives, impact_capacity
-    integer(c_int), intent(in) :: chosen(chosen_count), first(segment_count + 1)
-    real(c_double), value :: force_interval, tolerance
-    real(c_double), intent(in) :: values(chosen_count), start(3, segment_count), times(*)
-    real(c_double), intent(in) :: directions(chosen_count, direction_count)
-    real(c_double), intent(inout) :: x(*), v(*)
-    real(c_double), intent(inout) :: jacobian(direction_count + 3, *), velocity_jacobian(direction_count + 3, *)
-    integer(c_int), intent(inout) :: impacts(segment_count), steady(segment_count), reason(segment_count)
-    integer(c_int), intent(out) :: impact_count
-    integer(c_int), intent(inout) :: impact_segment(impact_capacity)
-    real(c_double), intent(inout) :: impact(4, impact_capacity)
+  integer(c_int) function separatrix_segment_numbers(model, start_numbers, sample_numbers, message, message_size) &
+    bind(c) result(code)
+    type(c_ptr), value :: model
+    integer(c_int), intent(out) :: start_numbers, sample_numbers
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
     type(model_t), pointer :: self
-    real(c_double), target :: no_force(0)
-    real(c_double), pointer :: own_force(:)
     type(error_t), allocatable :: error
-    type(samples_t) :: samples
-    type(report_t) :: report
-    integer :: kept
+    type(family_t) :: family
     call c_f_pointer(model, self)
-    ! NULL where there are no samples.
-    own_force => no_force
-    if (c_associated(force)) call c_f_pointer(force, own_force, [force_count])
-    impact_count = 0
-    call check_samples(segment_count, first, times, error)
+    start_numbers = 0
+    sample_numbers = 0
+    call prepare_family(self%the_case%laws, model_options(self, self%the_case%integrator%tolerance), self%parameters(:0), &
+                        [real(wp) ::], reshape([real(wp) ::], [0, 0]), .false., family, error)
     if (.not. allocated(error)) then
-      call fly(self, chosen + 1, values, directions, start, first, times(:first(segment_count + 1)), force_interval, &
-               own_force, derivatives /= 0, tolerance, samples, report, error)
-    end if
-    if (.not. allocated(error)) then
-      x(:size(samples%x)) = samples%x
-      v(:size(samples%x)) = samples%v
-      if (derivatives /= 0) then
-        jacobian(:, :size(samples%x)) = samples%x_slope
-        velocity_jacobian(:, :size(samples%x)) = samples%v_slope
-      end if
-      impacts = report%impacts
-      steady = merge(1, 0, report%steady)
-      reason = report%reason
-      impact_count = size(report%impact_segment)
-      kept = min(impact_count, impact_capacity)
-      impact_segment(:kept) = report%impact_segment(:kept) - 1
-      impact(:, :kept) = report%impact(:, :kept)
+      start_numbers = family%machine%start_numbers
+      sample_numbers = family%machine%sample_numbers
     end if
     code = answer(error, message, message_size)
-  end function separatrix_segments
+  end function separatrix_segment_numbers
 
-  subroutine fly(self, chosen, values, directions, start, first, times, interval, force, derivatives, tolerance, samples, &
-                 report, error)
+  integer(c_int) function separatrix_propagate(model, segments, message, message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    type(segments_t), intent(inout) :: segments
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: self
+    type(error_t), allocatable :: error
+    type(given_t) :: given
+    type(samples_t) :: samples
+    type(report_t) :: report
+    call c_f_pointer(model, self)
+    segments%impact_count = 0
+    call take_given(segments, given, error)
+    if (.not. allocated(error)) call check_results(segments, size(given%times), error)
+    if (.not. allocated(error)) call fly(self, segments, given, samples, report, error)
+    if (.not. allocated(error)) call hand_out(samples, report, segments)
+    code = answer(error, message, message_size)
+  end function separatrix_propagate
+
+  !> What is given. Code 64 for a pointer that is NULL, offsets and times that do not ascend.
+  subroutine take_given(segments, given, error)
+    type(segments_t), intent(in) :: segments
+    type(given_t), intent(out) :: given
+    type(error_t), allocatable, intent(out) :: error
+    associate (of => segments)
+      call check_pointer('chosen', of%chosen, of%chosen_count, error)
+      call check_pointer('values', of%values, of%chosen_count, error)
+      call check_pointer('directions', of%directions, of%chosen_count*of%direction_count, error)
+      call check_pointer('start', of%start, of%start_numbers*of%segment_count, error)
+      call check_pointer('first', of%first, of%segment_count + 1, error)
+      call check_pointer('force', of%force, of%force_count, error)
+      if (min(of%direction_count, of%start_numbers, of%sample_numbers, of%impact_capacity) < 0) then
+        call fail(error, exit_usage, 'segments: found a negative count')
+      end if
+      if (allocated(error)) return
+      call c_f_pointer(of%chosen, given%chosen, [of%chosen_count])
+      call c_f_pointer(of%values, given%values, [of%chosen_count])
+      call c_f_pointer(of%directions, given%directions, [of%chosen_count, of%direction_count])
+      call c_f_pointer(of%start, given%start, [of%start_numbers, of%segment_count])
+      call c_f_pointer(of%first, given%first, [of%segment_count + 1])
+      call c_f_pointer(of%force, given%force, [of%force_count])
+      call check_offsets(given%first, error)
+      if (.not. allocated(error)) call check_pointer('times', of%times, given%first(of%segment_count + 1), error)
+      if (allocated(error)) return
+      call c_f_pointer(of%times, given%times, [given%first(of%segment_count + 1)])
+      call check_times(given%first, given%times, error)
+    end associate
+  end subroutine take_given
+
+  !> Code 64 where results are to be put at NULL.
+  subroutine check_results(segments, sample_count, error)
+    type(segments_t), intent(in) :: segments
+    integer, intent(in) :: sample_count
+    type(error_t), allocatable, intent(out) :: error
+    associate (of => segments)
+      call check_pointer('motion', of%motion, sample_count, error)
+      if (of%derivatives /= 0) call check_pointer('jacobian', of%jacobian, sample_count, error)
+      call check_pointer('impacts', of%impacts, of%segment_count, error)
+      call check_pointer('steady', of%steady, of%segment_count, error)
+      call check_pointer('reason', of%reason, of%segment_count, error)
+      call check_pointer('impact_segment', of%impact_segment, of%impact_capacity, error)
+      call check_pointer('impact', of%impact, of%impact_capacity, error)
+    end associate
+  end subroutine check_results
+
+  !> Code 64 for a pointer that is NULL, or a negative size.
+  subroutine check_pointer(name, pointer, size, error)
+    character(len=*), intent(in) :: name
+    type(c_ptr), intent(in) :: pointer
+    integer(c_int), intent(in) :: size
+    type(error_t), allocatable, intent(inout) :: error
+    if (allocated(error)) return
+    if (size < 0) then
+      call fail(error, exit_usage, name//': found a negative size')
+    else if (size > 0 .and. .not. c_associated(pointer)) then
+      call fail(error, exit_usage, name//': found NULL, allowed an array')
+    end if
+  end subroutine check_pointer
+
+  subroutine fly(self, segments, given, samples, report, error)
     type(model_t), intent(in) :: self
-    integer, intent(in) :: chosen(:), first(:)
-    real(wp), intent(in) :: values(:), directions(:, :), start(:, :), times(:), interval, force(:), tolerance
-    logical, intent(in) :: derivatives
+    type(segments_t), intent(in) :: segments
+    type(given_t), intent(in) :: given
     type(samples_t), intent(out) :: samples
     type(report_t), intent(out) :: report
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
     type(family_t) :: family
-    call check_values(self, chosen, values, error)
+    logical :: derivatives
+    derivatives = segments%derivatives /= 0
+    call check_values(self, given%chosen + 1, given%values, error)
+    if (.not. allocated(error)) call check_directions(given%directions, derivatives, error)
+    if (.not. allocated(error)) call check_tolerance(segments%tolerance, error)
+    if (.not. allocated(error)) call laws_with_force(self, segments%force_interval, given%force, laws, error)
     if (allocated(error)) return
-    call check_directions(directions, derivatives, error)
-    if (allocated(error)) return
-    call check_tolerance(tolerance, error)
-    if (allocated(error)) return
-    call laws_with_force(self, interval, force, laws, error)
-    if (allocated(error)) return
-    call prepare_family(laws, model_options(self, tolerance), self%parameters(chosen), values, directions, derivatives, &
-                        family, error)
-    if (allocated(error)) return
-    if (allocated(family%driven)) then
-      call fail(error, exit_bad_case, 'motor: found a machine with a motor, whose segments separatrix_crank_segments flies')
-      return
-    else if (allocated(family%bodies)) then
-      call fail(error, exit_bad_case, 'body.law: found "'//trim(laws(1)%name)//'", allowed for segments point_mass')
-      return
-    end if
-    call check_length(family%moving%machine%period, times, error)
-    if (.not. allocated(error)) call propagate(family, start, first, times, derivatives, samples, report)
+    call prepare_family(laws, model_options(self, segments%tolerance), self%parameters(given%chosen + 1), given%values, &
+                        given%directions, derivatives, family, error)
+    if (.not. allocated(error)) call check_machine(family, segments, error)
+    if (.not. allocated(error)) call check_length(family%machine%period, given%times, error)
+    if (.not. allocated(error)) call propagate(family, given%start, given%first, given%times, derivatives, samples, report)
   end subroutine fly
+
+  !> A start has all that the motion depends on. Code 65, or 64 for the wrong number of numbers.
+  subroutine check_machine(family, segments, error)
+    type(family_t), intent(in) :: family
+    type(segments_t), intent(in) :: segments
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: obstacle
+    associate (machine => family%machine)
+      obstacle = machine%obstacle()
+      if (segments%start_numbers /= machine%start_numbers) then
+        call fail(error, exit_usage, 'start_numbers: found '//to_text(segments%start_numbers)//', allowed '// &
+                  to_text(machine%start_numbers)//' for this machine')
+      else if (segments%sample_numbers /= machine%sample_numbers) then
+        call fail(error, exit_usage, 'sample_numbers: found '//to_text(segments%sample_numbers)//', allowed '// &
+                  to_text(machine%sample_numbers)//' for this machine')
+      else if (len(obstacle) > 0) then
+        call fail(error, exit_bad_case, obstacle)
+      end if
+    end associate
+  end subroutine check_machine
+
+  !> Impacts beyond the room are left out; contacts are counted from 0 there.
+  subroutine hand_out(samples, report, segments)
+    type(samples_t), intent(in) :: samples
+    type(report_t), intent(in) :: report
+    type(segments_t), intent(inout) :: segments
+    real(c_double), pointer :: motion(:, :), jacobian(:, :, :), impact(:, :)
+    integer(c_int), pointer :: impacts(:), steady(:), reason(:), impact_segment(:)
+    integer :: kept
+    call c_f_pointer(segments%motion, motion, shape(samples%motion))
+    motion = samples%motion
+    if (allocated(samples%slope)) then
+      call c_f_pointer(segments%jacobian, jacobian, shape(samples%slope))
+      jacobian = samples%slope
+    end if
+    call c_f_pointer(segments%impacts, impacts, [segments%segment_count])
+    call c_f_pointer(segments%steady, steady, [segments%segment_count])
+    call c_f_pointer(segments%reason, reason, [segments%segment_count])
+    impacts = report%impacts
+    steady = merge(1, 0, report%steady)
+    reason = report%reason
+    segments%impact_count = size(report%impact_segment)
+    kept = min(segments%impact_count, segments%impact_capacity)
+    call c_f_pointer(segments%impact_segment, impact_segment, [kept])
+    call c_f_pointer(segments%impact, impact, [impact_numbers, kept])
+    impact_segment = report%impact_segment(:kept) - 1
+    impact = report%impact(:, :kept)
+    impact(impact_contact, :) = impact(impact_contact, :) - 1
+  end subroutine hand_out
 
   !> Code 64 beyond the tolerances of an adaptive flight.
   subroutine check_tolerance(tolerance, error)
@@ -138,18 +261,22 @@ contains
     end do
   end subroutine check_directions
 
-  !> Offsets ascend from 0, and times within each segment from 0 on. Code 64.
-  subroutine check_samples(segment_count, first, times, error)
-    integer, intent(in) :: segment_count, first(:)
-    real(wp), intent(in) :: times(*)
+  !> Offsets ascend from 0. Code 64.
+  subroutine check_offsets(first, error)
+    integer(c_int), intent(in) :: first(:)
+    type(error_t), allocatable, intent(out) :: error
+    if (first(1) == 0 .and. all(first(2:) >= first(:size(first) - 1))) return
+    call fail(error, exit_usage, 'first: offsets must ascend from 0')
+  end subroutine check_offsets
+
+  !> Times ascend within each segment from 0 on. Code 64.
+  subroutine check_times(first, times, error)
+    integer(c_int), intent(in) :: first(:)
+    real(wp), intent(in) :: times(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: before
     integer :: i, k
-    if (first(1) /= 0 .or. any(first(2:) < first(:segment_count))) then
-      call fail(error, exit_usage, 'first: offsets must ascend from 0')
-      return
-    end if
-    do i = 1, segment_count
+    do i = 1, size(first) - 1
       before = 0
       do k = first(i) + 1, first(i + 1)
         if (.not. (times(k) >= before .and. times(k) <= huge(before))) then
@@ -160,7 +287,7 @@ contains
         before = times(k)
       end do
     end do
-  end subroutine check_samples
+  end subroutine check_times
 
   !> Samples lie within so many drive periods of `period` [s]. Code 64.
   subroutine check_length(period, times, error)

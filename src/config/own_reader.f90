@@ -6,6 +6,7 @@ module own_reader
   use case_source, only: case_source_t, description, find, know, report
   use case_values, only: take_text
   use composed_units, only: composed_unit_t, read_unit
+  use expression_names, only: has_name
   use kinds, only: wp
   use law_row, only: any_value, unit_length
   use law_table, only: force_family, label_length, law_choice, law_choice_t, law_text_t, own_law, parameter_row_t, &
@@ -66,28 +67,38 @@ contains
       call read_text(source, 'position', .false., choice)
       call read_period(source, choice)
     case default
-      call read_text(source, merge('load ', 'force', has_load(choice)), .true., choice)
+      call read_text(source, trim(force_key(choice)), .true., choice)
     end select
     call read_parameters(source, choice)
-    if (has_load(choice)) call refuse_unnamed(source, choice)
+    if (has_load(choice) .or. choice%family == part_family) call refuse_unnamed(source, choice)
     if (choice%family == state_family .and. all(choice%own%name /= 'start')) call add_own(choice, 'start', '1', 0.0_wp)
   end subroutine read_own_law
 
   !> Whether a law is friction of the catalogue, whose normal force is an expression.
   pure logical function has_load(choice)
     type(law_choice_t), intent(in) :: choice
-    has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%family == part_family
+    has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%name == 'friction:coulomb_load'
   end function has_load
+
+  !> The key of the expression of a force.
+  pure function force_key(choice) result(key)
+    type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: key
+    key = 'force'
+    if (has_load(choice)) key = 'load'
+  end function force_key
 
   !> Beside keys of the catalogue a parameter that no expression names is a misspelt key.
   subroutine refuse_unnamed(source, choice)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: name, path
     integer :: i
     do i = 1, size(choice%own)
-      if (index(text_of(choice, 'load'), trim(choice%own(i)%name)) > 0) cycle
-      call report(source, path_of(choice)//'.'//trim(choice%own(i)%name), 'unknown; allowed keys of the law, and parameters '// &
-                  'that load names')
+      name = trim(choice%own(i)%name)
+      path = path_of(choice)//'.'//name
+      if (has_name(text_of(choice, force_key(choice)), name) .or. has_name(text_of(choice, force_key(choice)), path)) cycle
+      call report(source, path, 'unknown; allowed keys of the law, and parameters that '//trim(force_key(choice))//' contains')
     end do
   end subroutine refuse_unnamed
 

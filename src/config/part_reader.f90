@@ -9,7 +9,7 @@ module part_reader
   use case_values, only: take_text
   use drive_record, only: read_record
   use kinds, only: wp
-  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, parameter_row_t, parameters, &
+  use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, own_law, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, path_of, set_value, value_of
   use part_angles, only: is_of_angle
   use own_reader, only: read_own_law
@@ -203,6 +203,8 @@ contains
       call read_own_law(source, choice)
       if (value_of(choice, 'static_coefficient') < 0) call set_value(choice, 'static_coefficient', &
                                                                       [value_of(choice, 'kinetic_coefficient')])
+    else if (part_law(choice%name) == own_law) then
+      call read_own_law(source, choice)
     else if (kind == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.
       if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then

@@ -3,10 +3,17 @@
 
 #include <stdint.h>
 #include <zlib.h>
+#ifdef SEPARATRIX_ISAL
+#include <isa-l.h>
+#endif
 
 /* CRC-32 (zlib) of `size` bytes that follow those of `previous` (0 at the start). */
 uint32_t separatrix_crc32(uint32_t previous, const void *bytes, int64_t size) {
+#ifdef SEPARATRIX_ISAL
+  return crc32_gzip_refl(previous, bytes, (uint64_t)size);
+#else
   return (uint32_t)crc32_z(previous, bytes, (z_size_t)size);
+#endif
 }
 
 /* CRC-32 of two pieces one after the other, from that of each and the bytes of the second. */

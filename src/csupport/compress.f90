@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Bytes as HDF5's filters `shuffle` and `deflate` store them.
+!> Bytes in the format of HDF5's filters `shuffle` and `deflate`. With ISA-L the compressed bytes may depend on the processor.
 module compress
   use, intrinsic :: iso_c_binding, only: c_int, c_loc
   use bindings, only: c_compress, c_compress_bound, c_shuffle

@@ -5,55 +5,62 @@
 !> directions in the space of the machine's parameters and by the start. A record is compared with them segment by segment, so that
 !> a small error of the model does not grow into another motion.
 module segments
-  use effect_law, only: observed
   use kinds, only: wp
-  use motion, only: advance, advance_period, motion_t, start_state
-  use motion_state, only: event_impact_lower, event_impact_upper, event_separation, event_touch_lower, event_touch_upper, log_t, &
-    state_t, tally_t
-  use segment_flight, only: add_differences, differentiate_sensor, flight_t, grazes, moved_start, start_allowed, untouched
-  use segments_in_lanes, only: fly_base_in_lanes, lane_segments_t, differentiate_in_lanes
-  use status, only: exit_bad_case
-  use variants, only: family_t
-  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use motion_state, only: log_t
+  use segment_machine, only: flown_segment_t, impact_contact, impact_numbers, impact_side, impact_time, not_a_number, &
+    segment_machine_t, speed_before
+  use variants, only: family_t, variant_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   implicit none
   private
 
   public :: propagate
 
-  !> Samples of all segments, one after the other.
+  !> Drive periods of a segment for lanes: their clock starts anew at no section.
+  real(wp), parameter :: most_periods_in_lanes = 8
+
+  !> Samples of all segments, one after the other: number of the sample, sample.
   type, public :: samples_t
-    real(wp), allocatable :: x(:), v(:)
-    !> Derivatives: row = directions, then x, v and crank angle of the start; column = sample.
-    real(wp), allocatable :: x_slope(:, :), v_slope(:, :)
+    real(wp), allocatable :: motion(:, :)
+    !> Derivatives: first directions, then numbers of the start; then as `motion`.
+    real(wp), allocatable :: slope(:, :, :)
   end type samples_t
 
   !> What happened in each segment, and every impact.
   type, public :: report_t
     integer, allocatable :: impacts(:), reason(:)
     logical, allocatable :: steady(:)
-    !> Segment of each impact; rows of `impact`: time since the start of the segment [s], speeds before and after [m/s] (after
-    !> a soft contact: when it ends, not a number if it lasts), +1 upper or -1 lower barrier.
+    !> Segment of each impact, and its numbers (module `segment_machine`) by column.
     integer, allocatable :: impact_segment(:)
     real(wp), allocatable :: impact(:, :)
     !> Segments that flew in lanes with all their neighbours.
     integer :: in_lanes = 0
   end type report_t
 
-  !> A flight in the event loop.
-  type :: run_t
+  !> Segments on their way together: in lanes, or one by one in the event loop.
+  type :: batch_t
+    real(wp), allocatable :: start(:, :), times(:)
+    integer, allocatable :: first(:)
+    logical :: in_lanes = .false.
+    !> Segments of this batch.
+    logical, allocatable :: chosen(:)
     type(log_t) :: log
-    type(tally_t) :: tally
-    type(flight_t) :: flight
-  end type run_t
+  end type batch_t
+
+  !> The neighbours of a batch along one direction: which segments want one, samples without a difference yet, starts and steps.
+  type :: neighbours_t
+    logical, allocatable :: wanted(:), open(:)
+    real(wp), allocatable :: start(:, :), step(:)
+    type(flown_segment_t), allocatable :: flights(:)
+  end type neighbours_t
 
 contains
 
-  !> Flies every segment: `start` = x [m], v [m/s], crank angle [rad] by column, its samples are at
-  !> `times(first(i) + 1:first(i + 1))` [s], ascending from 0. The sensor shows the start at time 0; if it is late, the body
-  !> was there `delay` before, when the crank was that much behind the angle given. A segment that cannot be flown has
-  !> samples that are not numbers and a reason (module `status`; `exit_bad_case`: its start is not finite or beyond a rigid
-  !> barrier). It is steady if its neighbours meet the same barriers in the same order and none is grazed. A segment flies with
-  !> all its neighbours in lanes, or in the event loop, so that they share their errors.
+  !> Flies every segment: its start is a column of `start`, its samples are at `times(first(i) + 1:first(i + 1))` [s], ascending
+  !> from 0. A segment that cannot be flown has samples that are not numbers and a reason (module `status`; `exit_bad_case`: its
+  !> start is not finite or beyond a rigid barrier). It is steady if its neighbours meet the same stops in the same order, none is
+  !> grazed, and every sample has a derivative. A segment flies with all its neighbours in lanes, or in the event loop, so that they
+  !> share their errors.
   pure subroutine propagate(family, start, first, times, derivatives, samples, report)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: start(:, :), times(:)
@@ -61,234 +68,258 @@ contains
     logical, intent(in) :: derivatives
     type(samples_t), intent(out) :: samples
     type(report_t), intent(out) :: report
-    type(lane_segments_t) :: lanes
-    type(run_t) :: base, adaptive, other
-    integer :: i, total
-    allocate (samples%x(size(times)), samples%v(size(times)))
-    if (derivatives) allocate (samples%x_slope(size(family%further) + 3, size(times)), &
-                               samples%v_slope(size(family%further) + 3, size(times)))
-    allocate (report%impacts(size(start, 2)), report%reason(size(start, 2)), report%steady(size(start, 2)))
-    allocate (report%impact_segment(size(start, 2)), report%impact(4, size(start, 2)))
-    call fly_base_in_lanes(family, start, first, times, lanes)
-    if (derivatives .and. any(lanes%flown)) then
-      call differentiate_in_lanes(family, start, first, times, lanes, samples%x_slope, samples%v_slope)
-    end if
-    report%in_lanes = count(lanes%flown)
-    call open_run(base)
-    call open_run(adaptive)
-    call open_run(other)
-    total = 0
-    do i = 1, size(start, 2)
-      associate (from => first(i) + 1, to => first(i + 1))
-        if (lanes%flown(i)) then
-          report%steady(i) = lanes%steady(i)
-          call keep(family, lanes%base(i), i, from, to, total, samples, report)
-          cycle
-        end if
-        call fly(family%moving, start(:, i), times(from:to), base)
-        report%steady(i) = base%flight%reason == 0 .and. .not. (derivatives .and. grazes(family, base%flight))
-        if (derivatives .and. allocated(family%adaptive)) call fly(family%adaptive%moving, start(:, i), times(from:to), adaptive)
-        if (derivatives) call differentiate(family, start(:, i), times(from:to), base%flight, adaptive%flight, other, &
-                                            samples%x_slope(:, from:to), samples%v_slope(:, from:to), report%steady(i))
-        call keep(family, base%flight, i, from, to, total, samples, report)
-      end associate
+    type(flown_segment_t) :: flights(size(start, 2))
+    type(batch_t) :: batch
+    integer :: i, k, all
+    all = size(start, 2)
+    allocate (samples%motion(family%machine%sample_numbers, size(times)))
+    if (derivatives) allocate (samples%slope(size(family%further) + size(start, 1), size(samples%motion, 1), size(times)))
+    allocate (report%steady(all), source=.false.)
+    batch%start = start
+    batch%first = first
+    batch%times = times
+    allocate (batch%chosen(all))
+    do i = 1, all
+      batch%chosen(i) = first(i + 1) == first(i)
+      if (.not. batch%chosen(i)) batch%chosen(i) = times(first(i + 1)) <= most_periods_in_lanes*family%machine%period
     end do
-    report%impact_segment = report%impact_segment(:total)
-    report%impact = report%impact(:, :total)
+    batch%in_lanes = .true.
+    call fly_batch(family, derivatives, batch, flights, samples, report%steady)
+    report%in_lanes = count(batch%chosen)
+    batch%chosen = .not. batch%chosen
+    batch%in_lanes = .false.
+    call fly_batch(family, derivatives, batch, flights, samples, report%steady)
+    report%impacts = flights%count
+    report%reason = flights%reason
+    report%impact_segment = [(spread(i, 1, flights(i)%count), i=1, all)]
+    allocate (report%impact(impact_numbers, size(report%impact_segment)))
+    k = 0
+    do i = 1, all
+      report%impact(:, k + 1:k + flights(i)%count) = flights(i)%impact(:, :flights(i)%count)
+      k = k + flights(i)%count
+    end do
   end subroutine propagate
 
-  !> Puts the flight of a segment into samples and report; `total` impacts are there.
-  pure subroutine keep(family, flight, segment, from, to, total, samples, report)
+  !> Flies the segments of a batch and their neighbours. A segment that lanes leave, or a neighbour of it, is in the batch no more.
+  pure subroutine fly_batch(family, derivatives, batch, flights, samples, steady)
     type(family_t), intent(in) :: family
-    type(flight_t), intent(in) :: flight
-    integer, intent(in) :: segment, from, to
-    integer, intent(inout) :: total
+    logical, intent(in) :: derivatives
+    type(batch_t), intent(inout) :: batch
+    type(flown_segment_t), intent(inout) :: flights(:)
     type(samples_t), intent(inout) :: samples
-    type(report_t), intent(inout) :: report
-    integer :: i
-    samples%x(from:to) = observed(family%moving%machine%sensor, flight%x(:to - from + 1))
-    samples%v(from:to) = flight%v(:to - from + 1)
-    report%impacts(segment) = flight%count
-    report%reason(segment) = flight%reason
-    if (total + flight%count > size(report%impact_segment)) then
-      report%impact_segment = [report%impact_segment, (0, i=1, total + flight%count)]
-      report%impact = reshape(report%impact, [4, size(report%impact_segment)], pad=[0.0_wp])
-    end if
-    report%impact_segment(total + 1:total + flight%count) = segment
-    report%impact(:, total + 1:total + flight%count) = flight%impact(:, :flight%count)
-    total = total + flight%count
-  end subroutine keep
-
-  pure subroutine open_run(run)
-    type(run_t), intent(out) :: run
-    run%log%sample_interval = 1
-    run%log%balance%kept = .false.
-    allocate (run%flight%impact(4, 16), run%flight%x(0), run%flight%v(0))
-  end subroutine open_run
-
-  !> One segment of one machine.
-  pure subroutine fly(moving, start, times, run)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: start(3), times(:)
-    type(run_t), intent(inout) :: run
-    type(state_t) :: state
-    run%tally = tally_t()
-    run%log%origin = 0
-    run%log%events = 0
-    run%log%samples = 0
-    run%log%next_sample = 0
-    associate (flight => run%flight)
-      flight%count = 0
-      flight%reason = 0
-      if (size(flight%x) < size(times)) then
-        deallocate (flight%x, flight%v)
-        allocate (flight%x(size(times)), flight%v(size(times)))
-      end if
-      if (start_allowed(moving, start)) then
-        associate (machine => moving%machine)
-          state = start_state(moving, start(1), start(2), start(3) - machine%drive_frequency*machine%sensor%delay)
-        end associate
-        run%tally%x_max = start(1)
-        run%tally%x_min = start(1)
-        flight%origin = state%time
-        run%log%instants = state%time + times
-        if (size(times) > 0) call fly_to(moving, run%log%instants(size(times)), state, run)
-      else
-        flight%reason = exit_bad_case
-      end if
-      if (flight%reason /= 0) then
-        flight%x = not_a_number()
-        flight%v = flight%x
-      else
-        associate (done => run%log%samples)
-          if (done > 0) flight%x(:done) = run%log%sample_data(2, :done)
-          if (done > 0) flight%v(:done) = run%log%sample_data(3, :done)
-          flight%x(done + 1:size(times)) = state%x
-          flight%v(done + 1:size(times)) = state%v
-        end associate
-      end if
-      flight%grazing_margin = run%tally%grazing_margin
-      flight%x_max = run%tally%x_max
-      flight%x_min = run%tally%x_min
-      call read_impacts(run%log, flight)
-    end associate
-  end subroutine fly
-
-  pure real(wp) function not_a_number()
-    not_a_number = ieee_value(1.0_wp, ieee_quiet_nan)
-  end function not_a_number
-
-  !> Moves to `until` [s on the clock of the log].
-  pure subroutine fly_to(moving, until, state, run)
-    type(motion_t), intent(in) :: moving
-    real(wp), intent(in) :: until
-    type(state_t), intent(inout) :: state
-    type(run_t), intent(inout) :: run
-    do while (until - run%log%origin >= moving%machine%period)
-      call advance_period(moving, state, run%tally, run%flight%reason, run%log)
-      if (run%flight%reason /= 0) return
-      ! Budgets are of one period.
-      run%tally%events = 0
-      run%tally%steps = 0
-    end do
-    call advance(moving, state, until - run%log%origin, run%tally, run%flight%reason, run%log)
-  end subroutine fly_to
-
-  !> Takes the impacts out of the events.
-  pure subroutine read_impacts(log, flight)
-    type(log_t), intent(in) :: log
-    type(flight_t), intent(inout) :: flight
-    real(wp) :: side
-    integer :: i
-    do i = 1, log%events
-      select case (log%event_kind(i))
-      case (event_impact_upper, event_touch_upper)
-        side = 1
-      case (event_impact_lower, event_touch_lower)
-        side = -1
-      case (event_separation)
-        if (flight%count > 0) flight%impact(3, flight%count) = abs(log%event_data(3, i))
-        cycle
-      case default
-        cycle
-      end select
-      if (flight%count == size(flight%impact, 2)) flight%impact = reshape(flight%impact, [4, 2*flight%count], pad=[0.0_wp])
-      flight%count = flight%count + 1
-      associate (event => log%event_data(:, i))
-        flight%impact(:, flight%count) = [event(1) - flight%origin, abs(event(3)), abs(event(4)), side]
-        if (any(log%event_kind(i) == [event_touch_upper, event_touch_lower])) flight%impact(3, flight%count) = not_a_number()
-      end associate
-    end do
-  end subroutine read_impacts
-
-  !> Derivatives of the samples of one segment by differences between its neighbours and itself.
-  pure subroutine differentiate(family, start, times, base, adaptive, other, x_slope, v_slope, steady)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: start(3), times(:)
-    type(flight_t), intent(in) :: base, adaptive
-    type(run_t), intent(inout) :: other
-    real(wp), intent(inout) :: x_slope(:, :), v_slope(:, :)
-    logical, intent(inout) :: steady
-    logical :: open(size(times))
-    integer :: k, row, turn
-    x_slope = merge(0.0_wp, not_a_number(), base%reason == 0)
-    v_slope = x_slope
-    if (base%reason /= 0) return
-    do k = 1, 3
-      open = .true.
-      row = size(family%further) + k
-      do turn = 1, 2
-        call step_start(family, start, k, turn, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
-        if (.not. any(open)) exit
+    logical, intent(inout) :: steady(:)
+    type(flown_segment_t), allocatable :: adaptive(:)
+    logical :: flown(size(flights))
+    integer :: i, row
+    call fly_all(family%machine, batch%start, batch, batch%chosen, flights)
+    if (.not. any(batch%chosen)) return
+    where (batch%chosen) steady = flights%reason == 0
+    if (derivatives) then
+      do i = 1, size(flights)
+        if (.not. batch%chosen(i)) cycle
+        steady(i) = steady(i) .and. .not. grazes(family, flights(i))
+        samples%slope(:, :, batch%first(i) + 1:batch%first(i + 1)) = merge(0.0_wp, not_a_number(), flights(i)%reason == 0)
       end do
-      if (any(open)) steady = .false.
+      allocate (adaptive(size(flights)))
+      flown = batch%chosen .and. .not. batch%in_lanes
+      if (allocated(family%adaptive)) call fly_all(family%adaptive%machine, batch%start, batch, flown, adaptive)
+      do row = 1, size(samples%slope, 1)
+        call differentiate(family, row, batch, flights, adaptive, samples%slope(row, :, :), steady)
+        if (.not. any(batch%chosen)) return
+      end do
+    end if
+    do i = 1, size(flights)
+      if (batch%chosen(i)) call show_segment(family, batch%first(i) + 1, batch%first(i + 1), flights(i), samples)
     end do
-    do row = 1, size(family%further)
-      if (.not. abs(family%further(row)%step) > 0) cycle
-      if (untouched(family%moving, family%further(row), base)) cycle
-      open = .true.
-      if (family%further(row)%leaves_exact) then
-        call step_along(family, row, start, times, adaptive, other, open, x_slope(row, :), v_slope(row, :), steady)
+  end subroutine fly_batch
+
+  !> Flies segments from `start`; those that lanes leave are not `asked` for any more.
+  pure subroutine fly_all(machine, start, batch, asked, flights)
+    class(segment_machine_t), intent(in) :: machine
+    real(wp), intent(in) :: start(:, :)
+    type(batch_t), intent(inout) :: batch
+    logical, intent(inout) :: asked(:)
+    type(flown_segment_t), intent(inout) :: flights(:)
+    integer :: i
+    if (batch%in_lanes) then
+      call machine%fly_in_lanes(start, batch%first, batch%times, asked, flights)
+      return
+    end if
+    do i = 1, size(asked)
+      if (asked(i)) call machine%fly(start(:, i), batch%times(batch%first(i) + 1:batch%first(i + 1)), batch%log, flights(i))
+    end do
+  end subroutine fly_all
+
+  !> Derivatives along one direction, or by one number of the start, by differences between neighbours and the segments.
+  pure subroutine differentiate(family, row, batch, flights, adaptive, slope, steady)
+    type(family_t), intent(in) :: family
+    integer, intent(in) :: row
+    type(batch_t), intent(inout) :: batch
+    type(flown_segment_t), intent(in) :: flights(:), adaptive(:)
+    real(wp), intent(inout) :: slope(:, :)
+    logical, intent(inout) :: steady(:)
+    type(neighbours_t) :: near
+    logical :: concerned(size(flights))
+    integer :: i, k, turn
+    k = row - size(family%further)
+    concerned = flights%reason == 0
+    if (k > 0) then
+      if (.not. family%start_step(k) > 0) return
+      ! A number that need not be given changes nothing.
+      concerned = concerned .and. .not. ieee_is_nan(batch%start(k, :))
+    else
+      if (.not. abs(family%further(row)%step) > 0) return
+      concerned = concerned .and. [(.not. is_untouched(family, family%further(row), flights(i)), i=1, size(flights))]
+    end if
+    near%open = spread(.true., 1, size(batch%times))
+    allocate (near%flights(size(flights)))
+    do turn = 1, 2
+      near%wanted = [(batch%chosen(i) .and. concerned(i) .and. any(near%open(batch%first(i) + 1:batch%first(i + 1))), &
+                      i=1, size(flights))]
+      near%start = batch%start
+      if (k > 0) then
+        call fly_moved(family, k, turn, batch, near)
+        call take_differences(flights, batch, near, slope, steady)
+      else if (turn == 1) then
+        call step_along(family%further(row), batch, flights, adaptive, near, slope, steady)
       else
-        call step_along(family, row, start, times, base, other, open, x_slope(row, :), v_slope(row, :), steady)
+        call step_along(family%back(row), batch, flights, adaptive, near, slope, steady)
       end if
-      if (any(open)) steady = .false.
     end do
-    call differentiate_sensor(family, base, x_slope, v_slope)
+    do i = 1, size(flights)
+      if (.not. (batch%chosen(i) .and. concerned(i))) cycle
+      if (any(near%open(batch%first(i) + 1:batch%first(i + 1)))) steady(i) = .false.
+    end do
   end subroutine differentiate
 
-  !> The difference that a step along direction `k` makes.
-  pure subroutine step_along(family, k, start, times, base, other, open, x_slope, v_slope, steady)
+  !> Whether a variant that differs at the barriers only cannot differ on a motion.
+  pure logical function is_untouched(family, variant, flight)
     type(family_t), intent(in) :: family
-    integer, intent(in) :: k
-    real(wp), intent(in) :: start(3), times(:)
-    type(flight_t), intent(in) :: base
-    type(run_t), intent(inout) :: other
-    logical, intent(inout) :: open(:), steady
-    real(wp), intent(inout) :: x_slope(:), v_slope(:)
-    associate (further => family%further(k), back => family%back(k))
-      call fly(further%moving, start, times, other)
-      call add_differences(base, other%flight, further%step, times, open, x_slope, v_slope, steady)
-      if (.not. any(open) .or. .not. abs(back%step) > 0) return
-      call fly(back%moving, start, times, other)
-      call add_differences(base, other%flight, back%step, times, open, x_slope, v_slope, steady)
-    end associate
+    type(variant_t), intent(in) :: variant
+    type(flown_segment_t), intent(in) :: flight
+    is_untouched = .false.
+    if (variant%contact_only .and. flight%count == 0) is_untouched = family%machine%never_meets(variant%machine, flight)
+  end function is_untouched
+
+  !> Flies neighbours whose starts are a step away in the number `k`, forth (`turn` 1) or back (2), where the barriers allow it.
+  pure subroutine fly_moved(family, k, turn, batch, near)
+    type(family_t), intent(in) :: family
+    integer, intent(in) :: k, turn
+    type(batch_t), intent(inout) :: batch
+    type(neighbours_t), intent(inout) :: near
+    logical :: asked(size(near%wanted))
+    integer :: i, sense
+    near%step = 0*near%start(k, :)
+    do i = 1, size(asked)
+      if (.not. near%wanted(i)) cycle
+      sense = merge(-1, 1, family%is_speed(k) .and. near%start(k, i) < 0)
+      if (turn == 2) sense = -sense
+      near%start(k, i) = batch%start(k, i) + sense*family%start_step(k)
+      near%step(i) = near%start(k, i) - batch%start(k, i)
+      near%wanted(i) = abs(near%step(i)) > 0 .and. family%machine%allows(near%start(:, i))
+    end do
+    asked = near%wanted
+    call fly_all(family%machine, near%start, batch, asked, near%flights)
+    batch%chosen = batch%chosen .and. (asked .or. .not. near%wanted)
+    near%wanted = asked
+  end subroutine fly_moved
+
+  !> The differences that a machine a step along a direction makes.
+  pure subroutine step_along(variant, batch, flights, adaptive, near, slope, steady)
+    type(variant_t), intent(in) :: variant
+    type(batch_t), intent(inout) :: batch
+    type(flown_segment_t), intent(in) :: flights(:), adaptive(:)
+    type(neighbours_t), intent(inout) :: near
+    real(wp), intent(inout) :: slope(:, :)
+    logical, intent(inout) :: steady(:)
+    logical :: asked(size(near%wanted))
+    if (.not. abs(variant%step) > 0) return
+    asked = near%wanted
+    call fly_all(variant%machine, near%start, batch, asked, near%flights)
+    batch%chosen = batch%chosen .and. (asked .or. .not. near%wanted)
+    near%wanted = asked
+    near%step = spread(variant%step, 1, size(asked))
+    if (variant%leaves_exact .and. .not. batch%in_lanes) then
+      call take_differences(adaptive, batch, near, slope, steady)
+    else
+      call take_differences(flights, batch, near, slope, steady)
+    end if
   end subroutine step_along
 
-  !> The difference that a step of the start in coordinate `k`, forth or back, makes, where the barriers allow it.
-  pure subroutine step_start(family, start, k, turn, times, base, other, open, x_slope, v_slope, steady)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: start(3), times(:)
-    integer, intent(in) :: k, turn
-    type(flight_t), intent(in) :: base
-    type(run_t), intent(inout) :: other
+  pure subroutine take_differences(base, batch, near, slope, steady)
+    type(flown_segment_t), intent(in) :: base(:)
+    type(batch_t), intent(in) :: batch
+    type(neighbours_t), intent(inout) :: near
+    real(wp), intent(inout) :: slope(:, :)
+    logical, intent(inout) :: steady(:)
+    integer :: i
+    do i = 1, size(base)
+      if (.not. near%wanted(i)) cycle
+      associate (from => batch%first(i) + 1, to => batch%first(i + 1))
+        call compare(base(i), near%flights(i), near%step(i), batch%times(from:to), near%open(from:to), slope(:, from:to), steady(i))
+      end associate
+    end do
+  end subroutine take_differences
+
+  !> Fills in the differences of a neighbour that is `step` away at the samples that are still open, but for those between an
+  !> impact of the base and the same impact of the neighbour: there a velocity before it would be compared with one after it. A
+  !> neighbour that could not be flown fills in none. Takes the steadiness away if the two do not meet the same stops.
+  pure subroutine compare(base, other, step, times, open, slope, steady)
+    type(flown_segment_t), intent(in) :: base, other
+    real(wp), intent(in) :: step, times(:)
     logical, intent(inout) :: open(:), steady
-    real(wp), intent(inout) :: x_slope(:), v_slope(:)
-    real(wp) :: moved(3)
-    moved = moved_start(family, start, k, turn)
-    if (.not. start_allowed(family%moving, moved) .or. .not. abs(moved(k) - start(k)) > 0) return
-    call fly(family%moving, moved, times, other)
-    call add_differences(base, other%flight, moved(k) - start(k), times, open, x_slope, v_slope, steady)
-  end subroutine step_start
+    real(wp), intent(inout) :: slope(:, :)
+    integer, parameter :: what(2) = [impact_contact, impact_side]
+    logical :: between(size(times))
+    integer :: i
+    if (other%reason /= 0) return
+    if (other%count /= base%count) then
+      steady = .false.
+    else if (any(nint(other%impact(what, :base%count)) /= nint(base%impact(what, :base%count)))) then
+      steady = .false.
+    end if
+    between = between_impacts(base, other, times)
+    do i = 1, size(times)
+      if (open(i) .and. .not. between(i)) slope(:, i) = (other%motion(:, i) - base%motion(:, i))/step
+    end do
+    open = open .and. between
+  end subroutine compare
+
+  !> Which of `times` lie between an impact of the base and the same impact of a neighbour, to rounding.
+  pure function between_impacts(base, other, times) result(between)
+    type(flown_segment_t), intent(in) :: base, other
+    real(wp), intent(in) :: times(:)
+    logical :: between(size(times))
+    real(wp) :: rounding
+    integer :: i
+    between = .false.
+    do i = 1, min(base%count, other%count)
+      associate (here => base%impact(impact_time, i), there => other%impact(impact_time, i))
+        rounding = 32*epsilon(1.0_wp)*(base%origin + here)
+        between = between .or. (times >= min(here, there) - rounding .and. times <= max(here, there) + rounding)
+      end associate
+    end do
+  end function between_impacts
+
+  !> Whether a motion turns round so close to a barrier, or meets one so slowly, that the steps are not small against it.
+  pure logical function grazes(family, flight)
+    type(family_t), intent(in) :: family
+    type(flown_segment_t), intent(in) :: flight
+    grazes = flight%grazing_margin < family%least_clearance .or. &
+             any(flight%impact(speed_before, :flight%count) < family%least_speed)
+  end function grazes
+
+  !> Samples `from` to `to` of a segment as sensors show them.
+  pure subroutine show_segment(family, from, to, flight, samples)
+    type(family_t), intent(in) :: family
+    integer, intent(in) :: from, to
+    type(flown_segment_t), intent(in) :: flight
+    type(samples_t), intent(inout) :: samples
+    if (allocated(samples%slope) .and. flight%reason == 0) then
+      call family%machine%show(flight, samples%motion(:, from:to), family%of_sensor, samples%slope(:, :, from:to))
+    else
+      call family%machine%show(flight, samples%motion(:, from:to))
+    end if
+  end subroutine show_segment
 
 end module segments

@@ -8,22 +8,23 @@
 !> tolerance that neighbours do not share.
 module variants
   use body_machine, only: body_machine_t
+  use body_segments, only: segments_of_body, sensor_paths
   use build_motion, only: bodies_of, body_of, has_several
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
   use machine_type, only: machine_t, scales_t
-  use motion, only: motion_t
   use motion_state, only: flight_adaptive, options_t
   use motor_choices, only: has_motor
   use motor_machine, only: motor_machine_t, prepare_motor_machine
-  use motor_motion, only: motor_motion_t
+  use motor_segments, only: segments_of_motor
   use multibody_machine, only: multibody_machine_t
-  use multibody_motion, only: multibody_motion_t
   use natural_scale, only: natural_size
   use parameter_list, only: parameter_t, put_values
+  use segment_machine, only: segment_machine_t
   use status, only: exit_bad_case
+  use structure_segments, only: segments_of_structure
   implicit none
   private
 
@@ -42,22 +43,9 @@ module variants
   !> not pay for following it.
   integer(int64), parameter :: most_a_period = 20000, most_a_sample = 32
 
-  !> Parameters of the sensor: derivatives by them follow from the samples and from those by the crank angle, and need no
-  !> machine.
-  integer, parameter, public :: sensor_bias = 1, sensor_gain = 2, sensor_delay = 3
-  character(len=*), parameter :: sensor_paths(3) = [character(len=25) :: &
-    'effect.sensor_bias.bias', 'effect.sensor_gain.gain', 'effect.sensor_delay.delay']
-
-  !> A machine of which segments are flown: one body, several, or one with a motor.
+  !> A machine of which segments are flown.
   type, public :: flown_t
-    type(motion_t) :: moving
-    type(multibody_motion_t), allocatable :: bodies
-    type(motor_motion_t), allocatable :: driven
-    type(scales_t) :: sizes
-    !> Drive period, or turn of a motor without load [s].
-    real(wp) :: period = 0
-    !> No mode is flown adaptively.
-    logical :: closed_form = .false.
+    class(segment_machine_t), allocatable :: machine
   end type flown_t
 
   !> A machine that is a step away.
@@ -78,8 +66,9 @@ module variants
     type(variant_t), allocatable :: further(:), back(:)
     !> Components of the directions along bias, gain and delay of the sensor, by column.
     real(wp), allocatable :: of_sensor(:, :)
-    !> Steps of positions [m], velocities [m/s] and crank angle [rad] of a start.
-    real(wp) :: start_step(3) = 0
+    !> Steps of the numbers of a start; those that are speeds are first made larger.
+    real(wp), allocatable :: start_step(:)
+    logical, allocatable :: is_speed(:)
     !> Distance to a barrier [m] and speed of an impact [m/s] below which a motion grazes: there a step changes the speed of
     !> the impact by more than a hundredth.
     real(wp) :: least_clearance = 0, least_speed = 0
@@ -99,7 +88,7 @@ contains
   !> Builds the machine of `laws` with `values` in the parameters `chosen`, and if `derivatives` its neighbours: column j of
   !> `directions` is direction j, its change of each chosen parameter (in the unit of that) per unit of the way along it.
   !> Code 65 if a machine cannot be built.
-  pure subroutine prepare_family(laws, options, chosen, values, directions, derivatives, family, error)
+  subroutine prepare_family(laws, options, chosen, values, directions, derivatives, family, error)
     type(law_choice_t), intent(in) :: laws(:)
     type(options_t), intent(in) :: options
     type(parameter_t), intent(in) :: chosen(:)
@@ -108,16 +97,18 @@ contains
     type(family_t), intent(out) :: family
     type(error_t), allocatable, intent(out) :: error
     type(plan_t) :: plan
-    real(wp) :: share
+    real(wp) :: share, unit(3)
     integer :: i, at
     plan = plan_t(laws, options, chosen, values, directions)
     call build(plan, values, .false., family%flown_t, error)
     if (allocated(error)) return
     if (.not. derivatives) return
-    plan%scales = family%sizes
-    share = share_of(options, family%closed_form)
-    family%start_step = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
-    family%least_clearance = 10*family%start_step(1)
+    plan%scales = family%machine%sizes
+    share = share_of(options, family%machine%closed_form)
+    unit = share*[plan%scales%length, plan%scales%length/plan%scales%time, 1.0_wp]
+    allocate (family%start_step(family%machine%start_numbers), family%is_speed(family%machine%start_numbers))
+    call family%machine%set_steps(unit, family%start_step, family%is_speed)
+    family%least_clearance = 10*unit(1)
     family%least_speed = 10*sqrt(share)*plan%scales%length/plan%scales%time
     allocate (family%further(size(directions, 2)), family%back(size(directions, 2)))
     allocate (family%of_sensor(size(sensor_paths), size(directions, 2)), source=0.0_wp)
@@ -129,9 +120,9 @@ contains
     end do
     do i = 1, size(directions, 2)
       if (.not. any(abs(plan%directions(:, i)) > 0)) cycle
-      call build_neighbours(plan, i, family%closed_form, family%further(i), family%back(i), error)
+      call build_neighbours(plan, i, family%machine%closed_form, family%further(i), family%back(i), error)
       if (allocated(error)) return
-      if (.not. family%further(i)%leaves_exact .or. allocated(family%adaptive)) cycle
+      if (.not. (family%further(i)%leaves_exact .or. family%back(i)%leaves_exact) .or. allocated(family%adaptive)) cycle
       allocate (family%adaptive)
       call build(plan, values, .true., family%adaptive, error)
       if (allocated(error)) return
@@ -145,11 +136,11 @@ contains
     share = sqrt(merge(exact_error, max(exact_error, uncommon*options%tolerance), exact))
   end function share_of
 
-  pure subroutine build(plan, values, adaptive, flown, error)
+  subroutine build(plan, values, adaptive, flown, error)
     type(plan_t), intent(in) :: plan
     real(wp), intent(in) :: values(:)
     logical, intent(in) :: adaptive
-    type(flown_t), intent(out) :: flown
+    type(flown_t), intent(inout) :: flown
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t) :: changed(size(plan%laws))
     type(options_t) :: options
@@ -160,40 +151,46 @@ contains
     call put_values(changed, plan%chosen, values)
     options = plan%options
     if (adaptive) options%flight = flight_adaptive
+    if (allocated(flown%machine)) deallocate (flown%machine)
     if (has_motor(changed)) then
       call prepare_motor_machine(changed, options, driven, error)
       if (allocated(error)) return
-      call take_facts(driven, flown)
-      flown%driven = driven%motor
+      call limit(driven)
+      allocate (flown%machine, source=segments_of_motor(driven))
+      call take_facts(driven, flown%machine)
     else if (has_several(changed)) then
       call bodies_of(changed, options, several, error)
       if (allocated(error)) return
-      call take_facts(several, flown)
-      flown%bodies = several%bodies
+      call limit(several)
+      allocate (flown%machine, source=segments_of_structure(several))
+      call take_facts(several, flown%machine)
     else
       call body_of(changed, options, body, error)
       if (allocated(error)) return
-      call take_facts(body, flown)
-      flown%moving = body%body
-      ! Samples within the Stribeck layer need the adaptive flight anyhow.
-      flown%moving%transit%available = .false.
+      call limit(body)
+      allocate (flown%machine, source=segments_of_body(body))
+      call take_facts(body, flown%machine)
     end if
   end subroutine build
 
-  !> Limits the budgets of a machine and takes over its facts.
-  pure subroutine take_facts(machine, flown)
+  !> Limits the budgets of a machine.
+  subroutine limit(machine)
     class(machine_t), intent(inout) :: machine
-    type(flown_t), intent(inout) :: flown
     integer(int64) :: budget
     budget = most_a_period + most_a_sample*machine%force_samples
     call machine%limit_budgets(budget, budget)
-    flown%sizes = machine%sizes
-    flown%period = machine%period
-    flown%closed_form = machine%closed_form
+  end subroutine limit
+
+  subroutine take_facts(machine, segments)
+    class(machine_t), intent(in) :: machine
+    class(segment_machine_t), intent(inout) :: segments
+    segments%sizes = machine%sizes
+    segments%period = machine%period
+    segments%closed_form = machine%closed_form
   end subroutine take_facts
 
   !> The neighbours along direction `which`. If the first cannot be built, the other replaces it.
-  pure subroutine build_neighbours(plan, which, exact, further, back, error)
+  subroutine build_neighbours(plan, which, exact, further, back, error)
     type(plan_t), intent(in) :: plan
     integer, intent(in) :: which
     logical, intent(in) :: exact
@@ -209,7 +206,7 @@ contains
     back%step = 0
   end subroutine build_neighbours
 
-  pure subroutine build_variant(plan, which, sense, exact, variant, error)
+  subroutine build_variant(plan, which, sense, exact, variant, error)
     type(plan_t), intent(in) :: plan
     integer, intent(in) :: which, sense
     logical, intent(in) :: exact
@@ -217,7 +214,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     call take_step(plan, which, sense, share_of(plan%options, exact), .false., variant, error)
     if (allocated(error)) return
-    if (exact .and. .not. variant%closed_form) then
+    if (exact .and. .not. variant%machine%closed_form) then
       variant%leaves_exact = .true.
       call take_step(plan, which, sense, share_of(plan%options, .false.), .true., variant, error)
     end if
@@ -233,7 +230,7 @@ contains
     if (index(path, effect) == 1) of_contact = acts_at_barrier(path(len(effect) + 1:last))
   end function of_contact
 
-  pure subroutine take_step(plan, which, sense, share, adaptive, variant, error)
+  subroutine take_step(plan, which, sense, share, adaptive, variant, error)
     type(plan_t), intent(in) :: plan
     integer, intent(in) :: which, sense
     real(wp), intent(in) :: share

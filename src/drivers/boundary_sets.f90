@@ -3,7 +3,7 @@
 
 !> The stable and unstable sets of the saddles of a plane, side by side on the ranks.
 module boundary_sets
-  use body_family, only: body_neighbourhood, family_t
+  use body_family, only: family_t
   use boundary_names, only: names_t
   use boundary_search, only: plane_t
   use checkpoint, only: checkpoint_t
@@ -11,6 +11,7 @@ module boundary_sets
   use grid, only: grid_t, point_slice, slice_laws
   use invariant_sets, only: grow_set, set_t
   use kinds, only: int64, wp
+  use machine_family, only: machine_neighbourhood
   use one_body, only: one_body_t
   use saddle_search, only: saddle_t
   use session, only: session_t
@@ -50,7 +51,7 @@ contains
     if (length == 0) return
     family%laws = slice_laws(grid, point_slice(grid, plane%index))
     family%options = grid%options
-    call body_neighbourhood(family, 0.0_wp, machines, error)
+    call machine_neighbourhood(family, 0.0_wp, machines, error)
     if (allocated(error)) return
     chosen = most_reached(names%reached)
     call session%journal%begin('sides of stable and unstable sets', int(4*size(chosen), int64), 0_int64)

@@ -4,7 +4,7 @@
 !> Homoclinic contacts and boundary crises among the labelled points of the branches.
 module branch_contacts
   use branch_point, only: label_crisis, label_homoclinic, point_t
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use errors, only: error_t
   use homoclinic, only: contact_t, find_contacts, starts_that_stay
   use journal, only: json_number, json_text

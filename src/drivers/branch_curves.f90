@@ -5,7 +5,7 @@
 module branch_curves
   use bifurcation_curve, only: can_be_followed, curve_t, passes, trace_curve
   use branch_point, only: label_names, last_label, no_label, point_t
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use branches_setup, only: read_end
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names, parameter_value
   use case_type, only: case_t

@@ -4,7 +4,7 @@
 !> The equilibria of `separatrix branches`: what is reported of them, and what the file has.
 module branch_equilibria
   use branch_point, only: label_closed, label_names, last_label, no_label
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use equilibrium, only: count_unstable, equilibrium_t
   use errors, only: error_t
   use multibody, only: is_stop

@@ -3,7 +3,7 @@
 
 !> Where dry friction holds joints at rest: what `separatrix branches` reports of it, and what the file has.
 module branch_rest
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_schema, only: name_length, schema_t, type_float64

@@ -3,7 +3,7 @@
 
 !> Reports the progress of a search for branches to the log.
 module branch_watch
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use journal, only: journal_t, json_number
   use kinds, only: int64, wp
   use search_watch, only: search_watch_t
@@ -38,7 +38,10 @@ contains
 
   subroutine report_start(self)
     class(branch_watch_t), intent(inout) :: self
-    self%tried = self%tried + 1
+    integer(int64) :: total
+    ! The other ranks are at work on as many.
+    total = 2_int64*size(self%search%values)*size(self%search%starts, 2)
+    self%tried = min(total, self%tried + self%search%workers%count())
     call self%journal%progress(self%tried)
   end subroutine report_start
 

@@ -10,7 +10,10 @@ module branches_driver
                           no_label, point_t
   use branch_rest, only: describe_rest, find_rest, report_rest, rest_at_t
   use branch_watch, only: branch_watch_t
-  use branch_search, only: follow_seeds, prepare_search, search_t, search_value
+  use branch_search, only: follow_seeds, prepare_search
+  use search_jobs, only: dismiss, search_values, serve
+  use search_state, only: search_t
+  use search_team, only: search_team_t
   use branches_setup, only: set_range, set_starts
   use case_setup, only: output_path
   use case_values, only: bounds_t
@@ -48,6 +51,7 @@ contains
     type(session_t), target :: session
     type(search_t), target :: search
     type(branch_watch_t), target :: watch
+    type(search_team_t), target :: workers
     type(curves_t) :: curves
     type(contacts_t) :: contacts
     type(rest_at_t), allocatable :: rest(:)
@@ -55,7 +59,6 @@ contains
     type(bounds_t) :: bounds
     type(error_t), allocatable :: error
     character(len=:), allocatable :: path
-    integer :: i
     call open_session(command, session)
     path = output_path(command%output, command%path, command%name)
     call set_range(command, session%the_case, search, bounds, error)
@@ -73,13 +76,13 @@ contains
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.false.)
-    ! One process is enough: the others wait at its end.
+    workers%team => session%team
+    search%workers => workers
     if (session%team%is_root()) then
       call watch%begin(session%journal, search)
-      do i = 1, size(search%values)
-        call search_value(search, i)
-      end do
+      call search_values(search)
       call follow_seeds(search)
+      call dismiss(search)
       if (command%contacts) call look_for_contacts(session, search, contacts)
       if (curves%wanted) call follow_labels(search, curves)
       call report(session, search, contacts, trim(bounds%unit))
@@ -87,6 +90,8 @@ contains
       call find_rest(search, rest)
       call report_rest(session, rest, search%family%path, trim(bounds%unit))
       call report_curves(session, search, curves)
+    else
+      call serve(search)
     end if
     if (session%team%is_root()) then
       if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, merge(exit_given_up, &

@@ -3,7 +3,7 @@
 
 !> What `separatrix branches` searches: the range of the parameter, and the starts.
 module branches_setup
-  use branch_search, only: search_t
+  use search_state, only: search_t
   use case_parameters, only: canonical_name, is_start, parameter_bounds, parameter_names
   use case_setup, only: options_of
   use case_type, only: case_t

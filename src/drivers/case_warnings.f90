@@ -77,8 +77,9 @@ contains
     real(wp) :: torque
     logical :: remains
     call cannot_start(the_case%laws, torque, remains)
-    if (remains) call journal%line('warning', 'warning: the motor cannot start: at standstill its torque is '//to_text(torque)// &
-      ' N m, motor.bearing_friction = '//to_text(parameter_value(the_case%laws, 'motor.bearing_friction', 0.0_wp))//' N m')
+    if (remains) call journal%line('warning', 'warning: the motor cannot start: its torque at standstill is at most '// &
+      to_text(torque)//' N m, motor.bearing_friction = '// &
+      to_text(parameter_value(the_case%laws, 'motor.bearing_friction', 0.0_wp))//' N m')
   end subroutine warn_about_standstill
 
   !> Warns of parameters that change nothing.
@@ -106,7 +107,7 @@ contains
     do i = 1, size(machine%impulses)
       if (machine%impulses(i)%time <= the_case%run%duration) cycle
       call journal%line('warning', 'warning: the impulse at '//to_text(machine%impulses(i)%time)//' s is after the end, '// &
-        'run.duration = '//to_text(the_case%run%duration)//' s: it does not fall')
+        'run.duration = '//to_text(the_case%run%duration)//' s: it does not act')
     end do
   end subroutine warn_about_impulses
 
@@ -188,7 +189,7 @@ contains
     lasts = the_case%integrator%step_budget/rate
     if (lasts >= the_case%run%duration) return
     call journal%line('warning', 'warning: this barrier is so stiff that integrator.step_budget = '// &
-      to_text(the_case%integrator%step_budget)//' lasts a body that leans on it about '//to_text(lasts, 2)//' s of '// &
+      to_text(the_case%integrator%step_budget)//' suffices a body that rests against it for about '//to_text(lasts, 2)//' s of '// &
       to_text(the_case%run%duration)//' s; it then ends as step_budget. A softer barrier, or a rigid one '// &
       '(contact.law = "newton"), is faster')
   end subroutine warn_about_steps

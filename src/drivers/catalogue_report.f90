@@ -7,7 +7,7 @@ module catalogue_report
   use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_family, kind_not_known, regime_names
   use basin, only: catalogue_t
   use build_motion, only: machine_of
-  use crank_summary, only: crank_outcomes, crank_summary_t
+  use crank_summary, only: crank_outcomes, crank_stalled, crank_summary_t
   use crank_turns, only: summarize_attractor
   use errors, only: error_t
   use journal, only: journal_t
@@ -103,8 +103,12 @@ contains
     character(len=:), allocatable :: text
     type(crank_summary_t) :: crank
     text = ''
-    if (.not. allocated(machine) .or. attractor%kind /= kind_cycle) return
+    if (.not. allocated(machine) .or. .not. (attractor%kind == kind_cycle .or. attractor%rests)) return
     call summarize_attractor(machine, attractor, crank)
+    if (crank%outcome == crank_stalled) then
+      text = ', crank stalled at '//to_text(attractor%section(3), 5)//' rad'
+      return
+    end if
     text = ', crank speed '//to_text(crank%speed, 6)//' rad/s'
     if (resonance_of(laws) > 0) text = text//', '//to_text(crank%speed/resonance_of(laws), 4)//' times the natural frequency'
     text = text//': '//trim(crank_outcomes(crank%outcome))

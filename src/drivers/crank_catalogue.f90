@@ -4,7 +4,8 @@
 !> What the crank of a motor does on each cycle of the catalogues of a map: columns of the catalogue in its file.
 module crank_catalogue
   use basin, only: catalogue_t
-  use crank_summary, only: crank_numbers, crank_outcomes, crank_summary_t, crank_table, crank_values, last_crank_outcome
+  use crank_summary, only: crank_numbers, crank_outcomes, crank_summary_t, crank_table, crank_values, last_crank_outcome, &
+    no_summary
   use crank_turns, only: summarize_attractor
   use errors, only: error_t
   use grid, only: grid_t, slice_motion
@@ -32,6 +33,8 @@ contains
     if (.not. has_motor(grid%laws)) return
     call summarize_entries(team, grid, catalogues, values)
     if (size(values, 2) == 0) return
+    call schema%add_variable('crank_angle', type_float64, ['entry'], units='rad', group='catalogue', data=angles_of(catalogues), &
+                             long_name='angle of the crank at the section, or where it is at rest')
     call schema%add_variable('crank_outcome', type_int8, ['entry'], units='1', group='catalogue', data=values(1, :), &
                              long_name='outcome of a run-up of the crank', flag_values=[(i, i=0, last_crank_outcome)], &
                              flag_meanings=join(crank_outcomes, ' '))
@@ -40,6 +43,17 @@ contains
                                long_name=trim(crank_table(i)%meaning), data=values(1 + i, :), group='catalogue')
     end do
   end subroutine add_crank_catalogue
+
+  !> Angle of the crank of every entry, slice after slice.
+  pure function angles_of(catalogues) result(angles)
+    type(catalogue_t), intent(in) :: catalogues(:)
+    real(wp), allocatable :: angles(:)
+    integer :: i
+    allocate (angles(0))
+    do i = 1, size(catalogues)
+      angles = [angles, catalogues(i)%attractors%section(3)]
+    end do
+  end function angles_of
 
   !> Outcome and numbers of every entry (columns), slice after slice.
   subroutine summarize_entries(team, grid, catalogues, values)
@@ -64,7 +78,8 @@ contains
       end do
     end do
     call team%allgather(mine, gathered)
-    allocate (values(1 + crank_numbers, entry), source=0.0_wp)
+    ! What no rank could summarise is not known.
+    values = spread([0.0_wp, crank_values(no_summary())], 2, entry)
     do i = 1, size(gathered), 2 + crank_numbers
       values(:, nint(gathered(i))) = gathered(i + 1:i + 1 + crank_numbers)
     end do

@@ -6,6 +6,7 @@
 !> Powers bind strongest and from the right, then signs (-x^2 is -(x^2)), products, sums. `if(a < b, c, d)` has branches.
 module expression_text
   use errors, only: error_t, fail
+  use expression_names, only: letters, name_letters
   use kinds, only: wp
   use operations, only: op_add, op_divide, op_multiply, op_negative, op_subtract
   use status, only: exit_bad_case
@@ -22,8 +23,7 @@ module expression_text
   !> Most parentheses, functions and exponents within each other, and characters of a text.
   integer, parameter, public :: deepest = 100, longest_text = 100000
   integer, parameter :: longest_name = 64, most_arguments = 16
-  character(len=*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ', &
-    name_letters = letters//'0123456789_.', blanks = ' '//achar(9)//achar(10)//achar(13)
+  character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
   real(wp), parameter :: pi = 3.14159265358979323846264338327950288_wp
 
   type :: reader_t

@@ -5,13 +5,14 @@
 module tape_value
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds, only: wp
-  use operations, only: op_constant, op_parameter, op_select, op_variable, operate, operation_table
+  use operations, only: op_add, op_constant, op_divide, op_multiply, op_negative, op_parameter, op_select, op_subtract, &
+    op_variable, operate, operation_table
   use tape, only: node_t, tape_t
   use text, only: to_text
   implicit none
   private
 
-  public :: evaluate, fault_text, starting_branches
+  public :: evaluate, fault_text, sizes_of_nodes, starting_branches
 
 contains
 
@@ -105,6 +106,31 @@ contains
       branch_value = 0.5_wp*(value(node%second) + value(node%third))
     end if
   end subroutine take_branch
+
+  !> Sizes of what the nodes are sums of, for their rounding.
+  pure function sizes_of_nodes(tape, value) result(sizes)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: value(:)
+    real(wp) :: sizes(tape%count)
+    integer :: i
+    do i = 1, tape%count
+      sizes(i) = abs(value(i))
+      associate (a => tape%nodes(i)%first, b => tape%nodes(i)%second, c => tape%nodes(i)%third)
+        select case (tape%nodes(i)%operation)
+        case (op_add, op_subtract)
+          sizes(i) = sizes(a) + sizes(b)
+        case (op_negative)
+          sizes(i) = sizes(a)
+        case (op_multiply)
+          sizes(i) = abs(value(a))*sizes(b) + sizes(a)*abs(value(b))
+        case (op_divide)
+          if (abs(value(b)) > 0) sizes(i) = (sizes(a) + abs(value(i))*sizes(b))/abs(value(b))
+        case (op_select)
+          sizes(i) = max(sizes(b), sizes(c))
+        end select
+      end associate
+    end do
+  end function sizes_of_nodes
 
   !> The branch of each switching function at a point, 1 or -1; 0 where its argument is zero or not defined.
   pure subroutine starting_branches(tape, variables, parameters, branches)

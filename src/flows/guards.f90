@@ -5,8 +5,8 @@
 !> of one form, constant + position s + speed u + force lambda of a joint.
 module guards
   use contact_law, only: contact_kelvin_voigt
-  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, most_joints, most_load_switches, &
-    multibody_t
+  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, joint_spring, most_joints, &
+    most_load_switches, multibody_t
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
@@ -89,6 +89,8 @@ contains
           end if
         case (joint_soft)
           call soft_guards(machine, state, j, list, count_guards)
+        case (joint_spring)
+          if (allocated(joint%load)) call switch_guards(machine, j, list, count_guards)
         case (joint_section)
           if (phase /= 0) call put(list, count_guards, joint_guard_t(j, turns_round, speed=d, from_zero=changed))
         end select

@@ -8,7 +8,7 @@ module marched_load
   use kinds, only: wp
   use multibody, only: joint_t, load_t, multibody_t, wave_t
   use multibody_state, only: load_branches, load_variables, multibody_state_t
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate, sizes_of_nodes
   implicit none
   private
 
@@ -25,6 +25,8 @@ module marched_load
     integer, allocatable :: phase(:)
     real(wp), allocatable :: touch_speed(:)
     real(wp) :: frequency = 0
+    !> Time of the section, where the time is counted from the start [s].
+    real(wp) :: clock = 0
   end type marched_load_t
 
 contains
@@ -38,6 +40,7 @@ contains
     integer :: i
     marched%load = machine%joints(j)%load
     marched%frequency = machine%frequency
+    if (marched%load%by_clock) marched%clock = state%clock
     associate (sources => marched%load%sources)
       allocate (marched%position(size_of_rows, size(sources)), marched%speed(size_of_rows, size(sources)), source=0.0_wp)
       allocate (marched%contacts(size(sources)), marched%phase(size(sources)), marched%touch_speed(size(sources)))
@@ -99,7 +102,7 @@ contains
     real(wp) :: variables(size(marched%load%rates)), force
     integer :: i
     variables = 0
-    variables(:2) = [time, marched%frequency*time]
+    variables(:2) = [marched%clock + time, marched%frequency*time]
     do i = 1, size(marched%load%sources)
       associate (motion => variables(4*i - 1:4*i))
         motion = [sum(marched%position(:, i)*z), sum(marched%speed(:, i)*z)]
@@ -138,12 +141,13 @@ contains
     type(marched_load_t), intent(in) :: marched
     integer, intent(in) :: number
     real(wp), intent(in) :: time, z(:)
-    real(wp) :: value(marched%load%tape%count)
+    real(wp), dimension(marched%load%tape%count) :: value, sizes
     integer :: fault(marched%load%tape%count)
     call values_at(marched, time, z, value, fault)
+    sizes = sizes_of_nodes(marched%load%tape, value)
     associate (argument => marched%load%tape%switches(number)%argument)
       associate (node => marched%load%tape%nodes(argument))
-        total = maxval(abs(value([argument, max(node%first, 1), max(node%second, 1)])))
+        total = max(sizes(argument), maxval(abs(value([argument, max(node%first, 1), max(node%second, 1)]))))
       end associate
     end associate
   end function sizes_of_switch

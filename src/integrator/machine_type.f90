@@ -103,6 +103,7 @@ module machine_type
     procedure(samples_interface), deferred :: contact_forces
     procedure(samples_interface), deferred :: kinetic_energies
     procedure :: rests_at_end
+    procedure :: bound_to_rest
     procedure(fact_of_machine), deferred :: has_mode
     procedure :: driver
     procedure :: contacts_in_row
@@ -333,6 +334,13 @@ contains
     type(log_t), intent(in) :: log
     rests = .false.
   end function rests_at_end
+
+  !> Whether a motion that comes to no section is at rest or will be, for good.
+  pure logical function bound_to_rest(self, section) result(rests)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    rests = .false.
+  end function bound_to_rest
 
   !> Position and velocity of the driving body of two [m, m/s], zeros without one.
   pure function driver(self, section) result(motion)

@@ -16,6 +16,7 @@ module motor_machine
   use motor_equations, only: foot_half_range
   use motor_log, only: add_sample, motor_energy
   use motor_motion, only: advance_motor, motor_motion_t, prepare_motor, start_motor
+  use held_crank, only: held_for_good
   use motor_system, only: y_at
   use section_size, only: most_coordinates
   use status, only: reason_time_over
@@ -39,6 +40,7 @@ module motor_machine
     procedure :: section_obstacle
     procedure :: start
     procedure :: allows
+    procedure :: bound_to_rest
     procedure :: resume
     procedure :: state_at
     procedure :: point_of
@@ -86,7 +88,8 @@ contains
       machine%drive_frequency = system%no_load_speed
       machine%period = two_pi/system%no_load_speed
       machine%has_drive_period = .true.
-      machine%rest_lasts = .false.
+      ! The force on a body at rest then depends on the angle alone.
+      machine%rest_lasts = .not. (system%moment > 0 .or. system%control%has_own .or. system%control%supply > 0)
       machine%stops = system%contact
       machine%lower = system%contact%lower
       machine%upper = system%contact%upper
@@ -137,6 +140,13 @@ contains
     real(wp), intent(in) :: values(:)
     allowed = .not. beyond_barrier(self%motor%system%contact, values(1))
   end function allows
+
+  !> Whether the bearing holds the crank for good.
+  pure logical function bound_to_rest(self, section) result(rests)
+    class(motor_machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    rests = held_for_good(self%motor%system, section%state, section%motor)
+  end function bound_to_rest
 
   pure function resume(self, before, angle) result(section)
     class(motor_machine_t), intent(in) :: self

@@ -128,7 +128,8 @@ contains
       text = 'the section has '//to_text(coordinates_of_multibody(self%bodies))//' coordinates, more than '// &
              to_text(most_coordinates)
       if (acts_on_time(machine)) text = &
-        'with impulses, or samples of a controller, the state at crank angle 0 does not determine what follows'
+        'with impulses, samples of a controller or forces of the time since the start, the state at crank angle 0 does not '// &
+        'determine what follows'
       if (self%has_driver) text = 'with '//trim(merge('body.impulse     ', 'drive.sample_time', allocated(machine%impulses)))// &
                                   ' the state at crank angle 0 does not determine what follows'
     end associate

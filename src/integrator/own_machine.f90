@@ -102,7 +102,7 @@ contains
       machine%undriven = .not. system%period > 0 .and. .not. system%aperiodic
       machine%has_clock = .not. machine%undriven
       machine%has_section = .not. system%aperiodic
-      machine%rest_lasts = .false.
+      machine%rest_lasts = .not. system%aperiodic .and. size(machine%starts) == 0
       machine%stops = system%contact
       machine%lower = system%contact%lower
       machine%upper = system%contact%upper

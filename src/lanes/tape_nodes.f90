@@ -98,7 +98,8 @@ contains
     terms = terms + size(sum%nodes)
   end subroutine set_sum
 
-  !> The nodes that may change more than their series shows: quotients, and functions that are nearly constant far away.
+  !> The nodes that may change more than their series shows: quotients, roots, powers and logarithms, whose divisor or argument may
+  !> come near zero, and functions that are nearly constant far away.
   pure subroutine set_checks(body, is_used, number, series, kept, machine, fits)
     type(tape_body_t), intent(in) :: body
     logical, intent(in) :: is_used(:)
@@ -107,18 +108,20 @@ contains
     type(tape_machine_t), intent(inout) :: machine
     logical, intent(inout) :: fits
     integer :: i, argument
+    logical :: flattens
     do i = 1, body%tape%count
       associate (node => body%tape%nodes(i))
         if (.not. is_used(i) .or. node%is_steady) cycle
-        if (all(node%operation /= [op_divide, op_exp, op_tanh])) cycle
+        flattens = any(node%operation == [op_exp, op_tanh, op_atan])
+        if (.not. flattens .and. all(node%operation /= [op_divide, op_sqrt, op_power, op_log])) cycle
         argument = merge(node%second, node%first, node%operation == op_divide)
         if (body%tape%nodes(argument)%is_steady) cycle
         fits = fits .and. machine%checks < most_tape_checks
         if (.not. fits) return
         call keep(series(argument), kept)
-        call keep(series(i), kept)
+        if (flattens) call keep(series(i), kept)
         machine%checks = machine%checks + 1
-        machine%check(machine%checks) = lane_check_t(number(i), series(argument), series(i))
+        machine%check(machine%checks) = lane_check_t(number(i), series(argument), merge(series(i), -1, flattens))
       end associate
     end do
   end subroutine set_checks

@@ -45,7 +45,7 @@ contains
     where (body%tape%nodes(:body%tape%count)%operation == op_variable) is_used = .true.
     summed = body
     call find_sums(summed%tape, wanted, is_used, sums, sum_of)
-    if (count(is_used) > most_tape_nodes) return
+    if (summed%tape%is_full .or. count(is_used) > most_tape_nodes) return
     allocate (flow%tape)
     call set_constants(body, flow%tape)
     call set_nodes(summed, is_used, sums, sum_of, flow%tape, flow%available)

@@ -188,18 +188,20 @@ inline vec change_of(const vec *c, vec length) {
 
 // Where a function has values, over the range of its argument in the step, that its series does not show: the
 // series of a function that is nearly constant here knows nothing of a change nearby. A divisor must not lose
-// most of its size.
+// most of its size, nor must the argument of a root, a power or a logarithm: far from a corner that these
+// round, they are a straight line.
 [[gnu::noinline]] inline mask hides_change(const tape_machine &m, vec length, const tape_group &g) {
   mask hides = {};
   for (int i = 0; i < m.checks; i++) {
     const tape_check &check = m.check[i];
     const tape_node &n = m.node[check.node];
     vec room = change_of(g.t.of[check.argument], length);
-    if (n.operation == tape_divide) {
-      hides = hides | ~(room <= most_lost * magnitude(g.t.first[n.second]));
+    const vec &at = g.t.first[n.operation == tape_divide ? n.second : n.first];
+    if (check.own < 0) {
+      hides = hides | ~(room <= most_lost * magnitude(at));
       continue;
     }
-    vec at = g.t.first[n.first], value = g.t.first[check.node], inverse;
+    vec value = g.t.first[check.node], inverse;
     mask sound = {};
     interval y = bounds_of_function(n, {at - room, at + room}, g.box, inverse, sound);
     vec change = larger(y.high - value, value - y.low);

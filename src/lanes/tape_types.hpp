@@ -76,8 +76,8 @@ struct tape_term {
   int node, factor;
 };
 
-// A node that may change more than its series shows, with the series of its argument and its own; of a
-// quotient that of the divisor.
+// A node that may change more than its series shows, with the series of its argument, of a quotient that of
+// the divisor; its own series where it may be nearly constant (-1: its argument must not come near zero).
 struct tape_check {
   int node, argument, own, unused;
 };

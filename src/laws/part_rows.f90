@@ -14,21 +14,21 @@ module part_rows
   integer :: i
 
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
-  character(len=law_length), parameter :: springs(4) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
-    'spring:pendulum', 'spring:electrostatic']
+  character(len=law_length), parameter :: springs(5) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
+    'spring:pendulum', 'spring:electrostatic', 'spring:expression']
   character(len=law_length), parameter :: frictions(11) = [character(len=law_length) :: 'friction:coulomb', &
     'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic', &
     'friction:coulomb_quadratic', 'friction:coulomb_load', 'friction:maxwell_slip', 'friction:dahl', 'friction:bouc_wen', &
     'friction:lugre']
   character(len=law_length), parameter :: contacts(3) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt', &
     'contact:massless']
-  character(len=law_length), parameter :: joints(18) = [springs, frictions, contacts]
+  character(len=law_length), parameter :: joints(19) = [springs, frictions, contacts]
   !> Contacts with the laws of one body, which keep their parameters.
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
                                                                           contact_parameters%law /= 'kelvin_voigt')
-  character(len=law_length), parameter :: drives(4) = [character(len=law_length) :: 'drive:force', 'drive:motion', &
-    'drive:controller', 'drive:impulse']
+  character(len=law_length), parameter :: drives(5) = [character(len=law_length) :: 'drive:force', 'drive:motion', &
+    'drive:controller', 'drive:impulse', 'drive:expression']
   character(len=1), parameter :: drive_unit(3) = ['N', 'm', 'm']
   character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
   character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
@@ -48,6 +48,7 @@ module part_rows
     law_row_t('part', springs(3), 'moment sin s of an angle s', 'Huygens, Horologium Oscillatorium (1673)'), &
     law_row_t('part', springs(4), 'attraction/(gap - s)^2 of two charged plates, s their way towards each other', &
               'Nathanson et al., IEEE Trans. Electron Devices 14 (1967)'), &
+    law_row_t('part', springs(5), 'any force between two bodies, an expression `force` [N] of x, v, t, phase, NAME.x', ''), &
     law_row_t('part', frictions(1), 'dry friction between two bodies, or of one on the ground or a belt', ''), &
     law_row_t('part', frictions(2), 'spring and slider in series (Jenkins)', 'Gastaldi, Berruti, Appl. Sci. (2018)'), &
     law_row_t('part', frictions(3), 'dry friction and b u, u being the sliding speed', ''), &
@@ -74,7 +75,8 @@ module part_rows
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
     law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
     law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
-    law_row_t('part', drives(4), 'impulse on a body at a time after the start', '')]
+    law_row_t('part', drives(4), 'impulse on a body at a time after the start', ''), &
+    law_row_t('part', drives(5), 'any force on a body, an expression `force` [N] of t, phase, x, v, NAME.x', '')]
 
   !> The ends of a part are numbers of reference points: bodies, then points of structures, in the order of the file, 0 the ground;
   !> of a drive, one of them.
@@ -107,9 +109,9 @@ module part_rows
     (parameter_row_t('part', points(i), 'row', '1', any_value, 'its displacement for one of each coordinate', &
                      optional=.true., list=.true.), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first_end', '1', not_negative, 'number of the first body between', &
-                     optional=.true.), i=1, 18), &
+                     optional=.true.), i=1, 19), &
     (parameter_row_t('part', joints(i), 'second_end', '1', not_negative, 'number of the second body between', &
-                     optional=.true.), i=1, 18), &
+                     optional=.true.), i=1, 19), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', not_negative, &
                      'number of the first body between', optional=.true.), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', not_negative, &
@@ -182,7 +184,7 @@ module part_rows
                      optional=.true., default=none_above), i=1, 3), &
     (parameter_row_t('part', contacts(i), 'lower', 'm', any_value, 'smallest value of second minus first', &
                      optional=.true., default=none_below), i=1, 3), &
-    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 4), &
+    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 5), &
     (parameter_row_t('part', drives(i), 'frequency', 'rad/s', not_negative, &
                      'angular frequency; that of the first drive if absent', optional=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'mean', drive_unit(i), any_value, 'mean', optional=.true.), i=1, 3), &
@@ -199,6 +201,8 @@ module part_rows
     parameter_row_t('part', drives(3), 'sample_time', 's', not_negative, &
                     'time between samples, the force being held in between; 0: continuous', optional=.true.), &
     parameter_row_t('part', drives(4), 'impulse', 'N s', any_value, 'impulse'), &
-    parameter_row_t('part', drives(4), 'time', 's', not_negative, 'after the start', optional=.true.)]
+    parameter_row_t('part', drives(4), 'time', 's', not_negative, 'after the start', optional=.true.), &
+    parameter_row_t('part', drives(5), 'frequency', 'rad/s', not_negative, &
+                    'angular frequency of the phase; that of the first drive if absent', optional=.true.)]
 
 end module part_rows

@@ -7,14 +7,15 @@ module assembly
   use constants, only: two_pi
   use eigen, only: symmetric_eigen, undamped_modes
   use errors, only: error_t, fail
-  use multibody, only: is_stop, joint_elastic, joint_friction, joint_t, multibody_t, most_degrees, &
-    most_joints, name_length, wave_t
+  use multibody, only: count_switches, is_stop, joint_elastic, joint_friction, joint_spring, joint_t, &
+    multibody_t, most_degrees, most_joints, most_load_switches, name_length, reads_clock, wave_t
   use joint_forces, only: is_curved
   use normal_force, only: number_contacts, size_of_load
   use kinds, only: wp
   use matrices, only: solve
   use shared_friction, only: merge_friction
   use status, only: exit_bad_case
+  use text, only: to_text
   implicit none
   private
 
@@ -215,18 +216,25 @@ contains
     machine%mobility = (machine%mobility + transpose(machine%mobility))/2
     machine%driven = machine%frequency > 0
     machine%period = 1
+    if (.not. machine%driven .and. reads_clock(machine)) machine%section_time = two_pi/own_frequency(squares)
     if (.not. machine%driven .and. machine%section_time > 0) machine%frequency = two_pi/machine%section_time
     if (machine%frequency > 0) then
       machine%period = two_pi/machine%frequency
-    else if (squares(machine%n) > 0) then
-      k = count(squares <= 1e-12_wp*squares(machine%n)) + 1
-      machine%period = two_pi/sqrt(squares(k))
-      machine%frequency = sqrt(squares(k))
     else
-      machine%frequency = two_pi
+      machine%frequency = own_frequency(squares)
+      machine%period = two_pi/machine%frequency
     end if
     call set_sizes(machine, 0.0_wp)
   end subroutine finish
+
+  !> Angular frequency of the slowest mode [rad/s], given the squares of all; one turn per second without any.
+  pure real(wp) function own_frequency(squares) result(frequency)
+    real(wp), intent(in) :: squares(:)
+    frequency = two_pi
+    associate (largest => squares(size(squares)))
+      if (largest > 0) frequency = sqrt(squares(count(squares <= 1e-12_wp*largest) + 1))
+    end associate
+  end function own_frequency
 
   !> Takes a body whose motion is given out of the coordinates: its springs and dampers become forces, its joints get an
   !> offset.
@@ -323,6 +331,9 @@ contains
     else if (size(machine%joints) >= most_joints) then
       call fail(error, exit_bad_case, 'joints: found too many, allowed at most 12')
     end if
+    if (count_switches(machine) > most_load_switches) call fail(error, exit_bad_case, 'body: found '// &
+      to_text(count_switches(machine))//' of abs, sign, min, max and if in the expressions of a machine (a load has one more), '// &
+      'allowed at most '//to_text(most_load_switches))
     if (allocated(error)) return
     call symmetric_eigen(machine%mass, values, vectors)
     if (.not. values(1) > 1e-14_wp*values(machine%n)) then
@@ -376,6 +387,7 @@ contains
         if (joint%kind == joint_friction .or. joint%kind == joint_elastic) then
           largest = largest + joint%friction%break_away*size_of_load(joint, machine%frequency)
         end if
+        if (joint%kind == joint_spring .and. allocated(joint%load)) largest = largest + size_of_load(joint, machine%frequency)
         if (is_stop(joint%kind)) then
           if (joint%upper < huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%upper))
           if (joint%lower > -huge(1.0_wp)) machine%length_scale = max(machine%length_scale, abs(joint%lower))

@@ -116,6 +116,12 @@ contains
     real(wp), intent(out) :: force
     real(wp), intent(out), optional :: by_position
     real(wp) :: sine, cosine, pull
+    if (allocated(joint%load)) then
+      ! An expression: its rate is that of the strength.
+      force = strength
+      if (present(by_position)) by_position = 0
+      return
+    end if
     call sine_cosine(s, sine, cosine)
     pull = 0
     if (abs(joint%attraction) > 0) pull = joint%attraction/(joint%gap - s)**2
@@ -132,6 +138,10 @@ contains
     real(wp), intent(in) :: s, strength
     real(wp) :: sine, cosine
     call sine_cosine(s, sine, cosine)
+    if (allocated(joint%load)) then
+      terms = abs(strength)
+      return
+    end if
     terms = abs(s)*(abs(joint%stiffness) + abs(s)*(abs(joint%quadratic) + abs(s*joint%cubic))) + abs(joint%moment*sine)
     if (abs(joint%attraction) > 0) terms = terms + abs(joint%attraction)/(joint%gap - s)**2
     terms = abs(strength)*terms
@@ -182,7 +192,7 @@ contains
       if (abs(phase) == 1) energy = contact_energy(joint%contact, merge(s - joint%upper, joint%lower - s, phase > 0))
     case (joint_spring)
       ! Where the strength is given, all its work is the drive's.
-      if (allocated(joint%strength)) return
+      if (allocated(joint%strength) .or. allocated(joint%load)) return
       call sine_cosine(s/2, sine, cosine)
       energy = s**2*(joint%stiffness/2 + s*(joint%quadratic/3 + s*joint%cubic/4)) + 2*joint%moment*sine**2
       if (abs(joint%attraction) > 0) energy = energy - joint%attraction/(joint%gap - s)

@@ -14,13 +14,13 @@ module multibody
   implicit none
   private
 
-  public :: wave_value, harmonics_in, offset_of, is_stop, integral_of
+  public :: wave_value, harmonics_in, offset_of, is_stop, integral_of, reads_clock, count_switches
 
   !> One joint more than a machine may have: the section of a motion without a clock.
   integer, parameter, public :: most_degrees = 16, most_joints = 13
 
-  !> Most switching functions of a normal force by an expression.
-  integer, parameter, public :: most_load_switches = 8
+  !> Most switching functions of all expressions of a machine.
+  integer, parameter, public :: most_load_switches = 32
 
   !> Kinds of joints: dry friction, spring and slider in series, rigid contact, contact with a force over penetration,
   !> a spring whose force is not linear, one without force at which the watched coordinate turns round, and friction with memory.
@@ -47,8 +47,8 @@ module multibody
     integer :: joint = 0
   end type source_t
 
-  !> Normal force of friction [N], an expression. Its variables are the time since the section [s], the phase [rad], and of each
-  !> source its value and its first three derivatives by the time.
+  !> Normal force of friction, or the force of a joint [N], an expression. Its variables are the time [s], the phase [rad], and of
+  !> each source its value and its first three derivatives by the time.
   type, public :: load_t
     type(tape_t) :: tape
     integer :: node = 0
@@ -56,6 +56,8 @@ module multibody
     integer, allocatable :: rates(:)
     real(wp), allocatable :: parameters(:)
     type(source_t), allocatable :: sources(:)
+    !> The time is counted from the start, else from the section.
+    logical :: by_clock = .false.
   end type load_t
 
   !> Friction with memory. The deflection z [m] is the velocity of a coordinate of its own, of the mass s0, whose kinetic energy
@@ -86,7 +88,7 @@ module multibody
     real(wp) :: stiffness = 0, quadratic = 0, cubic = 0, moment = 0, attraction = 0, gap = 1
     !> What the force of a spring is multiplied by, a function of the time; without one, by 1.
     type(wave_t), allocatable :: strength
-    !> Normal force, by which the forces of friction, then coefficients, are multiplied.
+    !> Normal force, by which the forces of friction, then coefficients, are multiplied; the whole force of a spring that has one.
     type(load_t), allocatable :: load
     type(memory_t), allocatable :: memory
   end type joint_t
@@ -207,6 +209,26 @@ contains
     integer, intent(in) :: kind
     is_stop = kind == joint_contact .or. kind == joint_soft
   end function is_stop
+
+  !> Whether a force depends on the time since the start.
+  pure logical function reads_clock(machine)
+    type(multibody_t), intent(in) :: machine
+    integer :: j
+    reads_clock = .false.
+    do j = 1, size(machine%joints)
+      if (allocated(machine%joints(j)%load)) reads_clock = reads_clock .or. machine%joints(j)%load%by_clock
+    end do
+  end function reads_clock
+
+  !> Number of switching functions of all expressions.
+  pure integer function count_switches(machine) result(switches)
+    type(multibody_t), intent(in) :: machine
+    integer :: j
+    switches = 0
+    do j = 1, size(machine%joints)
+      if (allocated(machine%joints(j)%load)) switches = switches + size(machine%joints(j)%load%tape%switches)
+    end do
+  end function count_switches
 
   !> Number of the coordinate that is the integral of what a controller sees, 0 without one.
   pure integer function integral_of(machine) result(at)

@@ -9,7 +9,7 @@ module multibody_state
   use multibody, only: controller_t, joint_contact, load_t, multibody_t, most_degrees, most_joints, source_t, wave_value
   use kinds, only: wp
   use tape_series, only: expand, prepare_series, series_t
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate, sizes_of_nodes
   implicit none
   private
 
@@ -150,6 +150,7 @@ contains
     integer :: i, n
     n = machine%n
     variables(:2) = [state%time, machine%frequency*state%time]
+    if (load%by_clock) variables(1) = state%clock + state%time
     do i = 1, size(load%sources)
       associate (source => load%sources(i))
         call wave_value(source%offset, machine%frequency, state%time, turning, motion(0), motion(1), motion(2))
@@ -185,16 +186,19 @@ contains
     real(wp), intent(in) :: variables(:)
     integer, intent(out) :: branches(:)
     type(series_t) :: series
-    real(wp) :: value(load%tape%count), size_of
+    real(wp), dimension(load%tape%count) :: value, sizes
+    real(wp) :: size_of
     integer :: faults(load%tape%count), i, k, fault
     call evaluate(load%tape, variables, load%parameters, value, faults)
     associate (nodes => load%tape%switches%argument)
       branches = merge(1, -1, value(nodes) >= 0)
+      sizes = sizes_of_nodes(load%tape, value)
       do i = 1, size(branches)
         associate (node => load%tape%nodes(nodes(i)))
-          size_of = maxval(abs(value([nodes(i), max(node%first, 1), max(node%second, 1)])))
+          size_of = max(sizes(nodes(i)), maxval(abs(value([nodes(i), max(node%first, 1), max(node%second, 1)]))))
         end associate
-        if (abs(value(nodes(i))) > 16*epsilon(1.0_wp)*size_of) cycle
+        ! Events are found to 64 units of rounding of the sizes at the start of a flight.
+        if (abs(value(nodes(i))) > 256*epsilon(1.0_wp)*size_of) cycle
         call prepare_series(load%tape, 3, load%rates, nodes, branches, series)
         call expand(load%tape, variables, load%parameters, series, fault)
         if (fault /= 0) return

@@ -28,7 +28,8 @@ contains
     end do
   end subroutine number_contacts
 
-  !> Normal force of friction over a period where nothing is displaced [N]; 1 where it is part of the law.
+  !> Largest normal force of friction, or force by an expression, over a period where nothing is displaced [N]; 1 where it is part
+  !> of the law.
   pure real(wp) function size_of_load(joint, frequency) result(largest)
     type(joint_t), intent(in) :: joint
     real(wp), intent(in) :: frequency
@@ -46,7 +47,7 @@ contains
         variables(2) = two_pi*i/points
         if (frequency > 0) variables(1) = variables(2)/frequency
         call evaluate(load%tape, variables, load%parameters, value, fault)
-        largest = max(largest, value(load%node))
+        if (fault(load%node) == 0) largest = max(largest, abs(value(load%node)))
       end do
     end associate
   end function size_of_load

@@ -5,9 +5,9 @@
 !> go on as they are. Each hold lasts a whole number of drive periods, so that the crank is at the section when
 !> the parameter changes and its angle carries over exactly.
 module sweep
-  use attractors, only: features_t
+  use attractors, only: features_t, regime_at_rest
   use crank_summary, only: crank_summary_t, no_summary
-  use crank_turns, only: summarize_turns
+  use crank_turns, only: summarize_held, summarize_turns
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
@@ -75,6 +75,7 @@ contains
         held%samples = ieee_value(1.0_wp, ieee_quiet_nan)
         held%features = no_features()
         held%crank = no_summary()
+        if (held%reason == reason_time_over) call describe_held(moving, held)
         return
       end if
       if (i > periods - samples) held%samples(:, i - periods + samples) = [held%state%state%x, held%state%state%v]
@@ -99,6 +100,17 @@ contains
       seen%rotation = cycle%rotation
     end associate
   end subroutine hold_parameter
+
+  !> Features of a hold in which the bearing comes to hold the crank for good.
+  pure subroutine describe_held(moving, held)
+    class(machine_t), intent(in) :: moving
+    type(hold_t), intent(inout) :: held
+    if (.not. moving%bound_to_rest(held%state)) return
+    held%features = features_t(regime=regime_at_rest, x_max=held%state%state%x, x_min=held%state%state%x)
+    held%samples = spread([held%state%state%x, 0.0_wp], 2, size(held%samples, 2))
+    call summarize_held(moving, held%state, held%crank)
+    held%mark = with_crank(mark_of(moving, held%features), held%crank)
+  end subroutine describe_held
 
   !> Where a machine without a clock turns round next, rows x [m] and v [m/s]; the state as it is, where it does not.
   pure subroutine sample_turns(moving, state, samples)

@@ -1,16 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The normal force of friction between parts, from its expression. It may name the time and the phase of a drive; NAME.x and NAME.v
-!> of bodies and points; spring.NAME, the force by which a spring presses its ends apart; contact.NAME, that of a soft contact; the
-!> parameters of its own table by their names, and those of every table by their paths.
+!> The normal force of friction between parts, or a force on them, from its expression. It may name the time and the phase of a
+!> drive; x and v of the force; NAME.x and NAME.v of bodies and points; spring.NAME, the force by which a spring presses its ends
+!> apart; contact.NAME, that of a soft contact; the parameters of its own table by their names, and those of every table by their
+!> paths.
 module build_load
   use errors, only: error_t, fail
+  use expression_names, only: has_name
   use expression_text, only: read_expression
   use kinds, only: wp
   use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_kind, part_law, path_of, rows_of, text_of, &
     value_of
-  use multibody, only: joint_t, load_t, most_load_switches, multibody_t, source_t
+  use multibody, only: joint_t, load_t, multibody_t, source_t
   use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
   use reference_points, only: is_reference_point, row_of
   use status, only: exit_bad_case
@@ -21,10 +23,9 @@ module build_load
   implicit none
   private
 
-  public :: set_normal_force
+  public :: set_expression
 
   integer, parameter :: name_length = 64
-  character(len=*), parameter :: name_letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.'
   !> Points of a period at which a normal force is compared with that a period later, and the share that rounding may change.
   integer, parameter :: points = 24
   real(wp), parameter :: same = 1e-9_wp
@@ -38,8 +39,8 @@ module build_load
 
 contains
 
-  !> Sets the normal force of joint `joint`, choice number `i`; `rows` are those of the reference points. Errors name the key.
-  pure subroutine set_normal_force(choices, i, rows, machine, joint, error)
+  !> Sets the expression of joint `joint`, choice number `i`; `rows` are those of the reference points. Errors name the key.
+  pure subroutine set_expression(choices, i, rows, machine, joint, error)
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: i
     real(wp), intent(in) :: rows(:, :)
@@ -48,15 +49,20 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(names_t) :: names
     character(len=:), allocatable :: key, text
+    logical :: is_load
     integer :: node
-    key = path_of(choices(i))//'.load'
-    text = text_of(choices(i), 'load')
+    is_load = index(choices(i)%name, 'friction:') == 1
+    text = 'force'
+    if (is_load) text = 'load'
+    key = path_of(choices(i))//'.'//text
+    text = text_of(choices(i), text)
     allocate (joint%load)
     associate (load => joint%load)
       call new_tape(load%tape)
       allocate (names%names(0), names%nodes(0), names%of_variables(0), names%of_parameters(0), load%sources(0), load%parameters(0))
       allocate (load%rates(0))
       call add_clock(machine, load, names)
+      if (.not. is_load) call add_own_coordinate(joint%row, load, names)
       call add_coordinates(choices, text, rows, load, names)
       call add_parameters(choices, i, load, names)
       call add_springs(choices, text, rows, load, names)
@@ -67,14 +73,16 @@ contains
       end if
       call read_expression(text, names%names, names%nodes, load%tape, node, error)
       if (.not. allocated(error)) call check_unit(machine, load, names, node, error)
-      if (.not. allocated(error)) call check_values(machine, load, node, error)
+      if (.not. allocated(error)) call check_values(is_load, load, node, error)
       if (allocated(error)) then
         error%message = key//': '//error%message
         return
       end if
-      call positive_part(load%tape, load%parameters, node, load%node)
+      load%node = node
+      load%by_clock = has_name(text, 't') .and. .not. repeats(machine, load, node)
+      if (is_load) call positive_part(load%tape, load%parameters, node, load%node)
     end associate
-  end subroutine set_normal_force
+  end subroutine set_expression
 
   pure subroutine add_name(names, name, node)
     type(names_t), intent(inout) :: names
@@ -101,7 +109,7 @@ contains
     names%of_variables = [names%of_variables, quantity]
   end subroutine add_variable
 
-  !> Time and phase, which have names where there is a drive.
+  !> Time, and the phase where there is a drive.
   pure subroutine add_clock(machine, load, names)
     type(multibody_t), intent(in) :: machine
     type(load_t), intent(inout) :: load
@@ -110,7 +118,7 @@ contains
     call constant(load%tape, 1.0_wp, one)
     call constant(load%tape, machine%frequency, speed)
     call add_variable(load, names, one, 's', node)
-    if (machine%frequency > 0) call add_name(names, 't', node)
+    call add_name(names, 't', node)
     call add_variable(load, names, speed, '1', node)
     if (machine%frequency > 0) call add_name(names, 'phase', node)
   end subroutine add_clock
@@ -160,6 +168,19 @@ contains
     call move_alloc(sources, load%sources)
     nodes = made(:2)
   end subroutine add_source
+
+  !> The coordinate of the joint along `row`, second minus first, as x and v.
+  pure subroutine add_own_coordinate(row, load, names)
+    real(wp), intent(in) :: row(:)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    type(source_t) :: source
+    integer :: nodes(2)
+    source%row = row
+    call add_source(source, ['m  ', 'm/s'], load, names, nodes)
+    call add_name(names, 'x', nodes(1))
+    call add_name(names, 'v', nodes(2))
+  end subroutine add_own_coordinate
 
   !> Positions and velocities of the bodies and points that the text names.
   pure subroutine add_coordinates(choices, text, rows, load, names)
@@ -245,24 +266,6 @@ contains
     end do
   end subroutine add_contacts
 
-  !> Whether a text has a name, not as a part of another one.
-  pure logical function has_name(text, name)
-    character(len=*), intent(in) :: text, name
-    character(len=len(text) + 2) :: padded
-    integer :: from, at
-    padded = ' '//text
-    has_name = .false.
-    from = 1
-    do
-      at = index(padded(from:), name)
-      if (at == 0) return
-      at = from + at - 1
-      has_name = scan(padded(at - 1:at - 1), name_letters) == 0 .and. scan(padded(at + len(name):at + len(name)), name_letters) == 0
-      if (has_name) return
-      from = at + 1
-    end do
-  end function has_name
-
   !> The expression is in N, if its parameters have units.
   pure subroutine check_unit(machine, load, names, node, error)
     type(multibody_t), intent(in) :: machine
@@ -279,27 +282,36 @@ contains
     if (len(problem) > 0) call fail(error, exit_bad_case, problem)
   end subroutine check_unit
 
-  !> A constant is not negative, and what depends on the time repeats with the period of the drive.
-  pure subroutine check_values(machine, load, node, error)
-    type(multibody_t), intent(in) :: machine
+  !> A constant load is not negative.
+  pure subroutine check_values(is_load, load, node, error)
+    logical, intent(in) :: is_load
     type(load_t), intent(in) :: load
     integer, intent(in) :: node
     type(error_t), allocatable, intent(inout) :: error
-    real(wp), dimension(load%tape%count) :: now, later
-    real(wp) :: z(size(load%rates)), period, largest, change
-    integer, dimension(load%tape%count) :: fault, fault_later
-    integer :: i
-    if (load%tape%is_full .or. size(load%tape%switches) >= most_load_switches) then
-      call fail(error, exit_bad_case, 'found too many operations, allowed at most '//to_text(most_load_switches - 1)// &
-                ' of abs, sign, min, max and if')
+    real(wp) :: now(load%tape%count), z(size(load%rates))
+    integer :: fault(load%tape%count)
+    if (load%tape%is_full) then
+      call fail(error, exit_bad_case, 'found too many operations')
       return
     end if
     z = 0
     call evaluate(load%tape, z, load%parameters, now, fault)
-    if (load%tape%nodes(node)%is_steady .and. (fault(node) > 0 .or. now(node) < 0)) then
+    if (is_load .and. load%tape%nodes(node)%is_steady .and. (fault(node) > 0 .or. now(node) < 0)) then
       call fail(error, exit_bad_case, 'found '//to_text(real(now(node), kind(1d0)))//' N, allowed at least 0')
-      return
     end if
+  end subroutine check_values
+
+  !> Whether an expression that names the time repeats with the period of the drive, and with it all that it switches at: a step
+  !> after many periods shows in its switching function from the first.
+  pure logical function repeats(machine, load, node)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(in) :: load
+    integer, intent(in) :: node
+    real(wp), dimension(load%tape%count) :: now, later, largest, change
+    real(wp) :: z(size(load%rates)), period
+    integer, dimension(load%tape%count) :: fault, fault_later
+    integer :: i
+    repeats = .false.
     if (.not. machine%frequency > 0) return
     period = 8*atan(1.0_wp)/machine%frequency
     largest = 0
@@ -310,12 +322,14 @@ contains
       call evaluate(load%tape, z, load%parameters, now, fault)
       z(1) = z(1) + period
       call evaluate(load%tape, z, load%parameters, later, fault_later)
-      if (max(fault(node), fault_later(node)) > 0) cycle
-      largest = max(largest, abs(now(node)), abs(later(node)))
-      change = max(change, abs(now(node) - later(node)))
+      where (max(fault, fault_later) == 0)
+        largest = max(largest, abs(now), abs(later))
+        change = max(change, abs(now - later))
+      end where
     end do
-    if (change > same*largest) call fail(error, exit_bad_case, 'found a function of t that does not repeat after the period of '// &
-                                         'the drive, '//to_text(real(period, kind(1d0)))//' s, allowed one that does')
-  end subroutine check_values
+    associate (nodes => [node, load%tape%switches%argument])
+      repeats = all(change(nodes) <= same*largest(nodes))
+    end associate
+  end function repeats
 
 end module build_load

@@ -5,7 +5,7 @@
 module build_multibody
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
   use build_control, only: add_controllers, add_impulses
-  use build_load, only: set_normal_force
+  use build_load, only: set_expression
   use build_memory, only: add_bristles, add_deflections, add_elements, has_bristles
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use errors, only: error_t, fail
@@ -64,6 +64,10 @@ contains
       case ('drive:force')
         wave = wave_of(choices(i))
         call add_force(machine, rows(:, reference_point_of(choices(i))), wave%mean, wave%harmonic)
+      case ('drive:expression')
+        call add_own_force(machine, choices, i, rows(:, reference_point_of(choices(i))), rows, error)
+      case ('spring:expression')
+        call add_own_force(machine, choices, i, row_of(rows, choices(i)), rows, error)
       case default
         if (index(choices(i)%name, 'spring:') == 1) call add_spring(machine, choices(i), row_of(rows, choices(i)), error)
         if (index(choices(i)%name, 'friction:') == 1) call add_any_friction(machine, choices, i, rows, error)
@@ -163,6 +167,8 @@ contains
   !> Whether a drive is more than its mean.
   pure logical function varies(choice)
     type(law_choice_t), intent(in) :: choice
+    varies = .false.
+    if (choice%name == 'drive:expression') return
     varies = abs(value_of(choice, 'amplitude')) > 0 .or. size(list_of(choice, 'cosine')) + size(list_of(choice, 'sine')) > 0
   end function varies
 
@@ -207,6 +213,21 @@ contains
     call add_joint(machine, joint)
   end subroutine add_spring
 
+  !> A force along `row` by the expression of choice number `i`.
+  pure subroutine add_own_force(machine, choices, i, row, rows, error)
+    type(multibody_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: row(:), rows(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    type(joint_t) :: joint
+    joint%name = path_of(choices(i))
+    joint%kind = joint_spring
+    joint%row = row
+    call set_expression(choices, i, rows, machine, joint, error)
+    if (.not. allocated(error)) call add_joint(machine, joint)
+  end subroutine add_own_force
+
   !> Friction of any law: dry, with a normal force of its own, or with memory.
   pure subroutine add_any_friction(machine, choices, i, rows, error)
     type(multibody_t), intent(inout) :: machine
@@ -221,7 +242,7 @@ contains
     else
       call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
       if (choices(i)%name /= 'friction:coulomb_load' .or. allocated(error)) return
-      call set_normal_force(choices, i, rows, machine, machine%joints(size(machine%joints)), error)
+      call set_expression(choices, i, rows, machine, machine%joints(size(machine%joints)), error)
     end if
   end subroutine add_any_friction
 

@@ -122,6 +122,7 @@ contains
       associate (row => abs(machine%joints(i)%row))
         parts = parts + row*(abs(by_position)*sum(row*abs(state%q(:n))) + abs(by_speed)*sum(row*abs(state%v(:n))))
         if (machine%joints(i)%kind /= joint_spring) cycle
+        if (allocated(machine%joints(i)%load)) parts = parts + row*abs(r)
         parts = parts + row*(abs(by_position)*sum(row*positions) + magnitude_of_force(energy, abs(by_position), &
                                                                           sum(row*matmul(abs(machine%mobility), row)), order))
       end associate

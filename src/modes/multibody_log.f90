@@ -293,7 +293,7 @@ contains
         call factor_now(machine, j, state, turning, factor)
         call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r)
         work = work - r*rate
-        if (allocated(joint%strength)) work = work + r*u
+        if (allocated(joint%strength) .or. (joint%kind == joint_spring .and. allocated(joint%load))) work = work + r*u
         if (joint%kind == joint_bristle) then
           friction = friction - r*merge(s, u, joint%memory%on_deflection)
         else if (joint%kind == joint_soft) then

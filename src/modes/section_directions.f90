@@ -5,7 +5,8 @@
 !> anywhere, and looks the same from a frame that moves along.
 module section_directions
   use eigen, only: symmetric_eigen
-  use multibody, only: integral_of, is_stop, joint_bristle, joint_friction, joint_section, multibody_t, most_degrees
+  use multibody, only: integral_of, is_stop, joint_bristle, joint_friction, joint_section, joint_spring, multibody_t, &
+    most_degrees
   use kinds, only: wp
   implicit none
   private
@@ -70,6 +71,7 @@ contains
         end do
       end if
       if (any(machine%joints(j)%kind == [joint_friction, joint_section, joint_bristle])) cycle
+      if (machine%joints(j)%kind == joint_spring .and. allocated(machine%joints(j)%load)) cycle
       if (.not. stops .and. is_stop(machine%joints(j)%kind)) cycle
       call add_row(machine%joints(j)%row, depends)
     end do
@@ -97,8 +99,10 @@ contains
     depends = without_signs(machine%stiffness) + without_signs(machine%damping)
     do j = 1, size(machine%joints)
       if (machine%joints(j)%kind == joint_section) cycle
-      do i = 1, machine%n
-        depends(:, i) = depends(:, i) + machine%joints(j)%row*machine%joints(j)%row(i)
+      call add_row(machine%joints(j)%row, depends)
+      if (.not. allocated(machine%joints(j)%load)) cycle
+      do i = 1, size(machine%joints(j)%load%sources)
+        call add_row(machine%joints(j)%load%sources(i)%row, depends)
       end do
     end do
     if (.not. (machine%driven .or. machine%section_time > 0) .or. .not. any(abs(depends) > 0)) depends = unit(machine%n)

@@ -5,7 +5,7 @@
 module timed_actions
   use simultaneous_impact, only: apply_impact
   use control, only: error_of
-  use multibody, only: joint_contact, joint_friction, joint_section, multibody_t, most_joints
+  use multibody, only: joint_contact, joint_friction, joint_section, multibody_t, most_joints, reads_clock
   use multibody_flows, only: multibody_motion_t
   use multibody_log, only: balance_change, energy_of_multibody, record_change
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
@@ -22,7 +22,7 @@ contains
   !> Whether there is any such thing.
   pure logical function acts_on_time(machine)
     type(multibody_t), intent(in) :: machine
-    acts_on_time = allocated(machine%impulses)
+    acts_on_time = allocated(machine%impulses) .or. reads_clock(machine)
     if (allocated(machine%controller)) acts_on_time = acts_on_time .or. machine%controller%sample_time > 0
   end function acts_on_time
 

@@ -3,6 +3,7 @@
 
 !> Parameters that are given and change nothing: of parts that a mechanism does not have, and those that no expression names.
 module idle_inputs
+  use expression_names, only: has_name
   use law_table, only: law_choice_t, motor_family, path_of, state_family, value_of
   use motor_choices, only: has_motor, number_of_family
   implicit none
@@ -14,8 +15,6 @@ module idle_inputs
     character(len=160) :: key = ''
     character(len=80) :: reason = ''
   end type idle_input_t
-
-  character(len=*), parameter :: in_words = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.'
 
 contains
 
@@ -34,7 +33,7 @@ contains
         name = trim(choices(i)%own(k)%name)
         if (is_key(choices(i)%family, name) .or. is_named(choices, i, name)) cycle
         key = path_of(choices(i))//'.'//name
-        call add(key, 'no expression names it', idle)
+        call add(key, 'no expression contains it', idle)
       end do
     end do
   end function idle_inputs_of
@@ -50,7 +49,7 @@ contains
       call add('motor.'//trim(of_lever(k)), 'drive.law = "'//trim(drive%name)//'" has no lever', idle)
     end do
     if (drive%name == 'unbalance' .and. abs(value_of(motor, 'foot_mass')) > 0) then
-      call add('motor.foot_mass', 'an unbalance moves no foot of the spring', idle)
+      call add('motor.foot_mass', 'with an unbalance the foot of the spring is fixed', idle)
     end if
     if (motor%name /= 'dc') return
     if (abs(value_of(motor, 'start_current')) > 0 .and. .not. abs(value_of(motor, 'inductance')) > 0) then
@@ -86,28 +85,11 @@ contains
       if (.not. allocated(choices(i)%texts)) cycle
       do k = 1, size(choices(i)%texts)
         associate (text => choices(i)%texts(k)%text)
-          is_named = is_named .or. has_word(text, path)
-          if (i == own) is_named = is_named .or. has_word(text, name)
+          is_named = is_named .or. has_name(text, path)
+          if (i == own) is_named = is_named .or. has_name(text, name)
         end associate
       end do
     end do
   end function is_named
-
-  pure logical function has_word(text, word)
-    character(len=*), intent(in) :: text, word
-    integer :: at, length
-    has_word = .false.
-    at = 1
-    do while (at <= len(text))
-      length = scan(text(at:), in_words) - 1
-      if (length < 0) return
-      at = at + length
-      length = verify(text(at:), in_words) - 1
-      if (length < 0) length = len(text) - at + 1
-      has_word = text(at:at + length - 1) == word
-      if (has_word) return
-      at = at + length
-    end do
-  end function has_word
 
 end module idle_inputs

@@ -84,7 +84,7 @@ contains
   end function supply_of
 
   !> Whether a motor that starts from standstill never overcomes the friction of its bearing by itself. `torque` [N m] is the most
-  !> that it then has.
+  !> that it has there, also during a ramp.
   pure subroutine cannot_start(choices, torque, remains)
     type(law_choice_t), intent(in) :: choices(:)
     real(wp), intent(out) :: torque
@@ -101,18 +101,30 @@ contains
           torque = 2*value_of(motor, 'breakdown_torque')*slip/(1 + slip**2)
         end associate
       case ('dc')
-        torque = value_of(motor, 'torque_constant')*value_of(motor, 'voltage')/value_of(motor, 'resistance')
+        torque = value_of(motor, 'torque_constant')*largest_supply(motor, 'voltage')/value_of(motor, 'resistance')
+        if (value_of(motor, 'inductance') > 0) torque = max(abs(torque), abs(value_of(motor, 'torque_constant')* &
+                                                                             value_of(motor, 'start_current')))
       case ('pi')
-        torque = value_of(motor, 'proportional')*value_of(motor, 'reference')
+        torque = value_of(motor, 'proportional')*largest_supply(motor, 'reference')
         if (value_of(motor, 'integral') > 0) torque = huge(torque)
         if (value_of(motor, 'torque_limit') > 0) torque = min(torque, value_of(motor, 'torque_limit'))
       case default
         torque = continued_at(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')), 0.0_wp)
       end select
-      remains = .not. abs(value_of(motor, 'crank_speed')) > 0 .and. abs(torque) <= value_of(motor, 'bearing_friction')
+      torque = abs(torque)
+      remains = .not. abs(value_of(motor, 'crank_speed')) > 0 .and. torque <= value_of(motor, 'bearing_friction')
       remains = remains .and. value_of(motor, 'bearing_friction') > 0
     end associate
   end subroutine cannot_start
+
+  !> What sets the speed of a motor, where it is largest on a ramp.
+  pure real(wp) function largest_supply(motor, key) result(supply)
+    type(law_choice_t), intent(in) :: motor
+    character(len=*), intent(in) :: key
+    supply = value_of(motor, key)
+    if (.not. value_of(motor, 'ramp_time') > 0) return
+    if (abs(value_of(motor, 'ramp_from')) > abs(supply)) supply = value_of(motor, 'ramp_from')
+  end function largest_supply
 
   !> Speed of the crank [rad/s] and current [A] or integral [rad] at the start.
   pure function start_of_motor(choices) result(start)
@@ -174,9 +186,9 @@ contains
     character(len=:), allocatable :: problem
     problem = knots_problem(list_of(motor, 'speed'), size(list_of(motor, 'torque')))
     if (len(problem) > 0) then
-      call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque has its values there')
+      call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque is given at these speeds')
     else if (.not. speed_of(motor) > 0) then
-      call fail(error, exit_bad_case, 'motor.torque: allowed values that fall through 0 at a speed above 0; a turn at that '// &
+      call fail(error, exit_bad_case, 'motor.torque: allowed values that fall below 0 at a speed above 0; a turn at that '// &
                 'speed is the unit of time')
     else if (steepest(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')))*two_pi > &
              most_decay*value_of(motor, 'inertia')*speed_of(motor)) then

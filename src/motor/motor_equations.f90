@@ -69,7 +69,7 @@ contains
       call add_unbalance(choices(at(5)), system)
       if (.not. system%mass*value_of(choices(at(6)), 'inertia') > system%moment**2) then
         call fail(error, exit_bad_case, 'motor.inertia: found '//to_text(real(value_of(choices(at(6)), 'inertia'), kind(1d0)))// &
-                  ', allowed above drive.moment^2/body.mass: the unbalanced mass alone has more')
+                  ', allowed above drive.moment^2/body.mass: the moment of inertia of the unbalanced mass')
         return
       end if
     else

@@ -6,7 +6,7 @@ module motor_limits
   use curve_law, only: piece_at
   use kinds, only: wp
   use motion_state, only: state_t
-  use motor_rest, only: equation_mode, low_series, slips
+  use motor_rest, only: equation_mode, is_over, low_series, slips
   use motor_state, only: motor_state_t
   use motor_system, only: guard_integral_down, guard_integral_up, guard_limit_down, guard_limit_up, guard_piece_down, &
     guard_piece_up, guard_ramp_end, guard_resume, motor_system_t
@@ -52,8 +52,8 @@ contains
     call low_series(system, mode, state, crank, series, fault)
     associate (guards => system%flights(mode, 0)%guards, room => rounding_of(system))
       crank%limited = 0
-      if (is_beyond(series%c(:, guards(guard_limit_up)%node), room)) crank%limited = 1
-      if (is_beyond(-series%c(:, guards(guard_limit_down)%node), room)) crank%limited = -1
+      if (is_over(series%c(:, guards(guard_limit_up)%node), 0.0_wp, room)) crank%limited = 1
+      if (is_over(-series%c(:, guards(guard_limit_down)%node), 0.0_wp, room)) crank%limited = -1
     end associate
   end subroutine choose_limit
 
@@ -69,20 +69,9 @@ contains
     mode = equation_mode(slips(state%mode), crank%turning /= 0)
     call low_series(system, mode, state, crank, series, fault)
     associate (beyond => crank%held*series%c(:, system%flights(mode, 0)%guards(guard_resume)%node))
-      if (is_beyond(beyond, rounding_of_speed*abs(crank%w))) crank%held = 0
+      if (is_over(beyond, 0.0_wp, rounding_of_speed*abs(crank%w))) crank%held = 0
     end associate
   end subroutine release_integral
-
-  pure logical function is_beyond(c, rounding)
-    real(wp), intent(in) :: c(0:), rounding
-    integer :: k
-    is_beyond = c(0) > rounding
-    if (abs(c(0)) > rounding) return
-    do k = 1, ubound(c, 1)
-      is_beyond = c(k) > 0
-      if (abs(c(k)) > 0) return
-    end do
-  end function is_beyond
 
   !> What rounding does to a command [N m].
   pure real(wp) function rounding_of(system)
@@ -115,7 +104,6 @@ contains
         call add(guard_integral_down, -1, guards, directions)
       end if
     end associate
-
   end subroutine active_limits
 
   pure subroutine add(guard, direction, guards, directions)

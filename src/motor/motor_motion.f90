@@ -19,9 +19,9 @@ module motor_motion
   use motor_log, only: add_sample, motor_energy, record_motor_event
   use motor_modes, only: begin_mode, keep_angle
   use motor_now, only: restitution_of
-  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, hold_without_room, slips
+  use motor_rest, only: chatter_dies_out, choose_body, choose_crank, enters_stop, hold_without_room, slips, turns_at_section
   use motor_state, only: motor_state_t
-  use motor_system, only: far, guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
+  use motor_system, only: guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
     guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t, y_at
   use own_equations, only: build_own_equations
   use series_flight, only: advance_flight, change_branches, flight_crossed, flight_left_domain, flight_no_progress, &
@@ -118,6 +118,11 @@ contains
     at_section = .false.
     idle = 0
     reason = 0
+    if (enters_stop(moving%system, state)) then
+      if (abs(restitution_of(moving%system, state, crank) - 0.5_wp) > 0.5_wp) reason = reason_step_failed
+      if (reason == 0) call hit_stop(moving%system, merge(1, -1, state%v > 0), state, crank, tally, log)
+      if (reason /= 0 .or. present(one_event)) return
+    end if
     do while (state%time < time_end)
       tally%events = tally%events + 1
       if (tally%events > moving%options%event_budget) reason = reason_event_budget
@@ -204,15 +209,6 @@ contains
     if (idle >= most_idle_events) status = flight_wrong_branch
   end subroutine pass_switches
 
-  !> Whether a change of modes where the velocity is zero is a section: a maximum, or a minimum where only maxima are cut off.
-  pure logical function turns_at_section(system, before, after) result(turns)
-    type(motor_system_t), intent(in) :: system
-    integer, intent(in) :: before, after
-    integer :: arriving
-    arriving = merge(mode_slip_minus, mode_slip_plus, system%contact%upper < far .and. system%contact%lower <= -far)
-    turns = before == arriving .and. after /= arriving
-  end function turns_at_section
-
   !> State and losses after a part of a flight.
   pure subroutine take_state(system, flight, state, crank, log)
     type(motor_system_t), intent(in) :: system
@@ -258,6 +254,7 @@ contains
       if (crossed(guard_standstill)) then
         crank%w = 0
         call choose_crank(system, state, crank)
+        if (crank%turning == 0) crank%held_since = state%time
       else if (crossed(guard_crank_up) .or. crossed(guard_crank_down)) then
         crank%turning = merge(1, -1, crossed(guard_crank_up))
       end if

@@ -8,7 +8,7 @@ module motor_rest
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_stick, mode_upper_barrier, state_t
   use motor_now, only: node_values, parameters_now, restitution_of, state_vector
   use motor_state, only: motor_state_t
-  use motor_system, only: body_held, both_held, both_move, crank_held, guard_body_down, guard_body_up, low_order, &
+  use motor_system, only: body_held, both_held, both_move, crank_held, far, guard_body_down, guard_body_up, low_order, &
     motor_system_t, v_at
   use switch_branches, only: choose_branches
   use tape_series, only: expand, prepare_series, series_t
@@ -16,8 +16,8 @@ module motor_rest
   implicit none
   private
 
-  public :: choose_body, choose_crank, equation_mode, hold_without_room, size_of_forces, slips, chatter_dies_out, low_series, &
-    zero_order
+  public :: choose_body, choose_crank, enters_stop, equation_mode, hold_without_room, is_over, size_of_forces, slips, &
+    turns_at_section, chatter_dies_out, low_series, zero_order
 
   !> As for machines with a given drive: relative change of the acceleration over what is left of a chatter sequence at which it
   !> is completed, and the same where a bounce is below the rounding of the position.
@@ -32,6 +32,23 @@ contains
     integer, intent(in) :: mode
     slips = mode == mode_slip_plus .or. mode == mode_slip_minus
   end function slips
+
+  !> Whether a motion is on a stop and moves towards it, as one that starts there can.
+  pure logical function enters_stop(system, state)
+    type(motor_system_t), intent(in) :: system
+    type(state_t), intent(in) :: state
+    enters_stop = slips(state%mode) .and. ((state%x >= system%contact%upper .and. state%v > 0) .or. &
+                                           (state%x <= system%contact%lower .and. state%v < 0))
+  end function enters_stop
+
+  !> Whether a change of modes where the velocity is zero is a section: a maximum, or a minimum where only maxima are cut off.
+  pure logical function turns_at_section(system, before, after) result(turns)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: before, after
+    integer :: arriving
+    arriving = merge(mode_slip_minus, mode_slip_plus, system%contact%upper < far .and. system%contact%lower <= -far)
+    turns = before == arriving .and. after /= arriving
+  end function turns_at_section
 
   !> Which equations hold.
   pure integer function equation_mode(body_slips, crank_turns) result(mode)
@@ -64,6 +81,8 @@ contains
       end if
       call expand(flight%tape, z, parameters, series, fault)
     end associate
+    ! Coefficients that are too large count as not defined.
+    fault = abs(fault)
     if (fault == 0 .and. .not. fits) fault = -1
   end subroutine low_series
 
@@ -131,7 +150,8 @@ contains
     end associate
   end subroutine choose_crank
 
-  !> Whether a force with the Taylor coefficients `c` overcomes what holds against it.
+  !> Whether a force with the Taylor coefficients `c` overcomes what holds against it: where both are equal to rounding, the next
+  !> terms decide.
   pure logical function is_over(c, level, rounding)
     real(wp), intent(in) :: c(0:), level, rounding
     integer :: k

@@ -17,6 +17,8 @@ module motor_state
     real(wp) :: own(most_own) = 0
     !> 1 or -1: the crank turns this way; 0: its bearing holds it.
     integer :: turning = 1
+    !> Since when it holds it [s after the section].
+    real(wp) :: held_since = 0
     !> Turns taken off the angle; which way the crank last passed through zero. Backwards that is a section only if it was so the
     !> last time: a crank that rocks about zero passes its section once a cycle.
     integer :: turns = 0, passed_last = 1

@@ -12,11 +12,12 @@ module own_equations
   use equation_sheet, only: add_node, add_optional, add_parameter, add_variable, define, define_slope, new_sheet, node_of, &
     parameter_number
   use errors, only: error_t, fail
+  use expression_names, only: has_name
   use kinds, only: wp
   use law_table, only: effect_family, force_family, law_choice_t, own_law, path_of, state_family, text_of, value_of
   use motor_choices, only: number_of_family
   use motor_state, only: most_own
-  use motor_system, only: far, motor_system_t
+  use motor_system, only: far, motor_system_t, v_at
   use own_checks, only: check_period, check_values, set_scales
   use own_flights, only: add_own_flights
   use own_friction, only: add_friction, add_restitution
@@ -59,19 +60,26 @@ contains
     if (.not. allocated(error)) call add_restitution(choices, at(4), system, names, error)
     if (allocated(error)) return
     call add_motion(system)
-    if (allocated(system%sheet%error)) then
-      call fail(error, exit_internal, 'equations by expressions: '//system%sheet%error%message)
-      return
-    else if (system%sheet%tape%is_full) then
-      call fail(error, exit_bad_case, 'body.law: too many operations in the expressions of the case')
-      return
-    end if
+    call check_sheet(system, error)
+    if (allocated(error)) return
     call set_scales(system)
     call check_values(choices, at, system, error)
     if (.not. allocated(error)) call check_period(choices, system, error)
     if (allocated(error)) return
     call add_own_flights(system)
+    call check_sheet(system, error)
   end subroutine build_own_equations
+
+  !> All equations are on the tape.
+  pure subroutine check_sheet(system, error)
+    type(motor_system_t), intent(in) :: system
+    type(error_t), allocatable, intent(out) :: error
+    if (allocated(system%sheet%error)) then
+      call fail(error, exit_internal, 'equations by expressions: '//system%sheet%error%message)
+    else if (system%sheet%tape%is_full) then
+      call fail(error, exit_bad_case, 'body.law: too many operations in the expressions of the case')
+    end if
+  end subroutine check_sheet
 
   !> Laws that expressions do not go with.
   pure subroutine refuse_others(choices, at, error)
@@ -129,7 +137,7 @@ contains
       do i = 1, size(choices)
         if (choices(i)%family /= state_family) cycle
         if (any(names%names == choices(i)%label)) then
-          call fail(error, exit_bad_case, path_of(choices(i))//': found a state with the name of a variable, allowed any other')
+          call fail(error, exit_bad_case, path_of(choices(i))//': found the name of a variable, allowed any other')
           return
         end if
         call add_variable(sheet, 'state '//to_text(i))
@@ -274,7 +282,7 @@ contains
     number = 0
     do i = 1, size(choices)
       if (.not. is_open(i)) cycle
-      if (index(text, path_of(choices(i))//'.rate') > 0) number = i
+      if (has_name(text, path_of(choices(i))//'.rate')) number = i
     end do
   end function open_rate
 
@@ -350,7 +358,7 @@ contains
   !> Accelerations, powers and energies, and what they depend on.
   pure subroutine add_motion(system)
     type(motor_system_t), intent(inout) :: system
-    integer :: time
+    integer :: time, i
     associate (sheet => system%sheet)
       call define(sheet, 'zero', '0')
       call define(sheet, 'one', '1')
@@ -374,7 +382,8 @@ contains
       system%current = node_of(sheet, 'zero')
       system%body_hold = node_of(sheet, 'hold')
       associate (depends => depends_on(sheet%tape, 1))
-        time = count(depends([node_of(sheet, 'v_rate'), system%foot]))
+        time = count(depends([node_of(sheet, 'v_rate'), system%foot, (node_of(sheet, 'rate '//to_text(i)), &
+                                                                      i=1, system%variables - v_at)]))
         if (system%restitution > 0) time = time + count([depends(system%restitution)])
       end associate
     end associate

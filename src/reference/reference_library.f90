@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The one entry of the reference library: trajectories of a machine, run and labelled by the same code
+!> The entries of the reference library: trajectories of a machine, run and labelled by the same code
 !> as the maps but in quadruple precision. Doubles go in and out; nothing else is visible outside.
 module reference_library
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_null_char
@@ -9,6 +9,7 @@ module reference_library
   use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: wp
+  use law_fingerprint, only: fingerprint
   use law_table, only: law_choice, law_choice_t, laws
   use law_texts, only: unpack_texts
   use machine_type, only: machine_t
@@ -17,9 +18,14 @@ module reference_library
   implicit none
   private
 
-  public :: separatrix_reference_run
+  public :: separatrix_reference_laws, separatrix_reference_run
 
 contains
+
+  !> The fingerprint of the laws, whose rows are what the program passes.
+  integer(c_int64_t) function separatrix_reference_laws() bind(c)
+    separatrix_reference_laws = fingerprint()
+  end function separatrix_reference_laws
 
   !> Runs `points` trajectories. Laws and effects: row in the law table of each, their texts (`pack_texts`), lengths and values
   !> of their parameters one after the other. `numbers` = tolerance, domain, duration, window, extension, then 1 to stop at

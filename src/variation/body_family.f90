@@ -15,19 +15,14 @@ module body_family
   use one_body, only: mode_of_body, one_body_of, one_body_t, why_not_varied
   use status, only: exit_bad_case, reason_not_smooth
   use text, only: to_text
-  use variations, only: neighbourhood_t, period_slope, stencil_offset, vary
+  use variations, only: neighbourhood_t, period_slope, vary
   implicit none
   private
 
-  public :: body_neighbourhood, body_of_family, fly_periods, map_with_variation, position_neighbour, size_of_motion, vary_period
+  public :: body_of_family, fly_periods, map_with_variation, size_of_motion, vary_period
 
-  !> Distance of the neighbours, as a share of the parameter's size, and at least.
-  real(wp), parameter, public :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
-  real(wp), parameter :: smallest_share = 1e-9_wp
   !> The flights lead from event to event to this share of the size of the motion, or the variation is not known.
   real(wp), parameter, public :: likeness = 1e-6_wp
-  !> Neighbours on both sides; where there is no such machine, above or below.
-  integer, parameter, public :: sides_tried(3) = [0, 1, -1]
 
   !> A machine whose parameter `path` of the laws may be changed; no path: it has none.
   type, public :: family_t
@@ -86,58 +81,6 @@ contains
     body = one_body_of(machine%body, merge(family%sizes(1), size_of_motion(machine%body), family%sizes(1) > 0))
     if (family%sizes(2) > 0) body%size_of(2) = family%sizes(2)
   end subroutine body_of_family
-
-  !> The machine and its neighbours in the parameter.
-  pure subroutine body_neighbourhood(family, value, machines, error)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: value
-    type(neighbourhood_t), intent(out) :: machines
-    type(error_t), allocatable, intent(out) :: error
-    type(one_body_t) :: centre, near(4)
-    real(wp) :: there
-    integer :: i, side
-    call body_of_family(family, value, centre, error)
-    if (allocated(error)) return
-    allocate (machines%centre, source=centre)
-    if (.not. allocated(family%path)) return
-    machines%step = share_for(centre)*max(abs(value), family%parameter_size)
-    do side = 1, 3
-      machines%side = sides_tried(side)
-      if (allocated(error)) deallocate (error)
-      do i = 1, 4
-        call position_neighbour(family, value, machines, i, there, error)
-        if (.not. allocated(error)) call body_of_family(family, there, near(i), error)
-        if (allocated(error)) exit
-        ! The same difference steps in all.
-        near(i)%size_of = centre%size_of
-        near(i)%step_of = centre%step_of
-      end do
-      if (.not. allocated(error)) exit
-    end do
-    if (allocated(error)) return
-    allocate (machines%near, source=near)
-  end subroutine body_neighbourhood
-
-  !> Where the neighbour `i` of the machine at `value` is; code 65 if that is out of the parameter's range.
-  pure subroutine position_neighbour(family, value, machines, i, there, error)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: value
-    type(neighbourhood_t), intent(in) :: machines
-    integer, intent(in) :: i
-    real(wp), intent(out) :: there
-    type(error_t), allocatable, intent(out) :: error
-    there = value + stencil_offset(machines%side, i)*machines%step
-    if (there < family%lowest .or. there > family%highest) call fail(error, exit_bad_case, 'parameter out of its range')
-  end subroutine position_neighbour
-
-  !> Distance of the neighbours of a machine, as a share of the parameter's size: events of theirs must stay within a thin
-  !> Stribeck layer.
-  pure real(wp) function share_for(body)
-    type(one_body_t), intent(in) :: body
-    share_for = share
-    if (body%moving%layer > 0) share_for = &
-      min(share, max(smallest_share, 1.6_wp*(body%moving%machine%friction%stribeck_velocity/body%size_of(2))**2))
-  end function share_for
 
   !> Image of a section point after `periods` drive periods, its derivatives by the point (and by the parameter), and the
   !> events on the way. `ok` is false if the trajectory had to be given up or the derivatives are not known.

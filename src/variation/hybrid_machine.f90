@@ -57,6 +57,8 @@ module hybrid_machine
     procedure :: section_sizes
     procedure :: nearest_copy
     procedure :: within_stops
+    procedure :: narrowed
+    procedure :: take_sizes
     procedure(rests_interface), deferred :: rests
     procedure(fly_interface), deferred :: fly
     procedure(slope_interface), deferred :: slope
@@ -70,9 +72,15 @@ module hybrid_machine
     procedure(starts_interface), deferred :: starts_of_section
   end type hybrid_t
 
+  !> A machine whose parameter is a little different.
+  type, public :: neighbour_t
+    class(hybrid_t), allocatable :: machine
+  end type neighbour_t
+
   !> A machine and, for derivatives by a parameter, its four neighbours.
   type, public :: neighbourhood_t
-    class(hybrid_t), allocatable :: centre, near(:)
+    class(hybrid_t), allocatable :: centre
+    type(neighbour_t), allocatable :: near(:)
     !> Distance of the neighbours in the parameter; `side` -1, 0 or 1: which stencil they make.
     real(wp) :: step = 1
     integer :: side = 0
@@ -225,5 +233,19 @@ contains
     within = point
     within(1) = max(min(point(1), self%upper), self%lower)
   end function within_stops
+
+  !> Distance of the neighbours, as a `share` of the parameter's size, or less.
+  pure real(wp) function narrowed(self, share)
+    class(hybrid_t), intent(in) :: self
+    real(wp), intent(in) :: share
+    narrowed = share
+  end function narrowed
+
+  !> The sizes of another machine, so that differences have the same steps in both.
+  pure subroutine take_sizes(self, other)
+    class(hybrid_t), intent(inout) :: self
+    class(hybrid_t), intent(in) :: other
+    self%size_of = other%size_of
+  end subroutine take_sizes
 
 end module hybrid_machine

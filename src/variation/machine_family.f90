@@ -3,33 +3,41 @@
 
 !> Machines over a parameter of their laws, whatever they are made of: one body, with a motor or without, or a structure.
 module machine_family
-  use body_family, only: body_neighbourhood, body_of_family, family_t
+  use body_family, only: body_of_family, family_t
   use build_motion, only: has_several
-  use errors, only: error_t
-  use hybrid_machine, only: hybrid_t, neighbourhood_t
+  use errors, only: error_t, fail
+  use hybrid_machine, only: hybrid_t, neighbour_t, neighbourhood_t
   use kinds, only: wp
   use motor_body, only: motor_body_t
   use motor_choices, only: has_motor
-  use motor_family, only: motor_body_of_family, motor_neighbourhood
+  use motor_family, only: motor_body_of_family
   use one_body, only: one_body_t
+  use status, only: exit_bad_case
   use structure, only: structure_t
-  use structure_family, only: structure_neighbourhood, structure_of_family
+  use structure_family, only: structure_of_family
+  use variations, only: stencil_offset
   implicit none
   private
 
   public :: machine_of_family, machine_neighbourhood
 
+  !> Distance of the neighbours, as a share of the parameter's size.
+  real(wp), parameter :: share = merge(2e-4_wp, 1e-7_wp, epsilon(1.0_wp) > 1e-20_wp)
+  !> Neighbours on both sides; where there is no such machine, above or below.
+  integer, parameter :: sides_tried(3) = [0, 1, -1]
+
 contains
 
   !> The machine with the parameter at `value`. Code 65 if it cannot be built or its variations are not known.
-  subroutine machine_of_family(family, value, machine, error)
+  pure subroutine machine_of_family(family, value, machine, error)
     type(family_t), intent(in) :: family
     real(wp), intent(in) :: value
-    class(hybrid_t), allocatable, intent(out) :: machine
+    class(hybrid_t), allocatable, intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(one_body_t) :: body
     type(structure_t) :: structure
     type(motor_body_t) :: driven
+    if (allocated(machine)) deallocate (machine)
     if (has_motor(family%laws)) then
       call motor_body_of_family(family, value, driven, error)
       if (.not. allocated(error)) allocate (machine, source=driven)
@@ -48,13 +56,34 @@ contains
     real(wp), intent(in) :: value
     type(neighbourhood_t), intent(out) :: machines
     type(error_t), allocatable, intent(out) :: error
-    if (has_motor(family%laws)) then
-      call motor_neighbourhood(family, value, machines, error)
-    else if (has_several(family%laws)) then
-      call structure_neighbourhood(family, value, machines, error)
-    else
-      call body_neighbourhood(family, value, machines, error)
-    end if
+    integer :: side
+    call machine_of_family(family, value, machines%centre, error)
+    if (allocated(error) .or. .not. allocated(family%path)) return
+    machines%step = machines%centre%narrowed(share)*max(abs(value), family%parameter_size)
+    do side = 1, size(sides_tried)
+      machines%side = sides_tried(side)
+      call build_neighbours(family, value, machines, error)
+      if (.not. allocated(error)) return
+    end do
   end subroutine machine_neighbourhood
+
+  !> The neighbours on one side; code 65 if one is out of the parameter's range, or cannot be built.
+  pure subroutine build_neighbours(family, value, machines, error)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: value
+    type(neighbourhood_t), intent(inout) :: machines
+    type(error_t), allocatable, intent(out) :: error
+    type(neighbour_t) :: near(4)
+    real(wp) :: there
+    integer :: i
+    do i = 1, size(near)
+      there = value + stencil_offset(machines%side, i)*machines%step
+      if (there < family%lowest .or. there > family%highest) call fail(error, exit_bad_case, 'parameter out of its range')
+      if (.not. allocated(error)) call machine_of_family(family, there, near(i)%machine, error)
+      if (allocated(error)) return
+      call near(i)%machine%take_sizes(machines%centre)
+    end do
+    machines%near = near
+  end subroutine build_neighbours
 
 end module machine_family

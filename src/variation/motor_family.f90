@@ -3,18 +3,17 @@
 
 !> A body with a motor over a parameter of its laws.
 module motor_family
-  use body_family, only: family_t, position_neighbour, share, sides_tried
+  use body_family, only: family_t
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
   use motor_body, only: motor_body_of, motor_body_t, why_not_varied
   use motor_machine, only: motor_machine_t, prepare_motor_machine
   use status, only: exit_bad_case
-  use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: motor_body_of_family, motor_neighbourhood
+  public :: motor_body_of_family
 
 contains
 
@@ -57,34 +56,5 @@ contains
       if (machine%has_stops) reach = min(reach, max(length, abs(room)))
     end associate
   end function reach_of
-
-  !> The machine and its neighbours in the parameter.
-  pure subroutine motor_neighbourhood(family, value, machines, error)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: value
-    type(neighbourhood_t), intent(out) :: machines
-    type(error_t), allocatable, intent(out) :: error
-    type(motor_body_t) :: centre, near(4)
-    real(wp) :: there
-    integer :: i, side
-    call motor_body_of_family(family, value, centre, error)
-    if (allocated(error)) return
-    allocate (machines%centre, source=centre)
-    if (.not. allocated(family%path)) return
-    machines%step = share*max(abs(value), family%parameter_size)
-    do side = 1, 3
-      machines%side = sides_tried(side)
-      if (allocated(error)) deallocate (error)
-      do i = 1, 4
-        call position_neighbour(family, value, machines, i, there, error)
-        if (.not. allocated(error)) call motor_body_of_family(family, there, near(i), error)
-        if (allocated(error)) exit
-        near(i)%size_of = centre%size_of
-      end do
-      if (.not. allocated(error)) exit
-    end do
-    if (allocated(error)) return
-    allocate (machines%near, source=near)
-  end subroutine motor_neighbourhood
 
 end module motor_family

@@ -24,6 +24,9 @@ module one_body
   !> Steps of the differences that stand in for derivatives of laws, as a share of the natural size: of fourth order.
   real(wp), parameter :: step = merge(3e-4_wp, 1e-6_wp, epsilon(1.0_wp) > 1e-20_wp)
 
+  !> Smallest distance of the neighbours in a parameter, as a share of its size.
+  real(wp), parameter :: smallest_share = 1e-9_wp
+
   type, extends(hybrid_t), public :: one_body_t
     type(motion_t) :: moving
     !> Steps of the differences of laws.
@@ -40,6 +43,8 @@ module one_body
     procedure :: fly_sections => fly_body_over_sections
     procedure :: map => map_of_body
     procedure :: starts_of_section => starts_of_body
+    procedure :: narrowed
+    procedure :: take_sizes
   end type one_body_t
 
   ! In the submodule `body_sections`: it uses modules that use this one.
@@ -315,5 +320,24 @@ pure subroutine jump_of_body(self, event, t, y, after, by_state, by_time)
     end if
   end associate
 end subroutine jump_of_body
+
+ !> Events of the neighbours must stay within a thin Stribeck layer.
+pure real(wp) function narrowed(self, share)
+  class(one_body_t), intent(in) :: self
+  real(wp), intent(in) :: share
+  narrowed = share
+  if (self%moving%layer > 0) narrowed = &
+    min(share, max(smallest_share, 1.6_wp*(self%moving%machine%friction%stribeck_velocity/self%size_of(2))**2))
+end function narrowed
+
+pure subroutine take_sizes(self, other)
+  class(one_body_t), intent(inout) :: self
+  class(hybrid_t), intent(in) :: other
+  self%size_of = other%size_of
+  select type (other)
+  type is (one_body_t)
+    self%step_of = other%step_of
+  end select
+end subroutine take_sizes
 
 end module one_body

@@ -4,7 +4,7 @@
 !> A structure over a parameter of its laws, and the map from one section to the next with derivatives by the start and by the
 !> parameter. Of a machine without a clock the section is an event, and the time to it changes with both.
 module structure_family
-  use body_family, only: family_t, likeness, position_neighbour, share, sides_tried
+  use body_family, only: family_t, likeness
   use build_motion, only: bodies_of
   use errors, only: error_t, fail
   use guarded_march, only: most_equations
@@ -27,7 +27,7 @@ module structure_family
   implicit none
   private
 
-  public :: structure_of_family, structure_neighbourhood, map_of_family, why_not_varied, vary_section, state_at_start, &
+  public :: structure_of_family, map_of_family, why_not_varied, vary_section, state_at_start, &
     least_dimension
 
 contains
@@ -44,7 +44,7 @@ contains
     if (trial%n > most_equations/2 .and. (.not. moving%machine%linear .or. moving%options%flight == flight_adaptive)) then
       why = 'it has too many coordinates for a law that is not linear'
     end if
-    if (acts_on_time(moving%machine)) why = 'impulses, or samples of a controller, come at times of their own'
+    if (acts_on_time(moving%machine)) why = 'impulses, samples of a controller or forces depend on the time since the start'
     if (integral_of(moving%machine) > 0) why = 'a controller adds up what it sees'
     do j = 1, count_joints(moving%machine)
       associate (joint => moving%machine%joints(j))
@@ -53,7 +53,7 @@ contains
           why = 'a stop or a spring runs on with its surface'
         end if
         if (allocated(joint%memory)) why = 'friction has a memory'
-        if (allocated(joint%load)) why = 'the normal force of friction is an expression'
+        if (allocated(joint%load)) why = 'a force is an expression'
         if (joint%kind /= joint_friction) cycle
         if (joint%friction%excess > 0 .and. joint%friction%stribeck_exponent < 1) why = 'a Stribeck law is vertical at rest'
         if (joint%friction%second_excess > 0 .and. joint%friction%second_exponent < 1) why = 'a Stribeck law is vertical at rest'
@@ -112,35 +112,6 @@ contains
     real(wp), intent(in) :: start(:)
     state = start_of_multibody(structure%frame%moving, start)
   end function state_at_start
-
-  !> The structure and its neighbours in the parameter.
-  pure subroutine structure_neighbourhood(family, value, machines, error)
-    type(family_t), intent(in) :: family
-    real(wp), intent(in) :: value
-    type(neighbourhood_t), intent(out) :: machines
-    type(error_t), allocatable, intent(out) :: error
-    type(structure_t) :: centre, near(4)
-    real(wp) :: there
-    integer :: i, side
-    call structure_of_family(family, value, centre, error)
-    if (allocated(error)) return
-    allocate (machines%centre, source=centre)
-    if (.not. allocated(family%path)) return
-    machines%step = share*max(abs(value), family%parameter_size)
-    do side = 1, 3
-      machines%side = sides_tried(side)
-      if (allocated(error)) deallocate (error)
-      do i = 1, 4
-        call position_neighbour(family, value, machines, i, there, error)
-        if (.not. allocated(error)) call structure_of_family(family, there, near(i), error)
-        if (allocated(error)) exit
-        near(i)%size_of = centre%size_of
-      end do
-      if (.not. allocated(error)) exit
-    end do
-    if (allocated(error)) return
-    allocate (machines%near, source=near)
-  end subroutine structure_neighbourhood
 
   !> Image of a section point after so many sections, its derivatives by the point (and by the parameter).
   pure subroutine map_of_family(machines, point, sections, image, by_start, tally, ok, by_parameter)

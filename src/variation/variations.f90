@@ -192,7 +192,7 @@ contains
     if (present(determinant)) determinant = determinant*determinant_of(flight)
     if (.not. with_parameter) return
     do i = 1, 4
-      call machines%near(i)%fly(mode, t0, y, t1, near(:, i))
+      call machines%near(i)%machine%fly(mode, t0, y, t1, near(:, i))
     end do
     change(:, n + 1) = change(:, n + 1) + by_difference(machines, reached, near)
   end subroutine cross_flight
@@ -220,8 +220,8 @@ contains
       call machines%centre%jump(event, t, y, jumped, r_y, r_t)
       if (with_parameter) then
         do i = 1, 4
-          call machines%near(i)%guard(event, t, y, values(1, i), unused_y, unused_t)
-          call machines%near(i)%jump(event, t, y, jumps(:, i), saltation, unused_y)
+          call machines%near(i)%machine%guard(event, t, y, values(1, i), unused_y, unused_t)
+          call machines%near(i)%machine%jump(event, t, y, jumps(:, i), saltation, unused_y)
         end do
         guard_by_parameter = by_difference(machines, value, values)
         by_parameter = by_difference(machines, jumped, jumps)
@@ -276,7 +276,7 @@ contains
     real(wp) :: near(1, 4), value(1)
     integer :: i
     do i = 1, 4
-      near(1, i) = machines%near(i)%period
+      near(1, i) = machines%near(i)%machine%period
     end do
     value = by_difference(machines, [machines%centre%period], near)
     slope = value(1)

@@ -24,14 +24,34 @@ static int fly(const separatrix_model *model, int index, double inertia, double 
                double (*jacobian)[numbers][columns]) {
   const double start[numbers] = {0.05, 0, 0, 12, 0}, direction = 1;
   const int first[2] = {0, samples};
-  double times[samples], impact[64][4];
-  int impacts, steady, reason, impact_segment[64], impact_count, i;
+  double times[samples], impact[64][5];
+  int impacts, steady, reason, impact_segment[64], i;
+  separatrix_segments call = {
+      .chosen_count = 1,
+      .direction_count = jacobian != NULL,
+      .segment_count = 1,
+      .start_numbers = numbers,
+      .sample_numbers = numbers,
+      .derivatives = jacobian != NULL,
+      .impact_capacity = 64,
+      .tolerance = 1e-12,
+      .chosen = &index,
+      .values = &inertia,
+      .directions = &direction,
+      .start = start,
+      .first = first,
+      .times = times,
+      .motion = motion[0],
+      .jacobian = jacobian ? jacobian[0][0] : NULL,
+      .impacts = &impacts,
+      .steady = &steady,
+      .reason = &reason,
+      .impact_segment = impact_segment,
+      .impact = impact[0],
+  };
   for (i = 0; i < samples; i++)
     times[i] = i / (samples - 1.0);
-  return separatrix_crank_segments(model, 1, &index, &inertia, jacobian != NULL, &direction, 1, start, first,
-                                   times, jacobian != NULL, 1e-12, motion[0],
-                                   jacobian ? jacobian[0][0] : NULL, &impacts, &steady, &reason, 64,
-                                   &impact_count, impact_segment, impact[0], message, sizeof message);
+  return separatrix_propagate(model, &call, message, sizeof message);
 }
 
 /* Whether starts with 9 and 16 rad/s come to an attractor. */

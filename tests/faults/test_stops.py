@@ -217,8 +217,7 @@ def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, ranks):
     assert "stopped" in log
 
 
-@pytest.mark.parametrize("moved", [False, True])
-@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize(("ranks", "moved"), [(0, False), (2, True)])
 def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, ranks, moved):
     """The run does not go on to its end for nothing; a file that was moved can be put back."""
     life.write_case(tmp_path)
@@ -242,8 +241,7 @@ def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, 
         assert "tiles were done before" in (tmp_path / "log").read_text()
 
 
-@pytest.mark.parametrize("share", [0.1, 0.95])
-@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize(("ranks", "share"), [(0, 0.95), (2, 0.1)])
 def test_a_working_file_that_is_truncated_keeps_what_is_whole(mpi_separatrix, tmp_path, ranks, share):
     """The run reports it, writes the description back, and --resume goes on with the other tiles."""
     life.write_case(tmp_path)

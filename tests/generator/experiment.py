@@ -77,8 +77,9 @@ class Experiment:
     samples_per_period: int
     periods: int
     sensor: dict[str, float] = field(default_factory=dict)
-    """sensor_bias [m], sensor_gain [1], sensor_delay [s] of the position; sensor_curved and sensor_cubic:
-    what square and cube of the signal over its standard deviation add to it."""
+    """sensor_bias [m], sensor_gain [1], sensor_delay [s] of the position; sensor_lag: time constant [s] of a
+    low pass of first order; sensor_curved and sensor_cubic: what square and cube of the signal over its
+    standard deviation add to it."""
     scale: float = 1.0
     """Amplitude of the drive over that of the machine."""
 
@@ -123,6 +124,8 @@ class Experiment:
         delay = self.sensor.get("sensor_delay", 0.0)
         if delay > 0:
             seen[:, X] = self._delayed(driven, states, delay, self.substeps(steps_per_period))
+        if self.sensor.get("sensor_lag", 0.0) > 0:
+            seen[:, X] = self._filtered(driven, states, self.substeps(steps_per_period))
         curved, cubic = self.sensor.get("sensor_curved", 0.0), self.sensor.get("sensor_cubic", 0.0)
         if curved or cubic:
             middle, deviation = seen[:, X].mean(), seen[:, X].std()
@@ -133,11 +136,35 @@ class Experiment:
         return seen
 
     def _delayed(self, driven: Machine, states: np.ndarray, delay: float, substeps: int) -> np.ndarray:
-        """Positions `delay` before the samples; before the first sample the first."""
+        """Positions `delay` before the samples; before the first one, with the acceleration there."""
         whole = math.ceil(delay / self.interval)
         rest = whole * self.interval - delay
         starts = np.ascontiguousarray(states[: len(states) - whole])
         t0 = np.arange(len(starts)) * self.interval
         first = np.arange(0, 2 * len(starts) + 1, 2)
         ends, _ = simulate_pieces(driven, starts, t0, first, max(rest, 1e-12), substeps)
-        return np.concatenate([np.full(whole, states[0, X]), ends[1::2, X]])
+        earlier = self._before(states, np.arange(whole) * self.interval - delay)
+        return np.concatenate([earlier, ends[1::2, X]])
+
+    def _before(self, states: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Positions at times before the first sample, at time 0, with the acceleration after it."""
+        acceleration = (states[1, V] - states[0, V]) / self.interval
+        return states[0, X] + t * (states[0, V] + 0.5 * t * acceleration)
+
+    def _filtered(self, driven: Machine, states: np.ndarray, substeps: int) -> np.ndarray:
+        """Positions behind a low pass, exact for a position that is linear between the steps."""
+        step = self.interval / substeps
+        x = simulate(driven, states[0], 0.0, step, (len(states) - 1) * substeps + 1, 1)[0][:, X]
+        share = step / self.sensor["sensor_lag"]
+        forgets = np.exp(-share)
+        late, new = (1 - forgets) / share - forgets, 1 - (1 - forgets) / share
+        lag = self.sensor["sensor_lag"]
+        seen = np.empty_like(x)
+        # of the motion before the first sample
+        seen[0] = (
+            self._before(states, np.array([-lag]))[0]
+            + 0.5 * lag**2 * (states[1, V] - states[0, V]) / self.interval
+        )
+        for i in range(1, len(x)):
+            seen[i] = forgets * seen[i - 1] + late * x[i - 1] + new * x[i]
+        return seen[::substeps]

@@ -9,6 +9,7 @@ module reference
   use attractors, only: attractor_t, pack_attractor
   use errors, only: error_t, fail
   use kinds, only: int64, wp
+  use law_fingerprint, only: fingerprint
   use law_table, only: find_law, law_choice_t
   use law_texts, only: pack_texts
   use motion_state, only: options_t
@@ -56,6 +57,10 @@ module reference
       real(c_double), intent(out) :: results(*)
       integer(c_int) :: status
     end function reference_run
+
+    integer(c_int64_t) function reference_laws() bind(c)
+      import :: c_int64_t
+    end function reference_laws
   end interface
 
   procedure(reference_run), pointer :: separatrix_reference_run => null()
@@ -102,14 +107,30 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(c_ptr) :: handle
     type(c_funptr) :: address
+    procedure(reference_laws), pointer :: laws_of_library
     if (associated(separatrix_reference_run)) return
     handle = open_library(library//c_null_char, resolve_now)
     if (c_associated(handle)) then
+      address = function_in(handle, 'separatrix_reference_laws'//c_null_char)
+      laws_of_library => null()
+      if (c_associated(address)) call c_f_procpointer(address, laws_of_library)
+      if (.not. has_these_laws(laws_of_library)) then
+        call fail(error, exit_no_input, 'the quadruple-precision library '//library// &
+                  ' is of another build; cmake --build BUILD --target separatrix_reference renews it')
+        return
+      end if
       address = function_in(handle, 'separatrix_reference_run'//c_null_char)
       if (c_associated(address)) call c_f_procpointer(address, separatrix_reference_run)
     end if
     if (.not. associated(separatrix_reference_run)) call fail(error, exit_no_input, 'the quadruple-precision library '//library// &
       ' is not in lib/ beside the folder of the program; cmake --build BUILD --target separatrix_reference builds it')
   end subroutine load
+
+  !> Whether a library has the laws of this program, row by row.
+  logical function has_these_laws(laws_of_library)
+    procedure(reference_laws), pointer, intent(in) :: laws_of_library
+    has_these_laws = .false.
+    if (associated(laws_of_library)) has_these_laws = laws_of_library() == fingerprint()
+  end function has_these_laws
 
 end module reference

@@ -36,14 +36,35 @@ extern "C" int fuzz_library(const char *bytes, int64_t length, int *message_leng
     code = separatrix_model_text(model, some, &chosen, &value, resolved.data(), resolved.size(), &needed,
                                  message, size);
   if (code == 0) {
-    const double start[3] = {0.4, 0.1, 0.0}, times[2] = {0.0, 1e-3};
+    const double times[2] = {0.0, 1e-3}, direction = 1;
     const int first[2] = {0, 2};
-    double x[2], v[2], slopes[8], velocity_slopes[8], impact[4];
-    int impacts = 0, steady = 0, reason = 0, met = 0, segment = 0;
-    const double direction = 1;
-    code = separatrix_segments(model, some, &chosen, &value, some, &direction, 1, start, first, times, 0, 0.0,
-                               nullptr, 1, 1e-6, x, v, slopes, velocity_slopes, &impacts, &steady, &reason, 1,
-                               &met, &segment, impact, message, size);
+    int impacts = 0, steady = 0, reason = 0, impact_segment = 0;
+    double impact[5];
+    separatrix_segments segments = {};
+    code =
+        separatrix_segment_numbers(model, &segments.start_numbers, &segments.sample_numbers, message, size);
+    if (code == 0) {
+      const std::size_t rows = static_cast<std::size_t>(segments.sample_numbers);
+      const std::vector<double> start(static_cast<std::size_t>(segments.start_numbers), 0.1);
+      std::vector<double> motion(2 * rows), jacobian(2 * rows * (start.size() + 1));
+      segments.chosen_count = segments.direction_count = some;
+      segments.segment_count = segments.derivatives = segments.impact_capacity = 1;
+      segments.tolerance = 1e-6;
+      segments.chosen = &chosen;
+      segments.values = &value;
+      segments.directions = &direction;
+      segments.start = start.data();
+      segments.first = first;
+      segments.times = times;
+      segments.motion = motion.data();
+      segments.jacobian = jacobian.data();
+      segments.impacts = &impacts;
+      segments.steady = &steady;
+      segments.reason = &reason;
+      segments.impact_segment = &impact_segment;
+      segments.impact = impact;
+      code = separatrix_propagate(model, &segments, message, size);
+    }
   }
   separatrix_model_free(model);
   *message_length = static_cast<int>(std::strlen(message));

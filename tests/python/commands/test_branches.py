@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from program import succeed
+from program import differences, succeed
 from separatrix import style, table
 from separatrix.figures import branches
 from separatrix.open import decode_flags, decode_words, open_result
@@ -480,3 +480,12 @@ def test_every_turn_has_one_label(separatrix: Path, tmp_path: Path):
             ]
             assert len(events) == len(set(events))
     assert turns > 5
+
+
+@pytest.mark.parametrize("ranks", [2, 5])
+def test_the_ranks_share_the_search_and_the_bits_are_the_same(mpi_separatrix, tmp_path, ranks):
+    case = Path(__file__).parents[3] / "examples/validation/impact_coco.toml"
+    words = ["branches", case, "--parameter", "drive.amplitude", "--from", "0.05", "--to", "1.2", "-o"]
+    succeed(mpi_separatrix, *words, "one.h5", folder=tmp_path)
+    succeed(mpi_separatrix, *words, "many.h5", folder=tmp_path, ranks=ranks)
+    assert differences(tmp_path / "one.h5", tmp_path / "many.h5") == []

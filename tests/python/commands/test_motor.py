@@ -63,6 +63,61 @@ def test_crank_that_does_not_get_round(separatrix, yoke, tmp_path):
     assert outcome(separatrix, yoke, tmp_path, *held, "run.duration=60") == "stalled"
 
 
+@pytest.mark.parametrize("dry", [False, True], ids=["viscous", "coulomb"])
+def test_stalled_crank_is_an_attractor(separatrix, yoke, tmp_path, dry):
+    """Every start ends at rest: the bearing holds the crank, and friction ends the motion of the body."""
+    if dry:
+        yoke.write_text(
+            yoke.read_text().replace('"viscous", damping = 0.5', '"coulomb", kinetic_coefficient = 0.2')
+        )
+    axes = "{name='motor.crank_speed', from=0, to=20, count=5}, {name='x0', from=-0.3, to=0.3, count=3}"
+    sets = ["motor.voltage=0.3", "motor.bearing_friction=0.05", f"axis=[{axes}]", "attractors.sample=16"]
+    succeed(separatrix, "basin", yoke, *(f"--set={one}" for one in sets), "-o", "map.h5", folder=tmp_path)
+    with sx.open_result(tmp_path / "map.h5") as result:
+        assert set(result.separatrix.decoded("reason").values.ravel()) == {"settled"}
+        assert set(result.separatrix.decoded("regime").values.ravel()) == {"at_rest"}
+        settle, start = result["settle_time"].values, result["motor_crank_speed"].values
+        rest = result.separatrix.attractors.iloc[0]
+    assert settle[start == 0].max() == 0
+    assert (settle[start > 0] > 0).all()
+    assert settle.max() < 60
+    assert rest["crank_outcome"] == "stalled"
+    assert rest["crank_speed"] == 0
+    np.testing.assert_allclose(rest["torque"], 0.5 * 0.3 / 5, rtol=1e-12)
+    np.testing.assert_allclose(rest["heat_power"], 0.3**2 / 5, rtol=1e-12)
+    if not dry:
+        np.testing.assert_allclose(rest["x"], 0.02 * np.cos(rest["crank_angle"]), atol=1e-12)
+
+
+def test_turning_crank_beside_a_held_body(separatrix, yoke, tmp_path):
+    """Dry friction holds the body: it is at rest, and the crank turns."""
+    yoke.write_text(
+        yoke.read_text().replace('"viscous", damping = 0.5', '"coulomb", kinetic_coefficient = 10')
+    )
+    axes = "{name='motor.crank_speed', from=3, to=15, count=3}, {name='x0', from=-0.05, to=0.05, count=3}"
+    sets = [f"axis=[{axes}]", "attractors.sample=16"]
+    succeed(separatrix, "basin", yoke, *(f"--set={one}" for one in sets), "-o", "map.h5", folder=tmp_path)
+    with sx.open_result(tmp_path / "map.h5") as result:
+        assert set(result.separatrix.decoded("reason").values.ravel()) == {"settled"}
+        rest = result.separatrix.attractors.iloc[0]
+    # 0.1 U = (0.05 + 0.002) w in the mean
+    np.testing.assert_allclose(rest["crank_speed"], 0.7 / 0.052, rtol=1e-2)
+
+
+def test_sweep_out_of_rest(separatrix, yoke, tmp_path):
+    """The bearing holds the crank up to U = R H/k; the hold before has the torque of a crank at rest."""
+    text = '[sweep]\nparameter = "motor.voltage"\nfrom = 0.4\nto = 0.6\nstep = 0.1\n'
+    text += 'directions = "up"\nstarts = [0, 0]\n'
+    yoke.write_text(yoke.read_text() + text)
+    sets = ["--set=motor.bearing_friction=0.045", "--set=run.duration=60"]
+    succeed(separatrix, "sweep", yoke, *sets, "-o", "sweep.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        names = file["crank_outcome"].attrs["flag_meanings"].split()
+        assert [names[code] for code in file["crank_outcome"][0]] == ["stalled", "captured", "captured"]
+        np.testing.assert_allclose(file["torque"][0, 0], 0.04, rtol=1e-12)
+        assert file["amplitude"][0, 0] == 0
+
+
 @pytest.mark.parametrize(("case", "voltage", "speed", "expected"), [
     ("impact", 5.7, 9, "captured"),
     ("impact", 6.1, 10, "captured"),

@@ -91,3 +91,18 @@ def test_rests_keep_their_numbers_along_a_parameter(separatrix, tmp_path):
         rests = found["x"][found["attractor"] == number]
         assert len(rests) == 4
         assert np.ptp(rests) < 0.5
+
+
+@pytest.mark.parametrize("driven", [False, True], ids=["alone", "driven"])
+def test_own_forces_press_a_body_on_its_stop(separatrix, tmp_path, driven):
+    """What rests on a stop under its weight has settled."""
+    case = 'body = { mass = 1 }\nforce = { w = { force = "-g", g = 9.81 } }\n'
+    case += 'contact = { law = "newton", restitution = 0.5, lower = 0 }\n'
+    if driven:
+        case = case.replace('"-g"', '"-g + cos(phase)"') + 'drive = { law = "expression", period = 1 }\n'
+    (tmp_path / "case.toml").write_text(case + AXES.format(low=0, high=1))
+    succeed(separatrix, "basin", "case.toml", "--set=attractors.sample=16", "-o", "map.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "map.h5") as file:
+        reasons = file["reason"].attrs["flag_meanings"].split()
+        assert {reasons[code] for code in file["reason"][()].ravel()} == {"settled"}
+        assert (file["attractor"][()] == 1).all()

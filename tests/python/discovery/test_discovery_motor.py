@@ -51,7 +51,7 @@ def test_the_generator_moves_as_the_program(tmp_path: Path) -> None:
     paths = {"stiffness": "restoring", "damping": "friction", "inductance": "motor"}
     values = {f"{family}.{name}": true[name] for name, family in paths.items()}
     start = states[0][[cranks.X, cranks.PHI, cranks.V, cranks.W, cranks.CURRENT]]
-    found = model.crank_segments(
+    found = model.segments(
         list(values), np.array(list(values.values())), start[None], np.array([0, 150]),
         0.01 * np.arange(150), derivatives=False,
     )  # fmt: skip

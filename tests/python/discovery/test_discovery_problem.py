@@ -104,7 +104,7 @@ def test_derivatives_by_a_table_of_contact_forces_are_no_noise(library):
     flight = (start, 60 * np.arange(41), np.tile(np.linspace(0, 0.6, 60), 40))
     paths = [f"effect.contact_curve.force[{i}]" for i in (1, 4, 8)]
     values = np.array([model.parameters[path].value for path in paths])
-    found = model.segments(paths, values, *flight).jacobian[:, : len(paths)]
+    found = model.segments(paths, values, *flight).jacobian[:, 0, : len(paths)]
     for index, value in enumerate(values):
         ends = [
             model.segments(

@@ -360,7 +360,7 @@ def test_the_words_fit_the_outcome(report: tuple) -> None:
         "ambiguous": "but offset force, offset force with sensor bias would do about as well",
         "none": "No effect is missing that these records could show",
         "not-in-catalogue": "no effect of the catalogue explains it.",
-        "characterised": "on what it depends: memory, or speed and position.",
+        "characterised": "it looks like a force that depends on memory, or speed and position.",
     }
     present = [outcome for outcome, text in expected.items() if text in page.text]
     assert present == [reported["outcome"]]
@@ -437,18 +437,43 @@ def test_a_function_is_drawn_on_the_first_page_with_its_band(tmp_path: Path) -> 
     assert "friction (N) 1 at 0 m/s to 2 at 2 m/s" in first
 
 
-def test_a_record_without_impacts_is_reported(tmp_path: Path) -> None:
-    make(tmp_path, "named")
-    with h5py.File(tmp_path / "details.h5", "a") as file:
+def test_an_effect_that_passes_all_gates_but_one_is_reported_with_them() -> None:
+    reason = "dahl passes every gate but the adequacy"
+    missing = {section.key: section for section in sections(verdict("not-in-catalogue"))}["missing"]
+    assert "or none passed them" in missing.body[0]
+    changed = verdict("not-in-catalogue") | {"reasons": [reason]}
+    missing = {section.key: section for section in sections(changed)}["missing"]
+    assert reason in missing.body[0]
+    assert "none passed" not in missing.body[0]
+
+
+def test_a_low_pass_of_the_sensor_is_no_force() -> None:
+    found = [{"depends_on": ["low pass of the sensor"], "text": "a low pass of the sensor"}]
+    summary = sections(verdict("characterised") | {"character": found})[0].body[0]
+    assert "it looks like a low pass of the sensor" in summary
+    assert "force" not in summary
+
+
+@pytest.mark.parametrize("contacts", [True, False])
+def test_impacts_are_a_section_of_machines_that_have_contacts(tmp_path: Path, contacts: bool) -> None:
+    made = make(tmp_path, "named")
+    _without_impacts(tmp_path)
+    if not contacts:
+        made["parameters"] = {k: v for k, v in made["parameters"].items() if not k.startswith("contact.")}
+    (tmp_path / "verdict.json").write_text(json.dumps(made))
+    html, _ = write_report(tmp_path, tmp_path / "base.toml", Options(quick=True))
+    page = Page(html.read_text())
+    assert "impact-map" not in [name for name, _ in page.pictures]
+    assert ("There are no impacts" in page.text) == contacts
+
+
+def _without_impacts(folder: Path) -> None:
+    with h5py.File(folder / "details.h5", "a") as file:
         empty = {"impacts": np.zeros((0, 6))}
         for group in (*file["records"].values(), file["training/f0/before"], file["training/f0/after"],
                       file["held_out/f1/before"], file["held_out/f1/after"]):  # fmt: skip
             del group["impacts"]
             group["impacts"] = empty["impacts"]
-    html, _ = write_report(tmp_path, tmp_path / "base.toml", Options(quick=True))
-    page = Page(html.read_text())
-    assert "impact-map" not in [name for name, _ in page.pictures]
-    assert "There are no impacts" in page.text
 
 
 def test_maps_before_and_after(

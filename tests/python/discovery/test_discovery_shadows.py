@@ -50,3 +50,40 @@ def test_friction_that_falls_at_low_speed_alone_is_named(source_dir, tmp_path):
     verdict = verdict_of(source_dir, tmp_path, stribeck=0.6, stribeck_velocity=0.4)
     assert (verdict["outcome"], verdict["effects"]) == ("named", ["stribeck"])
     assert verdict["alternatives"] == []
+
+
+def verdict_of_mimic(source_dir, tmp_path, name, level=None):
+    """The verdict on a case of a viscous machine whose sensor shows the past."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(source_dir / "tests" / "generator"))
+        import mimics
+
+        case = mimics.draw_mimic(3, 4, name, "viscous")
+        case.level = level or case.level
+        mimics.write_mimic(tmp_path, case)
+    files = [tmp_path / one for one in ("first.csv", "second.csv", "held_out.csv")]
+    asked = ("coulomb", "quadratic_drag", "sensor_gain", "sensor_delay")
+    verdict = discover(tmp_path / "base.toml", files[:2], files[2:], Options(candidates=asked))
+    return verdict, case.training[0].sensor[name]
+
+
+def test_a_low_pass_of_the_sensor_is_no_delay(source_dir, tmp_path):
+    verdict, time = verdict_of_mimic(source_dir, tmp_path, "sensor_lag")
+    assert (verdict["outcome"], verdict["effects"]) == ("characterised", [])
+    found = verdict["character"][0]
+    assert found["depends_on"] == ["low pass of the sensor"]
+    assert found["constant"]["value"] == pytest.approx(time, rel=0.2)
+
+
+def test_a_delay_of_the_sensor_is_named(source_dir, tmp_path):
+    verdict, time = verdict_of_mimic(source_dir, tmp_path, "sensor_delay")
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["sensor_delay"])
+    assert verdict["parameters"]["effect.sensor_delay.delay"]["value"] == pytest.approx(time, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["sensor_lag", "sensor_delay"])
+def test_noise_that_hides_the_difference_leaves_both(source_dir, tmp_path, name):
+    verdict, _ = verdict_of_mimic(source_dir, tmp_path, name, level=0.1)
+    assert (verdict["outcome"], verdict["effects"]) == ("ambiguous", ["sensor_delay"])
+    assert "sensor_low_pass" in verdict["alternatives"]
+    assert any("low pass" in one for one in verdict["reasons"])

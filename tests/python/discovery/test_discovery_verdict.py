@@ -161,6 +161,8 @@ def test_the_x_of_a_pendulum_is_an_angle():
     assert unit_of("friction.damping", "N s/m", pendulum) == "N m s/rad"
     assert unit_of("effect.quadratic_drag.coefficient", "N s^2/m^2", pendulum) == "N m s^2/rad^2"
     assert unit_of("restoring.moment", "N m", pendulum) == "N m"
+    assert unit_of("", "friction (N)", pendulum) == "friction (N m)"
+    assert unit_of("", "m/s", pendulum) == "rad/s"
     assert unit_of("friction.damping", "N s/m", body) == "N s/m"
 
 

@@ -60,14 +60,14 @@ def test_segments_are_the_motion_of_another_simulator() -> None:
     assert model.coordinates == ("first", "second")
     assert [name.rpartition(".")[2] for name in model.contacts] == ["stop"]
     start, first, times = segments(6, 40)
-    found = model.coordinate_segments(PATHS, VALUES, start, first, times, derivatives=False)
+    found = model.segments(PATHS, VALUES, start, first, times, derivatives=False)
     assert found.jacobian is None
     for i, one in enumerate(start):
         begins = one[4] / 7
         wanted = flown(machine(), one[:2], one[2:4], begins + times[:40])
         assert found.motion[first[i] : first[i + 1]] == pytest.approx(wanted, abs=1e-7)
     assert found.impacts.sum() >= 3
-    assert set(found.contact) == {0}
+    assert set(found.impact.contact) == {0}
     assert found.impact.speed_after == pytest.approx(0.7 * found.impact.speed_before)
 
 
@@ -76,7 +76,7 @@ def test_elastic_friction_begins_in_slide() -> None:
     law = 'law = "elastic_coulomb"\nstiffness = 80\nforce = 0.5'
     model = Model.from_text(CASE[: CASE.index("[contact")].replace("force = 0.15", law))
     start, first, times = segments(6, 40)
-    found = model.coordinate_segments([], np.zeros(0), start, first, times, derivatives=False)
+    found = model.segments([], np.zeros(0), start, first, times, derivatives=False)
     whole = machine()
     for i, one in enumerate(start):
         other = Sprung(whole.mass, whole.force, [1, 0], 80.0, 0.5, int(np.sign(one[2])))
@@ -88,13 +88,13 @@ def test_elastic_friction_begins_in_slide() -> None:
 def test_derivatives_are_those_of_another_step() -> None:
     model = Model.from_text(CASE)
     start, first, times = segments(12, 40)
-    found = model.coordinate_segments(PATHS, VALUES, start, first, times)
+    found = model.segments(PATHS, VALUES, start, first, times)
     good = np.repeat(found.steady & (found.reason == 0), 40)
     assert good.sum() > 0.7 * good.size
 
     def apart(values: tuple, starts: tuple, step: float) -> np.ndarray:
         ends = [
-            model.coordinate_segments(PATHS, v, s, first, times, derivatives=False).motion
+            model.segments(PATHS, v, s, first, times, derivatives=False).motion
             for v, s in zip(values, starts, strict=True)
         ]
         return (ends[0] - ends[1]) / (2 * step)
@@ -117,9 +117,24 @@ def test_derivatives_are_those_of_another_step() -> None:
 def test_what_starts_cannot_express_is_refused(source_dir) -> None:
     one_body = Model.read(source_dir / "examples" / "trajectory_viscous_0.8.toml")
     assert one_body.coordinates == ()
-    with pytest.raises(CaseError, match="allowed for segments of coordinates structure"):
-        one_body.coordinate_segments([], np.zeros(0), np.zeros((1, 1)), np.array([0, 0]), np.zeros(0))
+    with pytest.raises(CaseError, match=r"start: found shape \(1, 5\), allowed \(1, 3\)"):
+        one_body.segments([], np.zeros(0), np.zeros((1, 5)), np.array([0, 0]), np.zeros(0))
     impulse = '[drive.impulse]\nlaw = "impulse"\nbody = "first"\nimpulse = 1\ntime = 2\n'
     struck = Model.from_text(CASE + impulse)
     with pytest.raises(CaseError, match="impulses, or samples of a controller"):
-        struck.coordinate_segments([], np.zeros(0), np.zeros((1, 5)), np.array([0, 0]), np.zeros(0))
+        struck.segments([], np.zeros(0), np.zeros((1, 5)), np.array([0, 0]), np.zeros(0))
+
+
+@pytest.mark.usefixtures("library")
+def test_a_sample_without_a_derivative_is_not_steady() -> None:
+    """At the instant of an impact a velocity has one before and one after it."""
+    model, start, first = Model.from_text(CASE), np.array([[0.0, 0.0, 0.0, 2.0, 0.0]]), np.array([0, 2])
+
+    def fly(time: float):
+        return model.segments([], np.zeros(0), start, first, np.array([time, 0.1]))
+
+    hit = fly(0.0).impact.time
+    assert hit.size == 1
+    assert fly(hit[0] - 1e-3).steady[0]
+    assert fly(hit[0] + 1e-3).steady[0]
+    assert not fly(hit[0]).steady[0]

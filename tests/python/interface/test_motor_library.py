@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import separatrix as sx
 from program import CASE
-from separatrix.library import CaseError, CoordinateSegments, Model
+from separatrix.library import CaseError, Model, Segments
 from separatrix.simulate import Catalogue, section_points, trajectory
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -21,10 +21,10 @@ START = (0.05, 0.1, 0.0, 12.0, 0.0)
 ACTIVE = ["motor.inertia", "motor.resistance", "restoring.stiffness", "friction.damping"]
 
 
-def fly(model: Model, times: np.ndarray, start=START, active=(), values=(), **options) -> CoordinateSegments:
+def fly(model: Model, times: np.ndarray, start=START, active=(), values=(), **options) -> Segments:
     """One segment."""
     first, starts = np.array([0, times.size]), np.array([start])
-    return model.crank_segments(list(active), np.array(values), starts, first, times, **options)
+    return model.segments(list(active), np.array(values), starts, first, times, **options)
 
 
 def flown(case: sx.Case, start: tuple = START) -> object:
@@ -86,6 +86,10 @@ def test_a_current_follows_the_speed() -> None:
     other = fly(model, later, (*begin[:4], 2 * begin[4]), derivatives=False).motion
     of_guess, of_other = (np.abs(one[:, 3] - kept[:, 3]).max() for one in (guessed, other))
     assert of_guess < 0.01 * of_other
+    changed = fly(model, later, (*begin[:4], np.nan))
+    assert changed.steady[0]
+    assert np.isfinite(changed.jacobian).all()
+    np.testing.assert_array_equal(changed.jacobian[:, :, 4], 0.0)
 
 
 def test_maps_in_memory_have_the_bits_of_the_program(tmp_path: Path) -> None:
@@ -130,19 +134,15 @@ def test_refusals_name_the_key() -> None:
     """What does not apply to a machine with a motor, and what only applies to one."""
     model, one = Model.read(IMPACT), (np.array([0, 1]), np.array([0.1]))
     none = ([], np.zeros(0))
-    for call in (
-        lambda: model.segments(*none, np.zeros((1, 3)), *one),
-        lambda: model.coordinate_segments(*none, np.zeros((1, 1)), *one),
-    ):
-        with pytest.raises(CaseError, match="motor: found a machine with a motor"):
-            call()
-    with pytest.raises(CaseError, match="motor: not found"):
-        Model.from_text(CASE).crank_segments(*none, np.zeros((1, 5)), *one)
+    with pytest.raises(CaseError, match=r"start: found shape \(1, 3\), allowed \(1, 5\)"):
+        model.segments(*none, np.zeros((1, 3)), *one)
+    with pytest.raises(CaseError, match=r"start: found shape \(1, 5\), allowed \(1, 3\)"):
+        Model.from_text(CASE).segments(*none, np.zeros((1, 5)), *one)
     ramp = sx.load(IMPACT).with_({"motor.ramp_time": 5.0}).model
     with pytest.raises(CaseError, match=r"motor\.ramp_time"):
-        ramp.crank_segments(*none, np.zeros((1, 5)), *one)
+        ramp.segments(*none, np.zeros((1, 5)), *one)
     with pytest.raises(CaseError, match=r"effect\.viscous"):
         model.with_effect("viscous", {"damping": 0.1})
     with pytest.raises(CaseError, match="motor: found a machine with a motor"):
         section_points(model, (0.0, 0.0), 1)
-    assert model.crank_segments(*none, np.full((1, 5), np.nan), *one).reason[0] == 65
+    assert model.segments(*none, np.full((1, 5), np.nan), *one).reason[0] == 65

@@ -94,7 +94,7 @@ def test_only_the_integrator_asks_what_kind_of_machine_it_moves(source_dir):
     asks = re.compile(r"%\s*(pair|multibody)\b")
     sources = (source_dir / "src").glob("*/*.f90")
     asking = ("integrator", "variation", "modes")
-    knowing = ("lane_slots.f90", "coordinate_segments.f90")
+    knowing = ("lane_slots.f90", "structure_segments.f90")
     above = [p for p in sources if p.parent.name not in asking and p.name not in knowing]
     assert len(above) > 150
     assert [p.name for p in above if asks.search(p.read_text())] == []

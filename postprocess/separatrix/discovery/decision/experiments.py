@@ -91,7 +91,7 @@ def d_primes(one: Fitted, others: list[Fitted], ratio: float | None, scale: floa
         paths, np.array([values[path] for path in paths]), start, edges, times, directions=directions
     )
     shape = (SEARCH.compared_periods, SEARCH.compared_steps)
-    slopes = (flown.jacobian / first.sigma).reshape(*shape, -1)
+    slopes = (flown.jacobian[:, 0] / first.sigma).reshape(*shape, -1)
     found = []
     for other in others:
         its = _values(other, frequency, scale)

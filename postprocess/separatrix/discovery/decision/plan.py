@@ -10,6 +10,7 @@ from separatrix.discovery.decision.scoring import NOISE
 from separatrix.discovery.decision.stages.character import character, has_gap
 from separatrix.discovery.decision.stages.conclusions import few_segments, named, no_effect, not_all
 from separatrix.discovery.decision.stages.cut_short import cut_short
+from separatrix.discovery.decision.stages.filtered_sensor import filtered_sensor, may_be_filtered
 from separatrix.discovery.decision.stages.function import function, function_alone, of_several, only_follows
 from separatrix.discovery.decision.stages.function_of_name import (
     form_refuted,
@@ -186,6 +187,8 @@ PLAN = (
         "the function of the family has another form than the one that is named"),
     Stage("lagging force", may_lag, lagging_force,
         "friction that falls with the speed may be a force that lags"),
+    Stage("filtered sensor", lambda state: not state.in_part and may_be_filtered(state), filtered_sensor,
+        "a delay of the sensor may be a low pass"),
 )
 # fmt: on
 """Every stage in the order in which it is looked at."""

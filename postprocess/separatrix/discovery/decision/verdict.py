@@ -23,7 +23,7 @@ from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
-from separatrix.discovery.fitting.members import MEMBERS, Member, friction_at
+from separatrix.discovery.fitting.members import MEMBERS, friction_at
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
@@ -139,7 +139,8 @@ def _function(found: Function | None, final: Fitted) -> dict | None:
     """The function that the accepted effect is, with its 95 % band and the closed forms that fit it."""
     if found is None:
         return None
-    member = found.member
+    member, parameters = found.member, final.model.parameters
+    unit, quantity = (unit_of("", one, parameters) for one in (found.member.unit, found.member.quantity))
     table = table_of(final, member) or []
     if member.effect == "friction_curve":
         # the law of the machine is in the friction too
@@ -154,8 +155,8 @@ def _function(found: Function | None, final: Fitted) -> dict | None:
     return {
         "effect": member.effect,
         "variable": member.variable,
-        "unit": member.unit,
-        "quantity": member.quantity,
+        "unit": unit,
+        "quantity": quantity,
         "parts": [
             {
                 "direction": one.name,
@@ -168,22 +169,22 @@ def _function(found: Function | None, final: Fitted) -> dict | None:
         "tables": [{"at": at, "value": value} for at, value in table],
         "closed_forms": found.forms,
         "text": "; ".join(
-            f"{member.quantity}{f' {one.name}' if one.name else ''} {one.value[0]:.4g} at {one.at[0]:.3g} "
-            f"{member.unit}{_hump(one, member)} to {one.value[-1]:.4g} at {one.at[-1]:.3g} {member.unit}"
+            f"{quantity}{f' {one.name}' if one.name else ''} {one.value[0]:.4g} at {one.at[0]:.3g} "
+            f"{unit}{_hump(one, unit)} to {one.value[-1]:.4g} at {one.at[-1]:.3g} {unit}"
             for one in found.parts
         )
         + shape,
     }
 
 
-def _hump(one: Part, member: Member) -> str:
+def _hump(one: Part, unit: str) -> str:
     """The value that is farthest outside of those at the ends, in words, if it is outside by its error."""
     ends = sorted((one.value[0], one.value[-1]))
     outside = np.maximum(one.value - ends[1], ends[0] - one.value)
     knot = int(np.argmax(outside))
     if not outside[knot] > 2 * one.error[knot]:
         return ""
-    return f" through {one.value[knot]:.4g} at {one.at[knot]:.3g} {member.unit}"
+    return f" through {one.value[knot]:.4g} at {one.at[knot]:.3g} {unit}"
 
 
 def d_prime(found: Round) -> dict[str, float]:
@@ -345,7 +346,8 @@ def _knot_of(path: str, fitted: Fitted) -> str:
     for member in MEMBERS if bracket else ():
         if member.knots and table in [f"effect.{member.effect}.{key}" for key in member.values]:
             knot = fitted.model.parameters[f"effect.{member.effect}.{member.knots}[{index}"]
-            return f"{member.variable} {knot.value:.4g} {member.unit}"
+            unit = unit_of("", member.unit, fitted.model.parameters)
+            return f"{member.variable} {knot.value:.4g} {unit}"
     return ""
 
 

@@ -177,7 +177,7 @@ class CoordinateProblem(Problem):
         out.hits[rows] = result.impacts
         hits = result.impact
         out.impacts[number] = np.column_stack(
-            [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side, result.contact]
+            [hits.segment, hits.time, hits.speed_before, hits.speed_after, hits.side, hits.contact]
         )
         if derivatives:
             out.steady[rows] = np.asarray(result.steady, bool)
@@ -218,7 +218,7 @@ class CoordinateProblem(Problem):
             each = 3
             times = (times[:, None] + instant * np.arange(each)).ravel()
             offsets = each * offsets
-        result = self.model.coordinate_segments(
+        result = self.model.segments(
             active,
             given,
             start,

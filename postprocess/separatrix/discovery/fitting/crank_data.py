@@ -67,7 +67,7 @@ class CrankProblem(CoordinateProblem):
             each = 3
             times = (times[:, None] + instant * np.arange(each)).ravel()
             offsets = each * offsets
-        result = self.model.crank_segments(
+        result = self.model.segments(
             active,
             given,
             following(start),
@@ -81,8 +81,6 @@ class CrankProblem(CoordinateProblem):
         motion = [result.motion[k::each] for k in range(each)]
         if directions is None:
             return result, motion, None
-        # this machine has no clock, whose angle the last column is of
-        result.jacobian[:, :, -1] = 0.0
         return result, motion, [result.jacobian[k::each] for k in range(each)]
 
     def _shown(self, sensor: Sensor, part: dict, motion, jacobian, active, given, directions) -> tuple:
@@ -164,7 +162,7 @@ class CrankData(SensedData):
     def fly(self, model, active: list, values: np.ndarray, start: np.ndarray, first, times) -> object:
         """Segments of a model without derivatives."""
         exact = {"derivatives": False, "tolerance": FIT.tolerance_of_cranks}
-        found = model.crank_segments(active, values, following(start), first, times, **exact)
+        found = model.segments(active, values, following(start), first, times, **exact)
         found.motion[:, _ANGLE] = np.mod(found.motion[:, _ANGLE], _TURN)
         return found
 

@@ -62,9 +62,9 @@ def flown_late(
     acceleration = ((whole.v[soon] - v0) / short)[segment]
     before = np.minimum(prompt, 0.0)
     v = whole.v[later] + acceleration * before
-    if whole.velocity_jacobian is None:
+    if whole.jacobian is None:
         return Flown(shown, v, None)
-    jacobian = whole.velocity_jacobian[later]
+    jacobian = whole.jacobian[later, 1]
     n = len(more["directions"])
     # by the delay with the start as it is: what comes later is what an earlier start would lead to
     later_start = start[segment, 1] * jacobian[:, n] + acceleration * jacobian[:, n + 1]
@@ -79,7 +79,6 @@ class _Shown:
     def __init__(self, whole, at: np.ndarray) -> None:
         self.x, self.v = whole.x[at], whole.v[at]
         self.jacobian = None if whole.jacobian is None else whole.jacobian[at]
-        self.velocity_jacobian = None if whole.velocity_jacobian is None else whole.velocity_jacobian[at]
         self.impacts, self.impact, self.steady, self.reason = (
             whole.impacts,
             whole.impact,

@@ -190,8 +190,8 @@ class BodyInMotion(OneBody):
             out.steady[rows] = np.asarray(result.steady, bool)
             jacobians = self._derivatives(number, part, moves, seen)
             n = len(directions)
-            out.transition[rows, :, 0, :] = padded_table(result.jacobian[:, n : n + 2], inside)
-            out.transition[rows, :, 1, :] = padded_table(result.velocity_jacobian[:, n : n + 2], inside)
+            out.transition[rows, :, 0, :] = padded_table(result.jacobian[:, 0, n : n + 2], inside)
+            out.transition[rows, :, 1, :] = padded_table(result.jacobian[:, 1, n : n + 2], inside)
         spread = prepared.samples.spread(prepared.memory)[part["samples"]]
         for channel, (measured, computed, size) in enumerate(
             ((part["x"], result.x, prepared.sigma), (part["v"], seen.v, prepared.velocity_sigma))
@@ -229,14 +229,15 @@ class BodyInMotion(OneBody):
             frequency = self.model.drive_frequency(dict(zip(active, given, strict=True)))
             return flown_late(self.model, *flight, frequency, **more)
         result = self.model.segments(*flight, **more)
-        return Flown(result, result.v, result.velocity_jacobian)
+        velocity = None if directions is None else result.jacobian[:, 1]
+        return Flown(result, result.v, velocity)
 
     def _derivatives(self, number: int, part: dict, moves: np.ndarray, seen: Flown) -> list:
         """Derivatives of x and v by the start, and by the free parameters through machine and crank."""
         n = np.count_nonzero(moves)
         crank = np.repeat(self._crank_slopes(number, part), np.diff(part["offsets"]), axis=0)
         found = []
-        for whole in (seen.shown.jacobian, seen.velocity_jacobian):
+        for whole in (seen.shown.jacobian[:, 0], seen.velocity_jacobian):
             by_parameter = whole[:, n + 2 : n + 3] * crank
             by_parameter[:, moves] += whole[:, :n]
             found.append((whole[:, n : n + 2], by_parameter))

@@ -181,7 +181,8 @@ class SensedData(Data):
 
     def fly(self, model, active: list, values: np.ndarray, start: np.ndarray, first, times) -> object:
         """Segments of a model without derivatives."""
-        return model.coordinate_segments(active, values, start, first, times, derivatives=False)
+        exact = {"derivatives": False, "tolerance": FIT.tolerance_of_bodies}
+        return model.segments(active, values, start, first, times, **exact)
 
     def _observed(self, prepared: SensedPrepared, known: np.ndarray, unseen: np.ndarray) -> np.ndarray:
         """The motion of the machine of the case, corrected by the measurement."""

@@ -59,6 +59,7 @@ class Search:
     attached_dampings: tuple = row((0.005, 0.02, 0.08), "1", "campaign",
         "damping ratios of an attached mass that are tried")
     beginnings: int = row(4, "1", "effort", "parts of a delay at the beginning of a record")
+    low_pass_steps: int = row(20, "1", "rounding", "steps in the time constant of a low pass of a sensor")
     hidden_steps: int = row(100, "1/period", "rounding",
         "integration steps of a hidden state per natural period")
     impacts_of_hypothesis: int = row(4, "1", "test", "least number of impacts for a hypothesis about them")

@@ -13,7 +13,7 @@ from separatrix.discovery.options import Options
 from separatrix.discovery.report import figures, where_figures
 from separatrix.discovery.report.comparison import compare
 from separatrix.discovery.report.pages import Beside, Picture, Section, page_of, write_pdf
-from separatrix.discovery.report.verdict_sections import depends_on, names, sections
+from separatrix.discovery.report.verdict_sections import cause, names, sections
 from separatrix.open import reading
 
 
@@ -51,7 +51,7 @@ def _title(verdict: dict) -> str:
         "ambiguous": f"{names(verdict)}, not beyond doubt",
         "none": "none",
         "not-in-catalogue": "not in the catalogue",
-        "characterised": f"not in the catalogue: a force that depends on {depends_on(verdict)}",
+        "characterised": f"not in the catalogue: {cause(verdict)}",
     }[verdict["outcome"]]
 
 
@@ -93,7 +93,12 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "records do not distinguish the two.",
     )
     _show_fits(by_key, details)
-    return parts
+    contacts = any(path.startswith("contact.") for path in verdict["parameters"])
+    return [one for one in parts if one.key != "impacts" or contacts or _has_pictures(one)]
+
+
+def _has_pictures(section: Section) -> bool:
+    return any(isinstance(one, Picture) for one in section.body)
 
 
 def _show_fits(by_key: dict[str, Section], details: h5py.File) -> None:

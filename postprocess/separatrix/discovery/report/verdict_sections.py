@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sections of the report of a verdict in words and tables; every number is one of verdict.json."""
 
+from separatrix.discovery.decision.stages.in_part import NEAREST
+from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.wording import (
@@ -66,6 +68,12 @@ def depends_on(verdict: dict) -> str:
     return ", or ".join(" and ".join(one["depends_on"]) for one in verdict["character"])
 
 
+def cause(verdict: dict) -> str:
+    """What makes a gap without a name, as words."""
+    found = depends_on(verdict)
+    return f"a {found}" if found == LOW_PASS else f"a force that depends on {found}"
+
+
 def _summary(verdict: dict) -> Section:
     others = ", ".join(_pair(name) for name in verdict["alternatives"])
     text = {
@@ -80,7 +88,7 @@ def _summary(verdict: dict) -> Section:
         "none": "No effect is missing that these records could show.",
         "not-in-catalogue": f"Something is missing, and no effect of {searched(verdict)} explains it.",
         "characterised": f"Something is missing, and no effect of {searched(verdict)} explains it; "
-        f"it is known on what it depends: {depends_on(verdict)}.",
+        f"it looks like {cause(verdict)}.",
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {text}"]
     for index, one in enumerate(verdict["character"]):
@@ -237,7 +245,12 @@ def _missing(verdict: dict) -> Section:
             Table(["gate", "meaning", ""], rows),
         ]
     else:
-        body.append("No effect gained enough to be put to the gates, or none passed them.")
+        nearest = [one for one in verdict["reasons"] if NEAREST in one]
+        body.append(
+            f"No effect passed every gate: {nearest[0]}."
+            if nearest
+            else "No effect gained enough to be put to the gates, or none passed them."
+        )
     if verdict["alternatives"]:
         body.append(
             "Not distinguished from: " + ", ".join(_pair(name) for name in verdict["alternatives"]) + "."

@@ -16,6 +16,7 @@ from separatrix.discovery.decision.scoring import family_wise
 from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.hypotheses import Hypothesis, Motion
+from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import SEARCH
@@ -43,8 +44,9 @@ class Character:
             name, unit = self.hypothesis.constant
             law += f", with a {name} of about {self.constant:.3g} {unit}"
         training, held_out = (100 * min(1, one) for one in (self.closed, self.held_out_closed))
+        subject = f"a {what}" if what == LOW_PASS else f"a force that depends on {what}"
         return (
-            f"a force that depends on {what}{law}: it would close {training:.0f} % of the gap in training "
+            f"{subject}{law}: it would close {training:.0f} % of the gap in training "
             f"and {held_out:.0f} % on held-out records (linearised)"
         )
 

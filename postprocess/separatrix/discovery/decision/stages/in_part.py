@@ -32,6 +32,8 @@ from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH
 
+NEAREST = "passes every gate but the adequacy"
+
 
 def effects_in_part(state: SearchState) -> SearchState:
     """Name the effects that help though more is missing."""
@@ -91,7 +93,7 @@ def nearest(state: SearchState) -> SearchState:
     found = _next(state.context, state.round)
     if found is None:
         return state
-    hint = "passes every gate but the adequacy; --partial names what helps though a gap remains"
+    hint = f"{NEAREST}; --partial names what helps though a gap remains"
     return state.decided(state.decision.because(f"{found.name} {hint}"))
 
 

@@ -53,7 +53,7 @@ def lagging_force(state: SearchState) -> SearchState:
     reason = (
         f"friction falls in proportion to the speed, by {-slope:.3g} N s/m up to {fastest:.3g} m/s, as "
         f"damping that supplies energy: a spring force that lags by {lag:.2g} s does the same. A record "
-        " with another spring separates them: the damping of a lag grows with the stiffness"
+        "with another spring separates them: the damping of a lag grows with the stiffness"
     )
     decision = state.decision.because(reason)
     return state.decided(

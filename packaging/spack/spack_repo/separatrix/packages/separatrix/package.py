@@ -28,6 +28,7 @@ class Separatrix(CMakePackage):
     depends_on("gsl")
     depends_on("toml11@3.7:3")
     depends_on("zlib-api")
+    depends_on("isa-l")
     depends_on("mpi", when="+mpi")
     depends_on("hdf5@1.10:1.14+fortran+hl+mpi", when="+mpi")
     depends_on("hdf5@1.10:1.14+fortran+hl~mpi", when="~mpi")
