@@ -53,6 +53,7 @@ contains
     family%options = grid%options
     call machine_neighbourhood(family, 0.0_wp, machines, error)
     if (allocated(error)) return
+    if (.not. has_sets(machines)) return
     chosen = most_reached(names%reached)
     call session%journal%begin('sides of stable and unstable sets', int(4*size(chosen), int64), 0_int64)
     do first = 0, 4*size(chosen) - 1, sides_of_part
@@ -77,6 +78,17 @@ contains
       end do
     end do
   end subroutine grow_sets
+
+  !> Whether sets of saddles are curves of a plane that are followed: those of one body.
+  pure logical function has_sets(machines)
+    type(neighbourhood_t), intent(in) :: machines
+    select type (body => machines%centre)
+    type is (one_body_t)
+      has_sets = .true.
+    class default
+      has_sets = .false.
+    end select
+  end function has_sets
 
   !> Of the four sides of every saddle the first two are of its stable set.
   pure logical function is_stable(n)

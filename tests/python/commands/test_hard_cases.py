@@ -114,7 +114,7 @@ def test_a_stiff_barrier_ends_by_the_step_budget(separatrix, tmp_path):
     outcome = run(separatrix, "trajectory", "case.toml", folder=tmp_path)
     output = outcome.out
     assert outcome.code == 78
-    assert "so stiff that integrator.step_budget = 20000 lasts" in output
+    assert "so stiff that integrator.step_budget = 20000 suffices" in output
     with h5py.File(tmp_path / "case.trajectory.h5") as file:
         assert file.attrs["reason"] == "step_budget"
     (tmp_path / "list.csv").write_text("x0,v0\n0,0.5\n0.01,0\n")

@@ -172,7 +172,7 @@ def test_a_function_is_reported_with_its_hump():
 
     def hump(value: list[float], error: float) -> str:
         part = Part("", at, np.array(value), error**2 * np.eye(5), none, none[0], none[0])
-        return _hump(part, member)
+        return _hump(part, member.unit)
 
     assert hump([0.06, 0.07, 0.096, 0.07, 0.059], 0.001) == " through 0.096 at 0 m"
     assert hump([0.06, 0.05, 0.02, 0.05, 0.059], 0.001) == " through 0.02 at 0 m"
