@@ -166,7 +166,10 @@ def test_what_is_refused(separatrix: Path, tmp_path: Path, parts, message):
 
 @pytest.mark.parametrize(
     ("parts", "message"),
-    [(SERVO + "integral = 3\n", "a controller adds up"), (SERVO + KNOCK, "depend on the time since the start")],
+    [
+        (SERVO + "integral = 3\n", "a controller adds up"),
+        (SERVO + KNOCK, "depend on the time since the start"),
+    ],
 )
 def test_variations_that_are_not_known(separatrix: Path, tmp_path: Path, parts, message):
     (tmp_path / "case.toml").write_text(RUN + BODIES + parts)
