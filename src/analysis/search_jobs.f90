@@ -69,21 +69,19 @@ contains
       return
     end if
     if (.not. allocated(search%traced)) allocate (search%traced(0))
-    if (.not. is_traced(search, seed, found)) then
-      call add_ways(jobs, seed)
-      do i = 1, size(search%expected)
-        if (size(jobs) + 2 > search%workers%count()) exit
-        if (is_same(search%expected(i), seed)) cycle
-        if (.not. is_traced(search, search%expected(i), found)) call add_ways(jobs, search%expected(i))
-      end do
-      call share(search, jobs, results)
-      do i = 1, size(jobs), 2
-        next%seed = jobs(i)%seed
-        call take_branch(search, results(i:i + 1), next%branch)
-        search%traced = [search%traced, next]
-      end do
-      if (.not. is_traced(search, seed, found)) error stop 'search_jobs: a branch was not followed'
-    end if
+    if (is_traced(search, seed, found)) return
+    call add_ways(jobs, seed)
+    do i = 1, size(search%expected)
+      if (size(jobs) + 2 > search%workers%count()) exit
+      if (.not. is_traced(search, search%expected(i), found)) call add_ways(jobs, search%expected(i))
+    end do
+    call share(search, jobs, results)
+    do i = 3, size(jobs), 2
+      next%seed = jobs(i)%seed
+      call take_branch(search, results(i:i + 1), next%branch)
+      search%traced = [search%traced, next]
+    end do
+    call take_branch(search, results(:2), found)
   end subroutine trace
 
   !> Does what the first process asks for, until it calls `dismiss`.
