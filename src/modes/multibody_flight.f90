@@ -43,7 +43,7 @@ contains
     logical :: ended, failed, hopeless
     reason = 0
     if (.not. (options%flight == flight_adaptive .or. is_marched(machine, state%phase))) then
-      start = state
+      if (present(log)) start = state
       ! Intervals of a series, of which a stiff structure has many.
       if (.not. flow%modal .and. flow%rate*(until - state%time) > options%step_budget) then
         triggered = .false.
@@ -64,7 +64,7 @@ contains
       list = flight%list
       count_guards = flight%count_guards
       do
-        start = state
+        if (present(log)) start = state
         call step_flight(machine, flight, state, until, path, triggered, ended, failed, watch)
         if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
         steps = steps + 1
