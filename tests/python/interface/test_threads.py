@@ -21,7 +21,7 @@ def changed(path: str, ratio: float) -> str:
 
 
 def test_cases_are_read_changed_and_written_by_four_threads(source_dir: Path) -> None:
-    """Texts of one thread must not be those of another; it runs apart, since it ended with a signal before."""
+    """Texts of one thread must not be those of another; it runs apart, since it crashed before."""
     case = source_dir / "examples" / "basin_coulomb.toml"
     done = subprocess.run([sys.executable, __file__, case], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
