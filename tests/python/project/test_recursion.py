@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""gfortran mixes up lengths of recursive functions with texts (findings/gfortran_deferred_length_static.sh)."""
+"""gfortran mixes up lengths of texts in recursive functions (findings/gfortran_deferred_length_static.sh)."""
 
 import re
 from pathlib import Path
