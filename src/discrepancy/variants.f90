@@ -9,7 +9,7 @@
 module variants
   use body_machine, only: body_machine_t
   use body_segments, only: segments_of_body, sensor_paths
-  use build_motion, only: bodies_of, body_of, kind_bodies, kind_motor, kind_of
+  use build_motion, only: bodies_of, body_of, kind_bodies, kind_body, kind_motor, kind_of, kind_own
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
   use kinds, only: int64, wp
@@ -164,12 +164,15 @@ contains
       call limit(several)
       allocate (flown%machine, source=segments_of_structure(several))
       call take_facts(several, flown%machine)
-    case default
+    case (kind_body, kind_own)
+      ! The second is refused with the keys that it has.
       call body_of(changed, options, body, error)
       if (allocated(error)) return
       call limit(body)
       allocate (flown%machine, source=segments_of_body(body))
       call take_facts(body, flown%machine)
+    case default
+      call fail(error, exit_bad_case, 'the segments of this kind of machine are not known')
     end select
   end subroutine build
 
