@@ -4,7 +4,7 @@
 !> Machines over a parameter of their laws, whatever they are made of: one body, with a motor or without, or a structure.
 module machine_family
   use body_family, only: body_of_family, family_t
-  use build_motion, only: kind_bodies, kind_body, kind_motor, kind_of
+  use build_motion, only: kind_bodies, kind_body, kind_motor, kind_of, kind_own
   use errors, only: error_t, fail
   use hybrid_machine, only: hybrid_t, neighbour_t, neighbourhood_t
   use kinds, only: wp
@@ -44,7 +44,8 @@ contains
     case (kind_bodies)
       call structure_of_family(family, value, structure, error)
       if (.not. allocated(error)) allocate (machine, source=structure)
-    case (kind_body)
+    case (kind_body, kind_own)
+      ! The second is refused with the keys that it has.
       call body_of_family(family, value, body, error)
       if (.not. allocated(error)) allocate (machine, source=body)
     case default
