@@ -9,7 +9,8 @@
  * Functions return 0, or a code as the program does (64: wrong call, 65: bad case or value, 66: a file
  * cannot be read, 78: the motion was given up) and then write what is wrong into `message`, of
  * `message_size` characters, cut to fit.
- * Nothing is kept outside the handles; one handle may be used by several threads at once.
+ * Nothing is kept outside the handles; one handle may be used by several threads at once. They take turns,
+ * except while they compute trajectories.
  */
 #ifndef SEPARATRIX_H
 #define SEPARATRIX_H

@@ -5,7 +5,7 @@
 module c_coordinates
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_ptr, c_size_t
   use build_motion, only: bodies_of, has_several
-  use c_text, only: answer, to_c
+  use c_text, only: answer, enter, to_c
   use errors, only: error_t, fail
   use multibody, only: is_stop, multibody_t
   use multibody_machine, only: multibody_machine_t
@@ -26,6 +26,7 @@ contains
     integer(c_size_t), value :: name_size, message_size
     type(error_t), allocatable :: error
     type(multibody_t) :: machine
+    call enter()
     call build(model, machine, error)
     if (.not. allocated(error)) then
       if (index < 0 .or. index >= machine%n) then
@@ -46,6 +47,7 @@ contains
     type(multibody_t) :: machine
     integer, allocatable :: contacts(:)
     integer :: i
+    call enter()
     call build(model, machine, error)
     if (.not. allocated(error)) then
       contacts = pack([(i, i=1, size(machine%joints))], is_stop(machine%joints%kind))

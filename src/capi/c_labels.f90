@@ -6,7 +6,7 @@ module c_labels
   use attractors, only: attractor_t
   use basin, only: catalogue_t, label_slices, search_starts
   use c_machine, only: is_start, prepare_machine, prepared_t
-  use c_text, only: answer
+  use c_text, only: answer, compute, computed, enter
   use case_setup, only: span_of
   use discover, only: discover_attractors, sort_attractors
   use errors, only: error_t, fail
@@ -53,6 +53,7 @@ contains
     type(model_t), pointer :: self
     type(labeller_t), pointer :: new
     type(error_t), allocatable :: error
+    call enter()
     call c_f_pointer(model, self)
     catalogue = c_null_ptr
     allocate (new)
@@ -94,6 +95,7 @@ contains
     real(wp), allocatable :: starts(:, :)
     type(error_t), allocatable :: error
     integer :: i
+    call enter()
     call c_f_pointer(catalogue, self)
     associate (prepared => self%prepared, settings => self%prepared%the_case%attractors)
       if (start_count < 0) then
@@ -114,8 +116,10 @@ contains
           exit
         end if
         if (.not. is_start(prepared, starts(:, i))) cycle
+        call compute()
         call discover_attractors(prepared%ensemble%moving, prepared%ensemble%span, starts(:, i:i), settings%max_period, &
                                  self%attractors)
+        call computed()
       end do
     end associate
     call sort_attractors(self%attractors)
@@ -164,6 +168,7 @@ contains
     type(labeller_t), pointer :: self
     type(error_t), allocatable :: error
     integer :: shown
+    call enter()
     call c_f_pointer(catalogue, self)
     numbers = 0
     points = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -201,6 +206,7 @@ contains
     type(labeller_t), pointer :: one
     type(grid_t) :: grid
     integer :: i
+    call enter()
     if (product(int(shape, int64)) /= count .or. any(shape < 1)) then
       call fail(error, exit_usage, 'shape: allowed '//to_text(int(count))//' slices in all')
     else
@@ -243,6 +249,7 @@ contains
     type(labeller_t), pointer :: self
     type(error_t), allocatable :: error
     integer :: first, last, points
+    call enter()
     call c_f_pointer(catalogue, self)
     points = block_size(self%prepared%ensemble)
     call check_size(self%prepared, start_size, error)
@@ -255,7 +262,9 @@ contains
         call fail(error, exit_resumable, 'stopped after '//to_text(first - 1)//' of '//to_text(int(start_count))//' starts')
         exit
       end if
+      call compute()
       call label_block(self, start(:, first:last), values(:, first:last))
+      call computed()
     end do
     code = answer(error, message, message_size)
   end function separatrix_labels_from
