@@ -20,7 +20,7 @@ module guard_functions
   !> where it is, of lengths that the flight has.
   type, public :: search_t
     integer :: guards, functions, terms
-    complex(wp), pointer, contiguous, dimension(:, :) :: term, turn
+    complex(wp), pointer, contiguous, dimension(:, :) :: term => null(), turn => null()
     complex(wp), pointer, contiguous :: exponent(:)
     real(wp), pointer, contiguous :: decay(:), size_of_exponent(:), size_of_term(:, :)
     !> Angular frequency of the first harmonic [rad/s].
