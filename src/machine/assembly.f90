@@ -334,9 +334,11 @@ contains
     real(wp) :: values(machine%n), vectors(machine%n, machine%n)
     integer :: i
     if (machine%n > most_degrees) then
-      call fail(error, exit_bad_case, 'body: found too many bodies, allowed at most 16 coordinates')
+      call fail(error, exit_bad_case, 'body: found '//to_text(machine%n)//' coordinates, allowed at most '// &
+                to_text(most_degrees))
     else if (size(machine%joints) >= most_joints) then
-      call fail(error, exit_bad_case, 'joints: found too many, allowed at most 12')
+      call fail(error, exit_bad_case, 'joints: found '//to_text(size(machine%joints))//' joints, allowed at most '// &
+                to_text(most_joints - 1))
     end if
     if (count_switches(machine) > most_load_switches) call fail(error, exit_bad_case, 'body: found '// &
       to_text(count_switches(machine))//' of abs, sign, min, max and if in the expressions of a machine (a load has one more), '// &
