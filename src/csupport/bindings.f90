@@ -10,7 +10,7 @@ module bindings
 
   public :: c_crashed, c_fork, c_signals_farewell, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
     c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
-    c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
+    c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, c_keep_memory, &
     c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
     c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
@@ -160,6 +160,11 @@ module bindings
     real(c_double) function c_monotonic_seconds() bind(c, name='separatrix_monotonic_seconds')
       import :: c_double
     end function c_monotonic_seconds
+
+    subroutine c_keep_memory(bytes) bind(c, name='separatrix_keep_memory')
+      import :: c_int
+      integer(c_int), value :: bytes
+    end subroutine c_keep_memory
 
     integer(c_int) function c_utc_now(text, size) bind(c, name='separatrix_utc_now')
       import :: c_char, c_int
