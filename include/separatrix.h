@@ -239,7 +239,7 @@ int separatrix_catalogue_search_from(separatrix_catalogue *catalogue, int start_
 /* Number of attractors. */
 int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
 
-/* Attractor `index`, from 0.
+/* Attractor `index`, from 0. Code 64 for one with more than 16 coordinates on the section.
  *   numbers [55]
  *     label, regime, period in drive periods (0: not periodic, or a family), event word; x [m] and v [m/s]
  *     on the section

@@ -314,9 +314,9 @@ contains
       found%rests = .true.
       found%kind = kind_rest
       found%period = 1
+      found%coordinates = n
       call make_points(found, 1)
       found%points(:, 1) = points(:, 0)
-      found%coordinates = n
       found%turn = moving%turn
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0

@@ -4,7 +4,7 @@
 !> The functions of include/separatrix.h that name coordinates and contacts of structures.
 module c_coordinates
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_ptr, c_size_t
-  use build_motion, only: bodies_of, has_several
+  use build_motion, only: bodies_of, kind_bodies, kind_of
   use c_text, only: answer, enter, to_c
   use errors, only: error_t, fail
   use multibody, only: is_stop, multibody_t
@@ -70,7 +70,7 @@ contains
     type(multibody_machine_t) :: several
     call c_f_pointer(model, self)
     allocate (machine%joints(0))
-    if (.not. has_several(self%the_case%laws)) return
+    if (kind_of(self%the_case%laws) /= kind_bodies) return
     call bodies_of(self%the_case%laws, model_options(self, self%the_case%integrator%tolerance), several, error)
     if (.not. allocated(error)) machine = several%bodies%machine
   end subroutine build

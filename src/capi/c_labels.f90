@@ -3,7 +3,7 @@
 
 !> The functions of include/separatrix.h that find the attractors of a machine and label starts with them.
 module c_labels
-  use attractors, only: attractor_t, most_coordinates
+  use attractors, only: attractor_t
   use basin, only: catalogue_t, label_slices, search_starts
   use c_machine, only: is_start, prepare_machine, prepared_t
   use c_text, only: answer, compute, computed, enter
@@ -29,7 +29,9 @@ module c_labels
     separatrix_labels_from
 
   !> Numbers of an attractor.
-  integer, parameter :: of_attractor = 23 + 2*most_coordinates
+  !> Coordinates of an attractor for which its arrays have room.
+  integer, parameter :: room = 16
+  integer, parameter :: of_attractor = 23 + 2*room
 
   !> What a catalogue's handle stands for.
   type :: labeller_t
@@ -159,7 +161,7 @@ contains
       message, message_size) bind(c) result(code)
     type(c_ptr), value :: catalogue
     integer(c_int), value :: index, point_capacity
-    real(c_double), intent(out) :: numbers(of_attractor), points(most_coordinates, point_capacity)
+    real(c_double), intent(out) :: numbers(of_attractor), points(room, point_capacity)
     integer(c_int), intent(out) :: point_count
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
@@ -173,6 +175,9 @@ contains
     point_count = 0
     if (index < 0 .or. index >= size(self%attractors)) then
       call fail(error, exit_usage, 'attractor: found '//to_text(int(index))//', allowed 0 to '//to_text(size(self%attractors) - 1))
+    else if (self%attractors(index + 1)%coordinates > room) then
+      call fail(error, exit_usage, 'attractor: found '//to_text(self%attractors(index + 1)%coordinates)// &
+                ' coordinates on the section, allowed at most '//to_text(room))
     else
       associate (one => self%attractors(index + 1), f => self%attractors(index + 1)%features)
         numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
@@ -180,7 +185,7 @@ contains
                    margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, &
                    one%any_position), &
                    real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, self%prepared%ensemble%moving%has_driver), &
-                   real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
+                   real(one%kind, wp), one%duration, real(one%multipliers(:room)), aimag(one%multipliers(:room))]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
         shown = min(point_count, point_capacity)
         points(:one%coordinates, :shown) = one%points(:one%coordinates, :shown)

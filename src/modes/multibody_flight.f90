@@ -5,7 +5,7 @@
 !> is not linear.
 module multibody_flight
   use flight_path, only: path_t
-  use guards, only: joint_guard_t, most_guards
+  use guards, only: joint_guard_t
   use multibody, only: multibody_t
   use multibody_log, only: log_flight
   use multibody_state, only: is_marched, multibody_state_t
@@ -31,9 +31,9 @@ contains
     type(options_t), intent(in) :: options
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
-    type(joint_guard_t), intent(inout) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(:)
     integer, intent(out) :: count_guards, reason
-    logical, intent(out) :: triggered(most_guards)
+    logical, intent(out) :: triggered(:)
     type(watch_t), intent(inout) :: watch
     integer(int64), intent(inout) :: steps
     type(log_t), intent(inout), optional :: log
