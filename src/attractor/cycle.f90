@@ -17,7 +17,8 @@ module cycle
   implicit none
   private
 
-  public :: map_point, refine_cycle, scale_of, derivative, direction, back_substituted, matrix_of, rests_at, same_events
+  public :: map_point, refine_cycle, scale_of, derivative, direction, back_substituted, matrix_of, rests_at, &
+    same_events, contracting_metric, eigenvalue_bounds
 
   integer, parameter :: most_newton = 20, most_halvings = 30
   !> A cycle attracts if its largest multiplier is below this: nearer to 1 rounding of the derivatives decides.

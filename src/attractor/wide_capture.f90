@@ -1,14 +1,14 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Capture neighbourhoods of cycles that are weakly damped, and of equilibria. One round of such a cycle takes away little more than
-!> what the curvature of the map adds: the neighbourhood that contracts within a round is far smaller than the one from which
-!> motions come in within some rounds.
+!> Capture neighbourhoods of cycles that are weakly damped, and of equilibria. The metric of `cycle` promises next to nothing in
+!> directions that the linear part turns before it shortens them, so that the slightest curvature of the map breaks the promise.
+!> Here the metric is one in which the linear part shortens all directions alike.
 module wide_capture
   use attractors, only: attractor_t, kind_rest, squared_distance
-  use cycle, only: back_substituted, direction, directions, map_point, matrix_of, rests_at, same_events
-  use elementary, only: logarithm
-  use kinds, only: int64, wp
+  use cycle, only: back_substituted, contracting_metric, derivative, direction, directions, eigenvalue_bounds, map_point, &
+    matrix_of, rests_at, rings, same_events
+  use kinds, only: wp
   use machine_type, only: machine_t
   use matrices, only: cholesky
   use motion_state, only: tally_t
@@ -19,25 +19,18 @@ module wide_capture
 
   !> Multiplier from which a cycle is weakly damped.
   real(wp), parameter :: weak = 0.9_wp
-  !> Radii of the starts: between a neighbourhood that is known and one of twice its radius.
-  real(wp), parameter :: rings(2) = [1.0_wp, 0.7071_wp]
-  !> What is to be left of a distance, and in how many times the rounds that the linear part would need.
-  real(wp), parameter :: left = 0.5_wp, longer = 2
-  integer, parameter :: fewest_rounds = 4, most_doublings = 24
-  !> Drive periods that are spent on one attractor, where flights are in closed form and where they are not.
-  integer(int64), parameter :: most_periods = 100000, most_marched = 10000
-
-  !> Rounds in which a start is to come in, and drive periods that may still be spent.
-  type :: effort_t
-    integer :: rounds = fewest_rounds
-    integer(int64) :: periods_left = 0
-  end type effort_t
+  !> Parts of what the multiplier takes away in a round: that which the metric keeps in all directions, that which starts must lose.
+  real(wp), parameter :: kept = 0.9_wp, asked = 0.225_wp
+  !> The first radius that is tried, in the metric; largest distance from a cycle that moves, in its size.
+  real(wp), parameter :: first_radius = 1e-4_wp, farthest = 0.5_wp
+  real(wp), parameter :: growth = 1.5_wp
+  integer, parameter :: most_steps = 60
 
 contains
 
-  !> Doubles the verified capture radius of a cycle while every sampled start on rings beyond it, around every point of the cycle,
-  !> comes in to half its distance within some rounds, each with the events of the cycle. By induction from ring to ring all come
-  !> into the neighbourhood that was verified before.
+  !> Gives a verified cycle a metric in which its map shortens all directions alike, and the largest radius up to which every
+  !> sampled start on rings around every point is nearer after one period of the cycle, by a part of what the multiplier promises,
+  !> with the events of the cycle. Nothing is changed where that captures no more than before.
   pure subroutine widen(moving, attractor)
     class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
@@ -47,91 +40,95 @@ contains
     if (attractor%by_event .and. .not. moving%by_event) then
       allocate (turning, source=moving)
       turning%by_event = .true.
-      call double_radius(turning, attractor)
+      call grow(turning, attractor)
     else
-      call double_radius(moving, attractor)
+      call grow(moving, attractor)
     end if
   end subroutine widen
 
-  pure subroutine double_radius(moving, attractor)
+  pure subroutine grow(moving, attractor)
     class(machine_t), intent(in) :: moving
     type(attractor_t), intent(inout) :: attractor
     type(tally_t) :: reference(attractor%period)
     type(attractor_t) :: wider
-    real(wp) :: image(attractor%coordinates)
-    type(effort_t) :: effort
+    real(wp) :: image(attractor%coordinates), jacobian(attractor%coordinates, attractor%coordinates), radius
     integer :: i
     logical :: ok
-    effort%periods_left = merge(most_periods, most_marched, moving%exact .or. moving%closed_form)
+    wider = attractor
     do i = 1, attractor%period
-      associate (point => attractor%points(:attractor%coordinates, i))
+      associate (n => attractor%coordinates, point => attractor%points(:attractor%coordinates, i))
         ! Where a body rests on the section, the events of one round are not those of the next.
         if (moving%has_clock .and. rests_at(moving, point)) return
         call map_point(moving, point, attractor%period, image, reference(i), ok)
+        if (ok) call derivative(moving, point, attractor%period, attractor%scale(:n), jacobian, ok)
+        if (.not. ok) return
+        wider%metric(:, i) = contracting_metric(jacobian/(1 - kept*(1 - attractor%multiplier)))
       end associate
       ! A neighbour of an equilibrium never comes to rest.
       if (moving%undriven .and. reference(i)%slips == 0) reference(i)%sticks = 0
     end do
-    if (attractor%multiplier > left) then
-      effort%rounds = max(fewest_rounds, ceiling(longer*logarithm(left)/logarithm(attractor%multiplier)))
-    end if
-    wider = attractor
-    do i = 1, most_doublings
-      wider%capture_radius = 2*wider%capture_radius
-      call come_in(moving, wider, reference, effort, ok)
-      if (.not. ok) return
-      attractor%capture_radius = wider%capture_radius
+    radius = first_radius
+    wider%capture_radius = 0
+    do i = 1, most_steps
+      if (attractor%kind /= kind_rest .and. radius > farthest*sqrt(least_eigenvalue(wider))) exit
+      if (.not. contracts(moving, wider, reference, radius)) exit
+      wider%capture_radius = radius
+      radius = growth*radius
     end do
-  end subroutine double_radius
+    if (reach_of(wider) > reach_of(attractor)) attractor = wider
+  end subroutine grow
 
-  !> Whether every start on the rings does.
-  pure subroutine come_in(moving, attractor, reference, effort, ok)
+  !> The least eigenvalue of the metrics of a cycle.
+  pure real(wp) function least_eigenvalue(attractor) result(least)
+    type(attractor_t), intent(in) :: attractor
+    real(wp) :: bounds(2)
+    integer :: i
+    least = huge(least)
+    do i = 1, attractor%period
+      bounds = eigenvalue_bounds(attractor, i)
+      least = min(least, bounds(1))
+    end do
+  end function least_eigenvalue
+
+  !> Smallest semi-axis of the neighbourhoods of a cycle, in the scales of its coordinates.
+  pure real(wp) function reach_of(attractor) result(reach)
+    type(attractor_t), intent(in) :: attractor
+    real(wp) :: bounds(2)
+    integer :: i
+    reach = huge(reach)
+    do i = 1, attractor%period
+      bounds = eigenvalue_bounds(attractor, i)
+      reach = min(reach, attractor%capture_radius/sqrt(bounds(2)))
+    end do
+  end function reach_of
+
+  !> Whether every start on the rings within `radius` is nearer after one period of the cycle.
+  pure logical function contracts(moving, attractor, reference, radius)
     class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor
     type(tally_t), intent(in) :: reference(:)
-    type(effort_t), intent(inout) :: effort
-    logical, intent(out) :: ok
-    real(wp) :: lower(attractor%coordinates, attractor%coordinates), point(attractor%coordinates)
+    real(wp), intent(in) :: radius
+    real(wp) :: lower(attractor%coordinates, attractor%coordinates)
+    real(wp), dimension(attractor%coordinates) :: point, image
+    type(tally_t) :: tally
     integer :: i, ring, k, n
-    ok = .true.
+    logical :: ok
+    contracts = .false.
     n = attractor%coordinates
     do i = 1, attractor%period
       lower = cholesky(matrix_of(attractor%metric(:, i), n))
       do ring = 1, size(rings)
         do k = 1, merge(2, max(directions, 4*n), n == 1)
-          point = attractor%points(:n, i) &
-                  + attractor%scale(:n)*back_substituted(lower, rings(ring)*attractor%capture_radius*direction(k, n))
+          point = attractor%points(:n, i) + attractor%scale(:n)*back_substituted(lower, rings(ring)*radius*direction(k, n))
           if (point(1) > moving%upper .or. point(1) < moving%lower) cycle
-          call halve(moving, attractor, i, reference(i), point, effort, ok)
-          if (.not. ok) return
+          call map_point(moving, point, attractor%period, image, tally, ok)
+          if (.not. ok .or. .not. same_events(tally, reference(i))) return
+          if (sqrt(squared_distance(attractor, i, image)) > (1 - asked*(1 - attractor%multiplier))*rings(ring)*radius &
+              + 1e-12_wp) return
         end do
       end do
     end do
-  end subroutine come_in
-
-  !> Whether a start comes in to half its distance from the `i`-th point of the cycle.
-  pure subroutine halve(moving, attractor, i, reference, start, effort, ok)
-    class(machine_t), intent(in) :: moving
-    type(attractor_t), intent(in) :: attractor
-    integer, intent(in) :: i
-    type(tally_t), intent(in) :: reference
-    real(wp), intent(in) :: start(:)
-    type(effort_t), intent(inout) :: effort
-    logical, intent(out) :: ok
-    real(wp) :: point(size(start)), image(size(start))
-    type(tally_t) :: tally
-    integer :: round
-    point = start
-    do round = 1, effort%rounds
-      effort%periods_left = effort%periods_left - attractor%period
-      ok = effort%periods_left >= 0
-      if (ok) call map_point(moving, point, attractor%period, image, tally, ok)
-      if (ok) ok = same_events(tally, reference)
-      if (.not. ok) return
-      if (squared_distance(attractor, i, image) <= left**2*squared_distance(attractor, i, start)) return
-      point = image
-    end do
-    ok = .false.
-  end subroutine halve
+    contracts = .true.
+  end function contracts
 
 end module wide_capture
