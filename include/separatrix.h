@@ -9,7 +9,8 @@
  * Functions return 0, or a code as the program does (64: wrong call, 65: bad case or value, 66: a file
  * cannot be read, 78: the motion was given up) and then write what is wrong into `message`, of
  * `message_size` characters, cut to fit.
- * Nothing is kept outside the handles; one handle may be used by several threads at once.
+ * Nothing is kept outside the handles; one handle may be used by several threads at once. They take turns,
+ * except while they compute trajectories.
  */
 #ifndef SEPARATRIX_H
 #define SEPARATRIX_H
@@ -238,7 +239,7 @@ int separatrix_catalogue_search_from(separatrix_catalogue *catalogue, int start_
 /* Number of attractors. */
 int separatrix_catalogue_size(const separatrix_catalogue *catalogue);
 
-/* Attractor `index`, from 0.
+/* Attractor `index`, from 0. Code 64 for one with more than 16 coordinates on the section.
  *   numbers [55]
  *     label, regime, period in drive periods (0: not periodic, or a family), event word; x [m] and v [m/s]
  *     on the section

@@ -110,6 +110,29 @@ class Accessor:
             frame[f"multiplier_{number}"] = values
         return frame.rename(columns={"parameter": str(found.attrs["parameter"])})
 
+    def table(self, name: str | None = None) -> "pandas.DataFrame":
+        """Return a table of this result: "attractors", "labelled_points", or that of a variable.
+
+        The table of a variable has all variables over the same dimensions: of a trajectory those over time
+        with "x", its events with "event_kind". Without a name it is the attractors of a map, the samples of
+        a motion, else the table of `regime` or of the first variable. Codes and event words are texts;
+        `attrs["units"]` has the unit of each column, but not of attractors and labelled points.
+        """
+        from separatrix.frames import frame_of
+
+        if name == "attractors" or (name is None and self.kind == "basin" and self._has_catalogue()):
+            return self.attractors
+        return self.labelled_points if name == "labelled_points" else frame_of(self._result, name)
+
+    def save_table(self, path: str | Path, name: str | None = None, *, overwrite: bool = False) -> Path:
+        """Write a `table` as .csv, at full precision, or with pyarrow as .parquet; return the path."""
+        from separatrix.frames import write_frame
+
+        return write_frame(self.table(name), path, overwrite)
+
+    def _has_catalogue(self) -> bool:
+        return "catalogue_attractor" in self._result
+
     def shares(self, field: str = "attractor") -> "pandas.Series":
         """Return the share of the points in each class: attractor, regime, reason, period."""
         if field not in self._result:

@@ -181,9 +181,7 @@ contains
       trace%step = length/4
       ! What was located on a step that is taken anew is found once more.
       points = points(:known)
-      if (trace%step >= smallest_step*plan%largest_step) return
-      call leave_by_graze(family, plan, trace, points, ending)
-      if (ending == label_not_known) ending = unforeseen(trace, next)
+      if (trace%step < smallest_step*plan%largest_step) call leave_unforeseen(family, plan, next, trace, points, ending)
       return
     end if
     next%step = min(plan%largest_step, length*merge(0.7_wp, 1.4_wp, steps > many_steps))
@@ -195,6 +193,18 @@ contains
     if (.not. turned) next%bend = (next%now%tangent - trace%now%tangent)/length
     trace = next
   end subroutine go_on
+
+  !> Beyond a step than which none is shorter the motion `next` has other events.
+  subroutine leave_unforeseen(family, plan, next, trace, points, ending)
+    type(family_t), intent(in) :: family
+    type(plan_t), intent(in) :: plan
+    type(trace_t), intent(in) :: next
+    type(trace_t), intent(inout) :: trace
+    type(point_t), allocatable, intent(inout) :: points(:)
+    integer, intent(inout) :: ending
+    call leave_by_graze(family, plan, trace, points, ending)
+    if (ending == label_not_known) ending = unforeseen(trace, next)
+  end subroutine leave_unforeseen
 
   !> What the second half of an orbit of even period differs by from the first, in natural sizes: in the instants and states of the
   !> events, and without any in the section points, which jump where an impact passes the section. Nothing where the halves have

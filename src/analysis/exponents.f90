@@ -107,13 +107,7 @@ contains
         ! In units in which both coordinates are alike.
         by_start(1, 2) = by_start(1, 2)*body%size_of(2)/body%size_of(1)
         by_start(2, 1) = by_start(2, 1)*body%size_of(1)/body%size_of(2)
-        direction = matmul(by_start, direction)
-        growth = norm2(direction)
-        if (growth > 0) then
-          direction = direction/growth
-        else
-          direction = [0.6_wp, 0.8_wp]
-        end if
+        call map_direction(by_start, direction, growth)
         if (i < 1) cycle
         dead = dead .or. .not. growth > 0
         determinant = abs(by_start(1, 1)*by_start(2, 2) - by_start(1, 2)*by_start(2, 1))
@@ -136,6 +130,20 @@ contains
     spectrum%periods = periods
     spectrum%mean_period = machines%centre%period
   end subroutine lyapunov_exponents
+
+  !> Maps a direction and makes it a unit vector again; `growth` is its length in between. One that vanishes begins anew.
+  pure subroutine map_direction(by_start, direction, growth)
+    real(wp), intent(in) :: by_start(2, 2)
+    real(wp), intent(inout) :: direction(2)
+    real(wp), intent(out) :: growth
+    direction = matmul(by_start, direction)
+    growth = norm2(direction)
+    if (growth > 0) then
+      direction = direction/growth
+    else
+      direction = [0.6_wp, 0.8_wp]
+    end if
+  end subroutine map_direction
 
   !> Moves a body that starts at another crank angle on to the first section, and from there over `periods`, if any. `reason` is
   !> not 0 if it had to be given up.

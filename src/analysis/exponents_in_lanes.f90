@@ -98,9 +98,7 @@ contains
       ! Not all alike: on a cycle the parts would begin at the same point, or at the same turn of the directions, and what
       ! their halves differ by would look like no chance.
       progress(lane)%left = aligning + (lane*(lane + 1))/2
-      call sine_cosine(pi*lane/lane_count, tangents%first_im(lane), tangents%first_re(lane))
-      tangents%second_re(lane) = -tangents%first_im(lane)
-      tangents%second_im(lane) = tangents%first_re(lane)
+      call set_directions(lane, tangents)
       call set_off(flow, lane, starts(lane), .true., batch)
       call go_on(periods, lane, progress(lane), batch)
     end do
@@ -129,6 +127,15 @@ contains
     spectrum%periods = periods
     spectrum%mean_period = body%period
   end subroutine gather_exponents
+
+  !> Two directions at right angles, in every lane others.
+  pure subroutine set_directions(lane, tangents)
+    integer, intent(in) :: lane
+    type(tangents_t), intent(inout) :: tangents
+    call sine_cosine(pi*lane/lane_count, tangents%first_im(lane), tangents%first_re(lane))
+    tangents%second_re(lane) = -tangents%first_im(lane)
+    tangents%second_im(lane) = tangents%first_re(lane)
+  end subroutine set_directions
 
   !> Flies the one motion over `transient` and the sections; the lanes start beside what it passes in the second half of the
   !> transient, so far apart that they are no repetition of each other.

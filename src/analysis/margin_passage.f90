@@ -66,11 +66,7 @@ contains
       return
     end if
     goes_on = here(1)%label /= label_stiction
-    if (goes_on) call change_all(at, passed, changed, goes_on)
-    if (goes_on) beyond%now%orbit = changed
-    if (goes_on) call enter_sequence(family, at, trace%step, beyond, goes_on)
-    ! An orbit of a shorter period near by is not what goes on there.
-    if (goes_on) goes_on = .not. is_repeated(beyond)
+    if (goes_on) call go_beyond(family, at, passed, trace%step, changed, beyond, goes_on)
     if (k > 0 .and. .not. goes_on) then
       call pass_without(family, plan, at, k, trace, points, ending)
       if (ending == no_label) return
@@ -94,6 +90,22 @@ contains
     beyond%came = beyond%step
     trace = beyond
   end subroutine pass_margin
+
+  !> The orbit `changed` at a margin, with the events beyond it, and the point `beyond` that is `step` further, if there is one.
+  subroutine go_beyond(family, at, passed, step, changed, beyond, ok)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: at
+    type(margin_t), intent(in) :: passed
+    real(wp), intent(in) :: step
+    type(orbit_t), intent(out) :: changed
+    type(trace_t), intent(inout) :: beyond
+    logical, intent(out) :: ok
+    call change_all(at, passed, changed, ok)
+    if (ok) beyond%now%orbit = changed
+    if (ok) call enter_sequence(family, at, step, beyond, ok)
+    ! An orbit of a shorter period near by is not what goes on there.
+    if (ok) ok = .not. is_repeated(beyond)
+  end subroutine go_beyond
 
   !> The event with which a slip, or stick, begins that lasts for next to no time, if what is zero belongs to it: all of its margins
   !> are zero together, and the orbit goes on without it. 0 without.

@@ -56,7 +56,7 @@ contains
   end function symmetry_text
 
   !> The event word of an orbit.
-  pure integer(int64) function word_of(orbit, search) result(word)
+  integer(int64) function word_of(orbit, search) result(word)
     type(orbit_t), intent(in) :: orbit
     type(search_t), intent(in) :: search
     type(tally_t) :: tally
@@ -125,7 +125,7 @@ contains
   end subroutine append_event
 
   !> Drive period of the machine of an orbit [s].
-  pure real(wp) function period_at(orbit, search) result(period)
+  real(wp) function period_at(orbit, search) result(period)
     type(orbit_t), intent(in) :: orbit
     type(search_t), intent(in) :: search
     type(law_choice_t), allocatable :: laws(:)

@@ -53,13 +53,13 @@ contains
       associate (machine => structure%frame%moving%machine)
         found%joints = join([(machine%joints(held(i))%name, i=1, count_held)], ', ')
         if (count_held == 0 .or. count_held > most_held .or. .not. (plain .and. machine%linear)) return
-        call position_of(machines, structure, phase, corner, ok)
+        call position_of(family, parameter, machines, structure, phase, corner, ok)
         if (.not. ok) return
         middle = corner
         half = 0
         do i = 1, count_held
           phase(held(i)) = -1
-          call position_of(machines, structure, phase, other, ok)
+          call position_of(family, parameter, machines, structure, phase, other, ok)
           if (.not. ok) return
           phase(held(i)) = 1
           associate (friction => machine%joints(held(i))%friction)
@@ -73,30 +73,30 @@ contains
       found%high = middle + half
       found%known = .true.
     end select
-
-  contains
-
-    !> Where the watched coordinate is at rest in a mode.
-    subroutine position_of(machines, structure, phase, position, ok)
-      type(neighbourhood_t), intent(in) :: machines
-      type(structure_t), intent(in) :: structure
-      integer, intent(in) :: phase(:)
-      real(wp), intent(out) :: position
-      logical, intent(out) :: ok
-      type(neighbourhood_t) :: own
-      type(equilibrium_t) :: point
-      real(wp) :: along(structure%n + 1), rows(2, structure%n)
-      own = machines
-      point = equilibrium_t(mode=mode_number(structure%frame%moving%machine, phase), parameter=parameter, &
-                            y=[(0.0_wp, i=1, structure%n)])
-      along = 0
-      along(structure%n + 1) = 1
-      call correct_equilibrium(family, own, point, along, ok)
-      rows = structure%watched
-      position = sum(rows(1, :)*point%y)
-    end subroutine position_of
-
   end subroutine find_rest_family
+
+  !> Where the watched coordinate is at rest in a mode.
+  subroutine position_of(family, parameter, machines, structure, phase, position, ok)
+    type(family_t), intent(in) :: family
+    real(wp), intent(in) :: parameter
+    type(neighbourhood_t), intent(in) :: machines
+    type(structure_t), intent(in) :: structure
+    integer, intent(in) :: phase(:)
+    real(wp), intent(out) :: position
+    logical, intent(out) :: ok
+    type(neighbourhood_t) :: own
+    type(equilibrium_t) :: point
+    real(wp) :: along(structure%n + 1), rows(2, structure%n)
+    integer :: i
+    own = machines
+    point = equilibrium_t(mode=mode_number(structure%frame%moving%machine, phase), parameter=parameter, &
+                          y=[(0.0_wp, i=1, structure%n)])
+    along = 0
+    along(structure%n + 1) = 1
+    call correct_equilibrium(family, own, point, along, ok)
+    rows = structure%watched
+    position = sum(rows(1, :)*point%y)
+  end subroutine position_of
 
   !> Joints that dry friction holds where nothing moves, with the phases of all joints there, those held sliding forwards. Not
   !> `plain` where the forces of friction at rest are not within fixed limits alone.

@@ -4,7 +4,8 @@
 !> How far a periodic orbit of a structure is from having another sequence of events: the guards of its flights that are not met,
 !> the speeds of its impacts, the reserve of what holds, the order of its events. See module `orbit_margins`.
 module structure_margins
-  use guards, only: force_ends, force_returns, guards_of, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, most_guards, &
+  use guards, only: force_ends, force_returns, guards_of, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, &
+    room_for_guards, &
     slide_ends, slides_down, slides_up, turns_round
   use hybrid_machine, only: event_t, hybrid_t
   use multibody, only: most_joints
@@ -163,9 +164,9 @@ contains
     real(wp), intent(in) :: from, start(:), until
     type(margins_t), intent(inout) :: margins
     type(mode_flow_t) :: spare
-    type(joint_guard_t) :: list(most_guards)
+    type(joint_guard_t) :: list(room_for_guards(machine%frame%moving%machine))
     type(event_t) :: probe
-    real(wp) :: y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(most_guards)
+    real(wp) :: y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(size(list))
     real(wp) :: least_t, least
     type(multibody_state_t) :: state
     integer :: i, g, at, count_guards, count_looks

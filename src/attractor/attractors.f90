@@ -11,7 +11,7 @@ module attractors
   private
 
   public :: most_coordinates, regime_of, wrap_range, make_points, find_capture, find_box, squared_distance, pack_attractor, &
-    packed_length, unpack_attractor
+    packed_length, unpack_attractor, metric_numbers, is_packed
 
   !> Regimes of a motion; stuck are two bodies that move as one.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
@@ -31,10 +31,7 @@ module attractors
   !> Longest period in drive periods that is looked for near a return of the motion, and of one that returns to the bit.
   integer, parameter, public :: longest_period = 64, longest_exact_period = 1024
 
-  !> Numbers of a metric: the upper triangle of its matrix, column by column.
-  integer, parameter, public :: metric_numbers = (most_coordinates*(most_coordinates + 1))/2
-
-  integer, parameter :: packed_scalars = 27 + 3*most_coordinates, packed_per_point = most_coordinates + metric_numbers
+  integer, parameter :: packed_scalars = 27
   !> Share of its size by which a box of section points is widened on each side.
   real(wp), parameter :: box_margin = 0.05_wp
   !> Fewest numbers of a packed attractor.
@@ -79,9 +76,10 @@ module attractors
     logical :: by_event = .false.
     !> Time that one cycle takes, of a family each [s]; 0 of what is none.
     real(wp) :: duration = 0
-    !> Section points, canonical one first; for period 0 lower and upper corner of the box.
+    !> Section points, zeros after the last coordinate, canonical one first; for period 0 lower and upper corner of the box.
     real(wp), allocatable :: points(:, :)
-    !> Scales of the coordinates, and for each point the metric in scaled coordinates in which the map contracts.
+    !> Scales of the coordinates, and for each point the metric in scaled coordinates in which the map contracts:
+    !> the upper triangle of its matrix, column by column.
     real(wp) :: scale(most_coordinates) = 1
     real(wp), allocatable :: metric(:, :)
     !> Radius in that metric within which contraction was verified.
@@ -90,12 +88,19 @@ module attractors
 
 contains
 
-  !> Room for the section points of an attractor, all 0.
+  !> Numbers of a metric.
+  pure elemental integer function metric_numbers(coordinates)
+    integer, intent(in) :: coordinates
+    metric_numbers = (coordinates*(coordinates + 1))/2
+  end function metric_numbers
+
+  !> Room for the section points of an attractor of known `coordinates`, all 0.
   pure subroutine make_points(attractor, count)
     type(attractor_t), intent(inout) :: attractor
     integer, intent(in) :: count
     if (allocated(attractor%points)) deallocate (attractor%points, attractor%metric)
-    allocate (attractor%points(most_coordinates, count), attractor%metric(metric_numbers, count), source=0.0_wp)
+    allocate (attractor%points(most_coordinates, count), attractor%metric(metric_numbers(attractor%coordinates), count), &
+              source=0.0_wp)
   end subroutine make_points
 
   !> Features of what was counted over `periods` drive periods (not necessarily a whole number).
@@ -250,32 +255,52 @@ contains
   !> Numbers of an attractor that `pack_attractor` packs.
   pure integer function packed_length(attractor)
     type(attractor_t), intent(in) :: attractor
-    packed_length = packed_scalars
-    if (allocated(attractor%points)) packed_length = packed_length + packed_per_point*size(attractor%points, 2)
+    packed_length = packed_scalars + 3*attractor%coordinates
+    if (allocated(attractor%points)) packed_length = packed_length + packed_per_point(attractor%coordinates)* &
+                                                     size(attractor%points, 2)
   end function packed_length
+
+  pure integer function packed_per_point(coordinates)
+    integer, intent(in) :: coordinates
+    packed_per_point = coordinates + metric_numbers(coordinates)
+  end function packed_per_point
+
+  !> Whether numbers, of which there are the `least_packed`, can be those of an attractor.
+  pure logical function is_packed(packed)
+    real(wp), intent(in) :: packed(:)
+    integer :: n
+    is_packed = packed(4) >= 0 .and. packed(4) <= most_coordinates
+    if (.not. is_packed) return
+    n = nint(packed(4))
+    is_packed = size(packed) >= packed_scalars + 3*n
+    if (is_packed .and. n > 0) is_packed = modulo(size(packed) - packed_scalars - 3*n, packed_per_point(n)) == 0
+  end function is_packed
 
   !> An attractor as plain numbers, to be sent between ranks; the first is their count.
   pure function pack_attractor(attractor) result(packed)
     type(attractor_t), intent(in) :: attractor
     real(wp) :: packed(packed_length(attractor))
-    associate (f => attractor%features)
-      packed(:packed_scalars) = [real(size(packed), wp), real(attractor%id, wp), real(attractor%period, wp), &
+    associate (f => attractor%features, n => attractor%coordinates)
+      packed(:packed_scalars + 3*n) = [real(size(packed), wp), real(attractor%id, wp), real(attractor%period, wp), &
         real(attractor%coordinates, wp), merge(1.0_wp, 0.0_wp, attractor%rests), real(f%regime, wp), real(f%word, wp), &
         f%impacts_per_period, f%mean_impact_speed, f%amplitude, f%x_max, f%x_min, f%v_max, &
         f%grazing_margin, attractor%multiplier, attractor%capture_radius, attractor%section, &
         merge(1.0_wp, 0.0_wp, attractor%any_position), real(attractor%kind, wp), attractor%turn, &
         f%rotation, merge(1.0_wp, 0.0_wp, attractor%by_event), attractor%duration, real(attractor%positions, wp), &
-        attractor%scale, real(attractor%multipliers), aimag(attractor%multipliers)]
+        attractor%scale(:n), real(attractor%multipliers(:n)), aimag(attractor%multipliers(:n))]
     end associate
-    if (allocated(attractor%points)) packed(packed_scalars + 1:) = &
-      [reshape(attractor%points, [size(attractor%points)]), reshape(attractor%metric, [size(attractor%metric)])]
+    if (.not. allocated(attractor%points)) return
+    associate (points => attractor%points(:attractor%coordinates, :), metric => attractor%metric)
+      packed(packed_scalars + 3*attractor%coordinates + 1:) = &
+        [reshape(points, [size(points)]), reshape(metric, [size(metric)])]
+    end associate
   end function pack_attractor
 
   !> The inverse of `pack_attractor`.
   pure function unpack_attractor(packed) result(attractor)
     real(wp), intent(in) :: packed(:)
     type(attractor_t) :: attractor
-    integer :: count, metric
+    integer :: count, n, last
     attractor%id = nint(packed(2))
     attractor%period = nint(packed(3))
     attractor%coordinates = nint(packed(4))
@@ -291,15 +316,16 @@ contains
     attractor%by_event = packed(25) > 0
     attractor%duration = packed(26)
     attractor%positions = nint(packed(27))
-    attractor%scale = packed(28:27 + most_coordinates)
-    attractor%multipliers = cmplx(packed(28 + most_coordinates:27 + 2*most_coordinates), &
-                                  packed(28 + 2*most_coordinates:packed_scalars), wp)
-    count = (size(packed) - packed_scalars)/packed_per_point
-    if (count == 0) return
+    n = attractor%coordinates
+    last = packed_scalars
+    attractor%scale(:n) = packed(last + 1:last + n)
+    attractor%multipliers(:n) = cmplx(packed(last + n + 1:last + 2*n), packed(last + 2*n + 1:last + 3*n), wp)
+    last = last + 3*n
+    if (size(packed) == last) return
+    count = (size(packed) - last)/packed_per_point(n)
     call make_points(attractor, count)
-    metric = packed_scalars + size(attractor%points)
-    attractor%points = reshape(packed(packed_scalars + 1:metric), shape(attractor%points))
-    attractor%metric = reshape(packed(metric + 1:), shape(attractor%metric))
+    attractor%points(:n, :) = reshape(packed(last + 1:last + n*count), [n, count])
+    attractor%metric = reshape(packed(last + n*count + 1:), shape(attractor%metric))
   end function unpack_attractor
 
 end module attractors

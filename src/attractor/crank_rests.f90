@@ -38,9 +38,9 @@ contains
     found%rests = .true.
     found%kind = kind_rest
     found%period = 1
+    found%coordinates = moving%coordinates()
     call make_points(found, 1)
     found%points(:, 1) = moving%point_of(later)
-    found%coordinates = moving%coordinates()
     found%section = [later%state%x, 0.0_wp, later%motor%phi, 0.0_wp]
     found%features%regime = regime_at_rest
     found%features%x_max = later%state%x

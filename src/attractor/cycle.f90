@@ -17,7 +17,8 @@ module cycle
   implicit none
   private
 
-  public :: map_point, refine_cycle, scale_of, derivative, direction
+  public :: map_point, refine_cycle, scale_of, derivative, direction, back_substituted, matrix_of, rests_at, &
+    same_events, contracting_metric, eigenvalue_bounds
 
   integer, parameter :: most_newton = 20, most_halvings = 30
   !> A cycle attracts if its largest multiplier is below this: nearer to 1 rounding of the derivatives decides.
@@ -250,7 +251,7 @@ contains
   !> S = sum over k of (M^k)' M^k, the metric in which a stable M contracts: its upper triangle, column by column.
   pure function contracting_metric(jacobian) result(metric)
     real(wp), intent(in) :: jacobian(:, :)
-    real(wp) :: metric(metric_numbers)
+    real(wp) :: metric(metric_numbers(size(jacobian, 1)))
     real(wp), dimension(size(jacobian, 1), size(jacobian, 1)) :: s, m
     integer :: i, j, k
     s = 0
@@ -263,7 +264,6 @@ contains
       m = matmul(m, m)
       if (maxval(abs(m)) < epsilon(1.0_wp)) exit
     end do
-    metric = 0
     do j = 1, size(s, 1)
       do k = 1, j
         metric((j*(j - 1))/2 + k) = (s(k, j) + s(j, k))/2
@@ -385,8 +385,19 @@ contains
     integer, intent(in) :: k, n
     real(wp) :: unit(n), sine, cosine
     integer :: j
-    real(wp), parameter :: irrational(most_coordinates) = sqrt([2.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 11.0_wp, 13.0_wp, &
-      17.0_wp, 19.0_wp, 23.0_wp, 29.0_wp, 31.0_wp, 37.0_wp, 41.0_wp, 43.0_wp, 47.0_wp, 53.0_wp])
+    !> Square roots of primes.
+    real(wp), parameter :: irrational(most_coordinates) = sqrt([ &
+      2.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 11.0_wp, 13.0_wp, 17.0_wp, 19.0_wp, 23.0_wp, 29.0_wp, 31.0_wp, 37.0_wp, 41.0_wp, &
+      43.0_wp, 47.0_wp, 53.0_wp, 59.0_wp, 61.0_wp, 67.0_wp, 71.0_wp, 73.0_wp, 79.0_wp, 83.0_wp, 89.0_wp, 97.0_wp, 101.0_wp, &
+      103.0_wp, 107.0_wp, 109.0_wp, 113.0_wp, 127.0_wp, 131.0_wp, 137.0_wp, 139.0_wp, 149.0_wp, 151.0_wp, 157.0_wp, 163.0_wp, &
+      167.0_wp, 173.0_wp, 179.0_wp, 181.0_wp, 191.0_wp, 193.0_wp, 197.0_wp, 199.0_wp, 211.0_wp, 223.0_wp, 227.0_wp, 229.0_wp, &
+      233.0_wp, 239.0_wp, 241.0_wp, 251.0_wp, 257.0_wp, 263.0_wp, 269.0_wp, 271.0_wp, 277.0_wp, 281.0_wp, 283.0_wp, 293.0_wp, &
+      307.0_wp, 311.0_wp, 313.0_wp, 317.0_wp, 331.0_wp, 337.0_wp, 347.0_wp, 349.0_wp, 353.0_wp, 359.0_wp, 367.0_wp, 373.0_wp, &
+      379.0_wp, 383.0_wp, 389.0_wp, 397.0_wp, 401.0_wp, 409.0_wp, 419.0_wp, 421.0_wp, 431.0_wp, 433.0_wp, 439.0_wp, 443.0_wp, &
+      449.0_wp, 457.0_wp, 461.0_wp, 463.0_wp, 467.0_wp, 479.0_wp, 487.0_wp, 491.0_wp, 499.0_wp, 503.0_wp, 509.0_wp, 521.0_wp, &
+      523.0_wp, 541.0_wp, 547.0_wp, 557.0_wp, 563.0_wp, 569.0_wp, 571.0_wp, 577.0_wp, 587.0_wp, 593.0_wp, 599.0_wp, 601.0_wp, &
+      607.0_wp, 613.0_wp, 617.0_wp, 619.0_wp, 631.0_wp, 641.0_wp, 643.0_wp, 647.0_wp, 653.0_wp, 659.0_wp, 661.0_wp, 673.0_wp, &
+      677.0_wp, 683.0_wp, 691.0_wp, 701.0_wp, 709.0_wp, 719.0_wp])
     if (n == 2) then
       call sine_cosine(k*two_pi/directions, sine, cosine)
       unit = [cosine, sine]

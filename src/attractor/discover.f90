@@ -18,6 +18,7 @@ module discover
   use motion_state, only: tally_t
   use single_trajectory, only: span_t
   use crank_rests, only: add_crank_rest
+  use wide_capture, only: widen
   implicit none
   private
 
@@ -66,7 +67,7 @@ contains
         if (segment%known .or. .not. segment%ok) exit
         call identify(moving, section, segment%returns, max_period, found, ok)
         if (ok) then
-          if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
+          call add(moving, found, catalogue)
           exit
         end if
         if (find_box(catalogue, moving%point_of(section), segment%regime) > 0) exit
@@ -78,6 +79,16 @@ contains
       end do
     end do
   end subroutine discover_attractors
+
+  !> Adds an attractor that a catalogue does not hold yet.
+  pure subroutine add(moving, found, catalogue)
+    class(machine_t), intent(in) :: moving
+    type(attractor_t), intent(inout) :: found
+    type(attractor_t), allocatable, intent(inout) :: catalogue(:)
+    if (holds(moving, catalogue, found)) return
+    call widen(moving, found)
+    catalogue = [catalogue, found]
+  end subroutine add
 
   !> The end of patience: the motion without impact of a linear oscillator is known without it; any other is watched for a fixed
   !> number of periods more if it may take `longer`, and if it has come to no cycle then, it is not periodic, or not known.
@@ -94,7 +105,7 @@ contains
     if (moving%linear .and. segment%regime == regime_non_impact) then
       call motion_without_impact(moving, found, ok)
       if (ok) then
-        if (.not. holds(moving, catalogue, found)) catalogue = [catalogue, found]
+        call add(moving, found, catalogue)
         return
       end if
     end if
@@ -106,7 +117,7 @@ contains
       if (known .or. .not. ok) return
       call identify(moving, section, returns, max_period, cycle_found, ok)
       if (ok) then
-        if (.not. holds(moving, catalogue, cycle_found)) catalogue = [catalogue, cycle_found]
+        call add(moving, cycle_found, catalogue)
         return
       end if
       if (moving%has_clock) call find_family(moving, section, segment%amplitude, min(max_period, longest_period), found)
@@ -303,9 +314,9 @@ contains
       found%rests = .true.
       found%kind = kind_rest
       found%period = 1
+      found%coordinates = n
       call make_points(found, 1)
       found%points(:, 1) = points(:, 0)
-      found%coordinates = n
       found%turn = moving%turn
       found%features = features_over(moving, tally, real(2*max_period, wp))
       found%features%v_max = 0

@@ -4,8 +4,8 @@
 !> The functions of include/separatrix.h that name coordinates and contacts of structures.
 module c_coordinates
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_ptr, c_size_t
-  use build_motion, only: bodies_of, has_several
-  use c_text, only: answer, to_c
+  use build_motion, only: bodies_of, kind_bodies, kind_of
+  use c_text, only: answer, enter, to_c
   use errors, only: error_t, fail
   use multibody, only: is_stop, multibody_t
   use multibody_machine, only: multibody_machine_t
@@ -26,6 +26,7 @@ contains
     integer(c_size_t), value :: name_size, message_size
     type(error_t), allocatable :: error
     type(multibody_t) :: machine
+    call enter()
     call build(model, machine, error)
     if (.not. allocated(error)) then
       if (index < 0 .or. index >= machine%n) then
@@ -46,6 +47,7 @@ contains
     type(multibody_t) :: machine
     integer, allocatable :: contacts(:)
     integer :: i
+    call enter()
     call build(model, machine, error)
     if (.not. allocated(error)) then
       contacts = pack([(i, i=1, size(machine%joints))], is_stop(machine%joints%kind))
@@ -68,7 +70,7 @@ contains
     type(multibody_machine_t) :: several
     call c_f_pointer(model, self)
     allocate (machine%joints(0))
-    if (.not. has_several(self%the_case%laws)) return
+    if (kind_of(self%the_case%laws) /= kind_bodies) return
     call bodies_of(self%the_case%laws, model_options(self, self%the_case%integrator%tolerance), several, error)
     if (.not. allocated(error)) machine = several%bodies%machine
   end subroutine build

@@ -4,7 +4,7 @@
 !> The functions of include/separatrix.h about effects: the table of them, and a model with one added.
 module c_effects
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
-  use c_text, only: answer, from_c, to_c
+  use c_text, only: answer, enter, from_c, to_c
   use effect_rows, only: effect_confusions, effect_traits
   use errors, only: error_t, fail
   use kinds, only: wp
@@ -25,6 +25,7 @@ contains
     character(kind=c_char), intent(inout) :: name(*), family(*), acts(*), amplitudes(*), sizes(*), needs(*), message(*)
     integer(c_size_t), value :: name_size, family_size, acts_size, amplitudes_size, sizes_size, needs_size, message_size
     type(error_t), allocatable :: error
+    call enter()
     call check_row(int(index), size(effect_traits), error)
     if (.not. allocated(error)) then
       associate (row => effect_traits(index + 1))
@@ -48,6 +49,7 @@ contains
     type(error_t), allocatable :: error
     integer, allocatable :: rows(:)
     integer :: i
+    call enter()
     numbers = 0
     rows = pack([(i, i=1, size(parameters))], parameters%family == effect_family)
     call check_row(int(index), size(rows), error)
@@ -69,6 +71,7 @@ contains
     character(kind=c_char), intent(inout) :: one(*), other(*), reason(*), message(*)
     integer(c_size_t), value :: one_size, other_size, reason_size, message_size
     type(error_t), allocatable :: error
+    call enter()
     call check_row(int(index), size(effect_confusions), error)
     if (.not. allocated(error)) then
       associate (row => effect_confusions(index + 1))
@@ -102,6 +105,7 @@ contains
     type(model_t), pointer :: self, new
     type(error_t), allocatable :: error
     integer :: i
+    call enter()
     call c_f_pointer(model, self)
     do i = 1, count
       call c_f_pointer(keys(i), key, [len(names)])

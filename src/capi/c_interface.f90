@@ -6,7 +6,7 @@
 module c_interface
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
   use build_motion, only: machine_of
-  use c_text, only: answer, from_c, to_c
+  use c_text, only: answer, enter, from_c, to_c
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
@@ -30,6 +30,7 @@ contains
     integer(c_size_t), value :: message_size
     type(model_t), pointer :: new
     type(error_t), allocatable :: error
+    call enter()
     allocate (new)
     call read_model(from_c(path), new, error)
     call hand_out(new, model, error)
@@ -43,6 +44,7 @@ contains
     integer(c_size_t), value :: message_size
     type(model_t), pointer :: new
     type(error_t), allocatable :: error
+    call enter()
     allocate (new)
     call model_from_text(from_c(text), from_c(directory), new, error)
     call hand_out(new, model, error)
@@ -85,6 +87,7 @@ contains
     real(c_double), intent(out) :: numbers(3)
     type(model_t), pointer :: self
     type(error_t), allocatable :: error
+    call enter()
     call c_f_pointer(model, self)
     numbers = 0
     if (index < 0 .or. index >= size(self%parameters)) then
@@ -109,6 +112,7 @@ contains
     type(model_t), pointer :: self
     type(error_t), allocatable :: error
     integer :: position
+    call enter()
     call c_f_pointer(model, self)
     call find_parameter(self, from_c(path), position, error)
     index = position - 1
@@ -128,6 +132,7 @@ contains
     type(error_t), allocatable :: error
     class(machine_t), allocatable :: moving
     type(law_choice_t), allocatable :: laws(:)
+    call enter()
     call c_f_pointer(model, self)
     frequency = 0
     call check_values(self, chosen + 1, values, error)
@@ -152,6 +157,7 @@ contains
     type(model_t), pointer :: self
     type(error_t), allocatable :: error
     character(len=:), allocatable :: written
+    call enter()
     call c_f_pointer(model, self)
     length = 0
     call check_values(self, chosen + 1, values, error)

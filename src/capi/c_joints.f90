@@ -5,7 +5,7 @@
 module c_joints
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
   use build_multibody, only: joint_alone
-  use c_text, only: answer, from_c
+  use c_text, only: answer, enter, from_c
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t, path_of
@@ -35,6 +35,7 @@ contains
     type(error_t), allocatable :: error
     type(multibody_t) :: machine
     integer :: i
+    call enter()
     call c_f_pointer(model, self)
     call build(self, chosen + 1, values, from_c(joint), machine, error)
     if (.not. allocated(error)) then

@@ -3,10 +3,10 @@
 
 !> The functions of include/separatrix.h that find the attractors of a machine and label starts with them.
 module c_labels
-  use attractors, only: attractor_t, most_coordinates
+  use attractors, only: attractor_t
   use basin, only: catalogue_t, label_slices, search_starts
   use c_machine, only: is_start, prepare_machine, prepared_t
-  use c_text, only: answer
+  use c_text, only: answer, compute, computed, enter
   use case_setup, only: span_of
   use discover, only: discover_attractors, sort_attractors
   use errors, only: error_t, fail
@@ -29,7 +29,9 @@ module c_labels
     separatrix_labels_from
 
   !> Numbers of an attractor.
-  integer, parameter :: of_attractor = 23 + 2*most_coordinates
+  !> Coordinates of an attractor for which its arrays have room.
+  integer, parameter :: room = 16
+  integer, parameter :: of_attractor = 23 + 2*room
 
   !> What a catalogue's handle stands for.
   type :: labeller_t
@@ -51,6 +53,7 @@ contains
     type(model_t), pointer :: self
     type(labeller_t), pointer :: new
     type(error_t), allocatable :: error
+    call enter()
     call c_f_pointer(model, self)
     catalogue = c_null_ptr
     allocate (new)
@@ -92,6 +95,7 @@ contains
     real(wp), allocatable :: starts(:, :)
     type(error_t), allocatable :: error
     integer :: i
+    call enter()
     call c_f_pointer(catalogue, self)
     associate (prepared => self%prepared, settings => self%prepared%the_case%attractors)
       if (start_count < 0) then
@@ -112,8 +116,10 @@ contains
           exit
         end if
         if (.not. is_start(prepared, starts(:, i))) cycle
+        call compute()
         call discover_attractors(prepared%ensemble%moving, prepared%ensemble%span, starts(:, i:i), settings%max_period, &
                                  self%attractors)
+        call computed()
       end do
     end associate
     call sort_attractors(self%attractors)
@@ -155,19 +161,23 @@ contains
       message, message_size) bind(c) result(code)
     type(c_ptr), value :: catalogue
     integer(c_int), value :: index, point_capacity
-    real(c_double), intent(out) :: numbers(of_attractor), points(most_coordinates, point_capacity)
+    real(c_double), intent(out) :: numbers(of_attractor), points(room, point_capacity)
     integer(c_int), intent(out) :: point_count
     character(kind=c_char), intent(inout) :: message(*)
     integer(c_size_t), value :: message_size
     type(labeller_t), pointer :: self
     type(error_t), allocatable :: error
     integer :: shown
+    call enter()
     call c_f_pointer(catalogue, self)
     numbers = 0
     points = ieee_value(1.0_wp, ieee_quiet_nan)
     point_count = 0
     if (index < 0 .or. index >= size(self%attractors)) then
       call fail(error, exit_usage, 'attractor: found '//to_text(int(index))//', allowed 0 to '//to_text(size(self%attractors) - 1))
+    else if (self%attractors(index + 1)%coordinates > room) then
+      call fail(error, exit_usage, 'attractor: found '//to_text(self%attractors(index + 1)%coordinates)// &
+                ' coordinates on the section, allowed at most '//to_text(room))
     else
       associate (one => self%attractors(index + 1), f => self%attractors(index + 1)%features)
         numbers = [real(one%id, wp), real(f%regime, wp), real(one%period, wp), real(f%word, wp), one%section, one%multiplier, &
@@ -175,7 +185,7 @@ contains
                    margin_or_infinite(f%grazing_margin), merge(1.0_wp, 0.0_wp, one%rests), merge(1.0_wp, 0.0_wp, &
                    one%any_position), &
                    real(one%coordinates, wp), merge(1.0_wp, 0.0_wp, self%prepared%ensemble%moving%has_driver), &
-                   real(one%kind, wp), one%duration, real(one%multipliers), aimag(one%multipliers)]
+                   real(one%kind, wp), one%duration, real(one%multipliers(:room)), aimag(one%multipliers(:room))]
         if (.not. one%rests) point_count = merge(2, one%period, one%period == 0)
         shown = min(point_count, point_capacity)
         points(:one%coordinates, :shown) = one%points(:one%coordinates, :shown)
@@ -196,6 +206,7 @@ contains
     type(labeller_t), pointer :: one
     type(grid_t) :: grid
     integer :: i
+    call enter()
     if (product(int(shape, int64)) /= count .or. any(shape < 1)) then
       call fail(error, exit_usage, 'shape: allowed '//to_text(int(count))//' slices in all')
     else
@@ -238,6 +249,7 @@ contains
     type(labeller_t), pointer :: self
     type(error_t), allocatable :: error
     integer :: first, last, points
+    call enter()
     call c_f_pointer(catalogue, self)
     points = block_size(self%prepared%ensemble)
     call check_size(self%prepared, start_size, error)
@@ -250,7 +262,9 @@ contains
         call fail(error, exit_resumable, 'stopped after '//to_text(first - 1)//' of '//to_text(int(start_count))//' starts')
         exit
       end if
+      call compute()
       call label_block(self, start(:, first:last), values(:, first:last))
+      call computed()
     end do
     code = answer(error, message, message_size)
   end function separatrix_labels_from

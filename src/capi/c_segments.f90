@@ -4,7 +4,7 @@
 !> The functions of include/separatrix.h that fly segments.
 module c_segments
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
-  use c_text, only: answer
+  use c_text, only: answer, compute, computed, enter
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t
@@ -69,6 +69,7 @@ contains
     type(model_t), pointer :: self
     type(error_t), allocatable :: error
     type(family_t) :: family
+    call enter()
     call c_f_pointer(model, self)
     start_numbers = 0
     sample_numbers = 0
@@ -91,6 +92,7 @@ contains
     type(given_t) :: given
     type(samples_t) :: samples
     type(report_t) :: report
+    call enter()
     call c_f_pointer(model, self)
     segments%impact_count = 0
     call take_given(segments, given, error)
@@ -180,7 +182,10 @@ contains
                         given%directions, derivatives, family, error)
     if (.not. allocated(error)) call check_machine(family, segments, error)
     if (.not. allocated(error)) call check_length(family%machine%period, given%times, error)
-    if (.not. allocated(error)) call propagate(family, given%start, given%first, given%times, derivatives, samples, report)
+    if (allocated(error)) return
+    call compute()
+    call propagate(family, given%start, given%first, given%times, derivatives, samples, report)
+    call computed()
   end subroutine fly
 
   !> A start has all that the motion depends on. Code 65, or 64 for the wrong number of numbers.

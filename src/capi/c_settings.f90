@@ -4,7 +4,7 @@
 !> The function of include/separatrix.h that reads a case with settings on top, as `--set` puts them.
 module c_settings
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, c_size_t
-  use c_text, only: answer, from_c
+  use c_text, only: answer, enter, from_c
   use case_reader, only: load_case_text
   use errors, only: error_t
   use model_type, only: model_t
@@ -34,6 +34,7 @@ contains
     integer(c_size_t), value :: message_size
     type(model_t), pointer :: new
     type(error_t), allocatable :: error
+    call enter()
     allocate (new)
     model = c_null_ptr
     call load_case_text(from_c(text), from_c(name), padded(settings), new%the_case, error)

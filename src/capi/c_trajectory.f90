@@ -5,7 +5,7 @@
 module c_trajectory
   use attractors, only: attractor_t
   use c_machine, only: prepare_machine, prepared_t, start_problem
-  use c_text, only: answer
+  use c_text, only: answer, compute, computed, enter
   use case_setup, only: span_of
   use case_type, only: case_t
   use constants, only: unreachable
@@ -57,13 +57,16 @@ contains
     type(outcome_t) :: outcome
     type(log_t) :: log
     integer :: kept
+    call enter()
     call c_f_pointer(model, self)
     sample_count = 0
     event_count = 0
     summary = ieee_value(1.0_wp, ieee_quiet_nan)
     call prepare(self, chosen + 1, values, start, duration, samples_per_period, prepared, log, error)
     if (.not. allocated(error)) then
+      call compute()
       call fly(self%the_case, prepared, start, duration > 0, log, outcome, summary)
+      call computed()
       sample_count = log%samples
       event_count = log%events
       kept = min(sample_count, sample_capacity)

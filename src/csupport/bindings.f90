@@ -10,14 +10,14 @@ module bindings
 
   public :: c_crashed, c_fork, c_signals_farewell, c_signals_install, c_signals_ignore_file_limit, c_signals_terminated, &
     c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
-    c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, &
+    c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, c_keep_memory, &
     c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
     c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
-    c_atomic_try_lock, c_yield, c_string_length, c_share_upper_limit, c_is_special, &
+    c_atomic_try_lock, c_yield, c_lock_calls, c_unlock_calls, c_string_length, c_share_upper_limit, c_is_special, &
     c_core_list, c_may_use_core, c_online_cores, c_core_quota, c_cpu_name, c_environment, &
     c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_has_name, &
-    c_length_of, c_close_bytes
+    c_length_of, c_set_length, c_close_bytes
 
   interface
     integer(c_int32_t) function c_crc32_combine(first, second, size) bind(c, name='separatrix_crc32_combine')
@@ -76,6 +76,12 @@ module bindings
       import :: c_int, c_int64_t
       integer(c_int), value :: descriptor
     end function c_length_of
+
+    integer(c_int) function c_set_length(descriptor, length) bind(c, name='separatrix_set_length')
+      import :: c_int, c_int64_t
+      integer(c_int), value :: descriptor
+      integer(c_int64_t), value :: length
+    end function c_set_length
 
     integer(c_int) function c_close_bytes(descriptor, sync) bind(c, name='separatrix_close_bytes')
       import :: c_int
@@ -154,6 +160,11 @@ module bindings
     real(c_double) function c_monotonic_seconds() bind(c, name='separatrix_monotonic_seconds')
       import :: c_double
     end function c_monotonic_seconds
+
+    subroutine c_keep_memory(bytes) bind(c, name='separatrix_keep_memory')
+      import :: c_int
+      integer(c_int), value :: bytes
+    end subroutine c_keep_memory
 
     integer(c_int) function c_utc_now(text, size) bind(c, name='separatrix_utc_now')
       import :: c_char, c_int
@@ -326,6 +337,12 @@ module bindings
 
     subroutine c_yield() bind(c, name='separatrix_yield')
     end subroutine c_yield
+
+    subroutine c_lock_calls() bind(c, name='separatrix_lock_calls')
+    end subroutine c_lock_calls
+
+    subroutine c_unlock_calls() bind(c, name='separatrix_unlock_calls')
+    end subroutine c_unlock_calls
 
     !> strlen, for strings that the HDF5 library returns.
     integer(c_int64_t) function c_string_length(string) bind(c, name='strlen')

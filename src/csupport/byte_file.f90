@@ -4,7 +4,7 @@
 !> Bytes at offsets of a file that exists. Errors have code 74.
 module byte_file
   use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_null_char
-  use bindings, only: c_close_bytes, c_has_name, c_length_of, c_open_bytes, c_read_bytes, c_write_bytes
+  use bindings, only: c_close_bytes, c_has_name, c_length_of, c_open_bytes, c_read_bytes, c_set_length, c_write_bytes
   use errors, only: error_t
   use files, only: test_status
   use kinds, only: int64, int8
@@ -23,6 +23,7 @@ module byte_file
     procedure :: close => close_bytes
     procedure :: has_name
     procedure :: length
+    procedure :: set_length
   end type byte_file_t
 
 contains
@@ -53,6 +54,16 @@ contains
     length = -1
     if (self%descriptor >= 0) length = c_length_of(self%descriptor)
   end function length
+
+  !> Makes the file `bytes` long, without a write into what is there.
+  subroutine set_length(self, bytes, error)
+    class(byte_file_t), intent(in) :: self
+    integer(int64), intent(in) :: bytes
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: number
+    number = c_set_length(self%descriptor, bytes)
+    call test_status(number, exit_io, 'cannot extend', self%path, error)
+  end subroutine set_length
 
   !> Reads what lies at an offset (from 0).
   subroutine read_bytes(self, bytes, offset, error)

@@ -234,6 +234,15 @@ int64_t separatrix_length_of(int descriptor) {
   return fstat(descriptor, &own) != 0 ? -1 : (int64_t)own.st_size;
 }
 
+/* Makes the file so long; bytes that others write meanwhile are kept. */
+int separatrix_set_length(int descriptor, int64_t length) {
+  int status;
+  do
+    status = ftruncate(descriptor, (off_t)length) != 0 ? errno : 0;
+  while (status == EINTR);
+  return status;
+}
+
 /* `sync`: what was written is durable afterwards. */
 int separatrix_close_bytes(int descriptor, int sync) {
   const int status = sync && fsync(descriptor) != 0 ? errno : 0;

@@ -10,6 +10,9 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 extern char **environ;
 
@@ -22,6 +25,16 @@ static double seconds(clockid_t clock) {
 
 /* Seconds since an arbitrary moment; never goes back. */
 double separatrix_monotonic_seconds(void) { return seconds(CLOCK_MONOTONIC); }
+
+/* Memory that is given back stays with the process, up to `bytes` of it, and so do its pages. */
+void separatrix_keep_memory(int bytes) {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, bytes);
+  mallopt(M_TRIM_THRESHOLD, bytes);
+#else
+  (void)bytes;
+#endif
+}
 
 /* UTC as 2026-01-31T12:34:56Z. */
 int separatrix_utc_now(char *text, int size) {

@@ -5,15 +5,15 @@
 module system
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
   use bindings, only: c_core_list, c_core_quota, c_cpu_name, c_crashed, c_default_environment, c_environment, c_exit, c_exit_now, &
-    c_fork, c_host_name, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, c_set_environment, &
-    c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
+    c_fork, c_host_name, c_keep_memory, c_may_use_core, c_monotonic_seconds, c_online_cores, c_resident_bytes, &
+    c_set_environment, c_sleep_microseconds, c_stderr_is_terminal, c_utc_now
   use kinds, only: int64, real64
   implicit none
   private
 
   public :: monotonic_seconds, utc_now, resident_bytes, host_name, stderr_is_terminal, &
     default_environment, set_environment, sleep_microseconds, exit_program, exit_at_once, fork_process, has_crashed, &
-    from_c, core_list, may_use_core, online_cores, core_quota, cpu_name, environment_text
+    from_c, core_list, keep_memory, may_use_core, online_cores, core_quota, cpu_name, environment_text
 
 contains
 
@@ -21,6 +21,13 @@ contains
   real(real64) function monotonic_seconds()
     monotonic_seconds = c_monotonic_seconds()
   end function monotonic_seconds
+
+  !> From now on memory that is given back stays with the process, up to `bytes` of it, so that large arrays that come and go find
+  !> pages ready; without effect where the C library does not know this.
+  subroutine keep_memory(bytes)
+    integer, intent(in) :: bytes
+    call c_keep_memory(int(bytes, c_int))
+  end subroutine keep_memory
 
   !> The time now as 2026-01-31T12:34:56Z; 'unknown' if the system has no clock.
   function utc_now() result(text)

@@ -9,14 +9,13 @@
 module variants
   use body_machine, only: body_machine_t
   use body_segments, only: segments_of_body, sensor_paths
-  use build_motion, only: bodies_of, body_of, has_several
+  use build_motion, only: bodies_of, body_of, kind_bodies, kind_body, kind_motor, kind_of, kind_own
   use effect_rows, only: acts_at_barrier
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
   use machine_type, only: machine_t, scales_t
   use motion_state, only: flight_adaptive, options_t
-  use motor_choices, only: has_motor
   use motor_machine, only: motor_machine_t, prepare_motor_machine
   use motor_segments, only: segments_of_motor
   use multibody_machine, only: multibody_machine_t
@@ -152,25 +151,29 @@ contains
     options = plan%options
     if (adaptive) options%flight = flight_adaptive
     if (allocated(flown%machine)) deallocate (flown%machine)
-    if (has_motor(changed)) then
+    select case (kind_of(changed))
+    case (kind_motor)
       call prepare_motor_machine(changed, options, driven, error)
       if (allocated(error)) return
       call limit(driven)
       allocate (flown%machine, source=segments_of_motor(driven))
       call take_facts(driven, flown%machine)
-    else if (has_several(changed)) then
+    case (kind_bodies)
       call bodies_of(changed, options, several, error)
       if (allocated(error)) return
       call limit(several)
       allocate (flown%machine, source=segments_of_structure(several))
       call take_facts(several, flown%machine)
-    else
+    case (kind_body, kind_own)
+      ! The second is refused with the keys that it has.
       call body_of(changed, options, body, error)
       if (allocated(error)) return
       call limit(body)
       allocate (flown%machine, source=segments_of_body(body))
       call take_facts(body, flown%machine)
-    end if
+    case default
+      call fail(error, exit_bad_case, 'the segments of this kind of machine are not known')
+    end select
   end subroutine build
 
   !> Limits the budgets of a machine.

@@ -53,7 +53,6 @@ contains
     type(branch_watch_t), target :: watch
     type(search_team_t), target :: workers
     type(curves_t) :: curves
-    type(contacts_t) :: contacts
     type(rest_at_t), allocatable :: rest(:)
     type(schema_t) :: schema
     type(bounds_t) :: bounds
@@ -80,31 +79,19 @@ contains
     search%workers => workers
     if (session%team%is_root()) then
       call watch%begin(session%journal, search)
-      call search_values(search)
-      call follow_seeds(search)
-      call dismiss(search)
-      if (command%contacts) call look_for_contacts(session, search, contacts)
-      if (curves%wanted) call follow_labels(search, curves)
-      call report(session, search, contacts, trim(bounds%unit))
-      call report_equilibria(session, search, trim(bounds%unit))
-      call find_rest(search, rest)
-      call report_rest(session, rest, search%family%path, trim(bounds%unit))
-      call report_curves(session, search, curves)
+      call search_and_report(session, search, trim(bounds%unit), curves, rest)
     else
       call serve(search)
     end if
-    if (session%team%is_root()) then
-      if (size(search%branches) + count_equilibria(search) + size(rest) == 0) call fail(error, merge(exit_given_up, &
-        exit_bad_case, all(search%found%lost == search%found%starts) .and. .not. command%partial), &
-        'no isolated periodic orbit was found over '//search%family%path//' from '//to_text(search%plan%lowest)//' to '// &
-        to_text(search%plan%highest)//lost_text(search)//'; nothing is written')
-    end if
+    if (session%team%is_root()) call refuse_nothing(search, rest, command%partial, error)
     call session%stop_if(error)
     call describe_file(session, 'branches', schema)
-    if (session%team%is_root()) call describe_branches(search, trim(bounds%unit), schema)
-    if (session%team%is_root()) call describe_equilibria(search, trim(bounds%unit), schema)
-    if (session%team%is_root()) call describe_rest(rest, search%family%path, trim(bounds%unit), schema)
-    if (session%team%is_root()) call describe_curves(curves, search%family%path, trim(bounds%unit), schema)
+    if (session%team%is_root()) then
+      call describe_branches(search, trim(bounds%unit), schema)
+      call describe_equilibria(search, trim(bounds%unit), schema)
+      call describe_rest(rest, search%family%path, trim(bounds%unit), schema)
+      call describe_curves(curves, search%family%path, trim(bounds%unit), schema)
+    end if
     call session%provenance%finish(schema)
     if (session%team%is_root()) call write_whole(path, schema, command%force, error)
     call session%stop_if(error)
@@ -112,6 +99,40 @@ contains
     call session%journal%line('written', 'wrote '//path)
     call session%end_with(exit_done)
   end subroutine run_branches
+
+  !> Branches, equilibria, positions of rest and, where they are wanted, contacts and curves; in the log as they are found.
+  subroutine search_and_report(session, search, unit, curves, rest)
+    type(session_t), intent(inout) :: session
+    type(search_t), intent(inout) :: search
+    character(len=*), intent(in) :: unit
+    type(curves_t), intent(inout) :: curves
+    type(rest_at_t), allocatable, intent(out) :: rest(:)
+    type(contacts_t) :: contacts
+    call search_values(search)
+    call follow_seeds(search)
+    call dismiss(search)
+    if (session%command%contacts) call look_for_contacts(session, search, contacts)
+    if (curves%wanted) call follow_labels(search, curves)
+    call report(session, search, contacts, unit)
+    call report_equilibria(session, search, unit)
+    call find_rest(search, rest)
+    call report_rest(session, rest, search%family%path, unit)
+    call report_curves(session, search, curves)
+  end subroutine search_and_report
+
+  !> An error where nothing was found: of another code if every motion was given up, unless `partial` results will do.
+  subroutine refuse_nothing(search, rest, partial, error)
+    type(search_t), intent(in) :: search
+    type(rest_at_t), intent(in) :: rest(:)
+    logical, intent(in) :: partial
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: given_up
+    if (size(search%branches) + count_equilibria(search) + size(rest) > 0) return
+    given_up = all(search%found%lost == search%found%starts) .and. .not. partial
+    call fail(error, merge(exit_given_up, exit_bad_case, given_up), 'no isolated periodic orbit was found over '// &
+              search%family%path//' from '//to_text(search%plan%lowest)//' to '//to_text(search%plan%highest)// &
+              lost_text(search)//'; nothing is written')
+  end subroutine refuse_nothing
 
   !> How many starts led nowhere; '' if none was lost.
   pure function lost_text(search) result(text)

@@ -4,7 +4,7 @@
 !> Builds the catalogues of all slices of a grid on a team: slices are handed out to the ranks, for their costs differ,
 !> then all are known to all. The result does not depend on the number of ranks.
 module catalogue_search
-  use attractors, only: attractor_t, least_packed, pack_attractor, packed_length, unpack_attractor
+  use attractors, only: attractor_t, is_packed, least_packed, pack_attractor, packed_length, unpack_attractor
   use basin, only: catalogue_t, label_slices, open_ensemble, open_slice, search_starts
   use case_type, only: attractors_t
   use discover, only: discover_attractors, sort_attractors
@@ -257,6 +257,8 @@ contains
         if (whole) whole = packed(position + 1) >= least_packed .and. packed(position + 1) <= size(packed) - position
         if (.not. whole) exit
         length = nint(packed(position + 1))
+        whole = is_packed(packed(position + 1:position + length))
+        if (.not. whole) exit
         catalogues(slice)%attractors(i) = unpack_attractor(packed(position + 1:position + length))
         position = position + length
       end do

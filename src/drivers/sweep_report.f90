@@ -37,7 +37,6 @@ contains
     type(schema_t), intent(inout) :: schema
     character(len=name_length), allocatable :: swept(:)
     character(len=name_length) :: dimensions(2)
-    real(wp), allocatable :: barriers(:)
     call add_axes(schema, [session%the_case%sweep%swept], swept)
     call schema%add_dimension('direction', 2_int64)
     call schema%add_dimension('sample', int(session%the_case%sweep%samples, int64))
@@ -58,19 +57,9 @@ contains
       call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 12)
     end if
     if (has_motor(session%the_case%laws)) call add_crank()
-    call schema%add_variable('section_x', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
-      units='m', long_name='position at crank angle 0', data=reshape(chains%samples(1, :, :, :), &
-      [size(chains%samples)/2]))
-    call schema%add_variable('section_v', type_float64, [dimensions, [character(len=name_length) :: 'sample']], &
-      units='m/s', long_name='velocity at crank angle 0', data=reshape(chains%samples(2, :, :, :), &
-      [size(chains%samples)/2]))
+    call add_sections(chains, [dimensions, [character(len=name_length) :: 'sample']], schema)
     if (size(chains%limits) > 0) call add_limits(session, schema, chains%limits)
-    barriers = barriers_of(session)
-    ! A barrier that is swept has no one position.
-    if (session%the_case%sweep%swept%name == 'contact.upper') barriers(1) = huge(1.0_wp)
-    if (session%the_case%sweep%swept%name == 'contact.lower') barriers(2) = -huge(1.0_wp)
-    if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
-    if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
+    call add_barriers(session, schema)
 
   contains
 
@@ -99,6 +88,29 @@ contains
     end subroutine fill
 
   end subroutine describe_chains
+
+  !> The last positions and velocities on the section.
+  subroutine add_sections(chains, dimensions, schema)
+    type(chains_t), intent(in) :: chains
+    character(len=name_length), intent(in) :: dimensions(:)
+    type(schema_t), intent(inout) :: schema
+    call schema%add_variable('section_x', type_float64, dimensions, units='m', long_name='position at crank angle 0', &
+                             data=reshape(chains%samples(1, :, :, :), [size(chains%samples)/2]))
+    call schema%add_variable('section_v', type_float64, dimensions, units='m/s', long_name='velocity at crank angle 0', &
+                             data=reshape(chains%samples(2, :, :, :), [size(chains%samples)/2]))
+  end subroutine add_sections
+
+  !> Positions of the barriers; one that is swept has none.
+  subroutine add_barriers(session, schema)
+    type(session_t), intent(in) :: session
+    type(schema_t), intent(inout) :: schema
+    real(wp), allocatable :: barriers(:)
+    barriers = barriers_of(session)
+    if (session%the_case%sweep%swept%name == 'contact.upper') barriers(1) = huge(1.0_wp)
+    if (session%the_case%sweep%swept%name == 'contact.lower') barriers(2) = -huge(1.0_wp)
+    if (barriers(1) < unreachable) call schema%add_attribute('', 'barrier_upper', barriers(1))
+    if (barriers(2) > -unreachable) call schema%add_attribute('', 'barrier_lower', barriers(2))
+  end subroutine add_barriers
 
   function barriers_of(session) result(barriers)
     type(session_t), intent(in) :: session

@@ -61,14 +61,7 @@ contains
     call open_session(command, session)
     call require_start(session%the_case, error)
     call session%stop_if(error)
-    grid = grid_of(session%the_case, session%the_case%axes(:0))
-    span = span_of(session%the_case)
-    span%extension = 1
-    span%stop_when_converged = .false.
-    call slice_motion(grid, 0_int64, moving, error)
-    if (.not. allocated(error)) call fit_window(moving%period, span)
-    if (.not. allocated(error)) call check_periods(span, moving%period, error)
-    if (.not. allocated(error)) call check_samples(session%the_case, span%duration/moving%period, error)
+    call prepare_motion(session%the_case, grid, span, moving, error)
     if (.not. allocated(error) .and. len(command%record) > 0) call check_record(session%the_case, error)
     call session%stop_if(error)
     path = output_path(command%output, command%path, command%name)
@@ -111,6 +104,23 @@ contains
     call session%stop_if(error)
     call session%end_with(exit_done)
   end subroutine run_trajectory_command
+
+  !> The machine of a case, its start, and the span of one motion, which ends with its duration.
+  subroutine prepare_motion(the_case, grid, span, moving, error)
+    type(case_t), intent(in) :: the_case
+    type(grid_t), intent(out) :: grid
+    type(span_t), intent(out) :: span
+    class(machine_t), allocatable, intent(out) :: moving
+    type(error_t), allocatable, intent(out) :: error
+    grid = grid_of(the_case, the_case%axes(:0))
+    span = span_of(the_case)
+    span%extension = 1
+    span%stop_when_converged = .false.
+    call slice_motion(grid, 0_int64, moving, error)
+    if (.not. allocated(error)) call fit_window(moving%period, span)
+    if (.not. allocated(error)) call check_periods(span, moving%period, error)
+    if (.not. allocated(error)) call check_samples(the_case, span%duration/moving%period, error)
+  end subroutine prepare_motion
 
   !> The motion, with a word on how far it is where it takes its time.
   subroutine fly(session, moving, span, start, outcome, log)

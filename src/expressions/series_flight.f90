@@ -17,11 +17,11 @@ module series_flight
   use tape, only: tape_t
   use tape_bounds, only: bound_coefficients
   use tape_series, only: expand, prepare_series, series_t
-  use tape_value, only: starting_branches
+  use tape_value, only: evaluate, starting_branches
   implicit none
   private
 
-  public :: start_flight, set_branches, change_branches, advance_flight
+  public :: start_flight, set_branches, change_branches, advance_flight, value_in_flight
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
   !> proven; at the budget of steps; at its start, whose branches are not those of the state.
@@ -73,6 +73,8 @@ module series_flight
     real(wp), private :: proven = 1
     !> A power of two near the step behind.
     real(wp), private :: next_unit = 1
+    !> The last motion ended at its last time.
+    logical, private :: goes_on = .false.
   end type flight_t
 
 contains
@@ -143,6 +145,16 @@ contains
     flight%proven = 1
   end subroutine change_branches
 
+  !> Value of a node at the present state, in the present branches.
+  pure real(wp) function value_in_flight(flight, node) result(value)
+    type(flight_t), intent(in) :: flight
+    integer, intent(in) :: node
+    real(wp) :: values(flight%tape%count)
+    integer :: faults(flight%tape%count)
+    call evaluate(flight%tape, flight%state, flight%parameters, values, faults, flight%series%branches)
+    value = values(node)
+  end function value_in_flight
+
   !> Moves on to the time `until`, or to the first crossing of a guard. `status` states how it ended.
   pure subroutine advance_flight(flight, until, status)
     type(flight_t), intent(inout) :: flight
@@ -150,14 +162,21 @@ contains
     integer, intent(out) :: status
     real(wp) :: step, fraction, longest, before
     integer :: i, idle
+    logical :: goes_on
+    goes_on = flight%goes_on
+    flight%goes_on = .false.
     flight%crossed = .false.
     idle = 0
     do i = 1, flight%step_budget
       status = flight_reached
-      if (flight%time >= until) return
+      flight%goes_on = flight%time >= until
+      if (flight%goes_on) return
       call expand_in_unit(flight)
       status = flight_left_domain
       if (flight%fault > 0) return
+      status = flight_crossed
+      if (i == 1 .and. goes_on) call cross_at_start(flight)
+      if (any(flight%crossed)) return
       status = flight_wrong_branch
       if (i == 1 .and. .not. branches_agree(flight)) return
       longest = until - flight%time
@@ -177,6 +196,28 @@ contains
     end do
     status = flight_step_budget
   end subroutine advance_flight
+
+  !> Guards that crossed zero at the end of the last motion, where rounding put them beyond it: no search from here finds that.
+  pure subroutine cross_at_start(flight)
+    type(flight_t), intent(inout) :: flight
+    real(wp) :: value, slope, rounding
+    integer :: g, own
+    own = size(flight%guards) - size(flight%series%branches)
+    do g = 1, size(flight%guards)
+      if (.not. flight%is_active(g) .or. flight%zeros(g) > 0) cycle
+      value = flight%series%c(0, flight%guards(g)%node)
+      slope = flight%series%c(1, flight%guards(g)%node)/flight%series%unit
+      rounding = 16*epsilon(1.0_wp)*(size_of_arguments(flight, flight%series%c(0, :), flight%guards(g)%node) + &
+                                     abs(slope*flight%time))
+      if (abs(value) > rounding) cycle
+      if (g > own) then
+        flight%crossed(g) = flight%series%branches(g - own)*slope < 0 .and. flight%series%branches(g - own)*value <= 0
+      else
+        flight%crossed(g) = flight%guards(g)%direction*slope > 0 .and. flight%guards(g)%direction*value >= 0
+      end if
+    end do
+    where (flight%crossed) flight%zeros = 1
+  end subroutine cross_at_start
 
   !> Coefficients at the state, in a unit of time in which they do not overflow.
   pure subroutine expand_in_unit(flight)

@@ -24,11 +24,11 @@ module flight_path
     !> Amplitudes of the exponentials, harmonics at the start, powers of the time since then.
     complex(wp) :: amplitude(2*most_degrees)
     !> Sizes of the sums that the amplitudes are, for their rounding.
-    real(wp) :: size_of_amplitude(2*most_degrees) = 0
+    real(wp) :: size_of_amplitude(2*most_degrees)
     complex(wp), allocatable :: turning(:)
-    real(wp) :: powers(most_degrees, 0:3) = 0
+    real(wp) :: powers(most_degrees, 0:3)
     !> Constant forces on the coordinates and their rates [N, N/s].
-    real(wp) :: force(most_degrees) = 0, force_rate(most_degrees) = 0
+    real(wp) :: force(most_degrees), force_rate(most_degrees)
     !> Unknowns of the series at the start, and the matrix with its constant columns.
     real(wp), allocatable :: unknowns(:), matrix(:, :)
     !> Of a step of a marched flight: its length [s], and the coordinates and speeds by rising powers of its fraction; 0 of
@@ -71,6 +71,7 @@ contains
     change%v(:machine%n) = v
     allocate (path%turning(harmonics_of(machine)), source=(0.0_wp, 0.0_wp))
     path%force(:machine%n) = force
+    path%force_rate(:machine%n) = 0
     still = 0
     if (present(surface)) still = surface
     if (flow%modal) then

@@ -6,8 +6,8 @@ module guard_functions
   use eigen, only: modulus
   use elementary, only: exponential, sine_cosine
   use flight_path, only: path_t
-  use guards, only: joint_guard_t, most_guards
-  use multibody, only: multibody_t, most_degrees
+  use guards, only: joint_guard_t
+  use multibody, only: multibody_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use path_rows, only: force_powers, position_powers
@@ -16,24 +16,22 @@ module guard_functions
 
   public :: prepare_search, bases_at, derivatives, bound
 
-  integer, parameter :: most_terms = 2*most_degrees, most_functions = most_guards + 1
-
-  !> All functions of a path that are looked at, as sums: the guards, and after them watched coordinates. Made for every flight:
-  !> what can be large has a fixed size, which costs nothing.
+  !> All functions of a path that are looked at, as sums: the guards, and after them watched coordinates. Made for every flight,
+  !> where it is, of lengths that the flight has.
   type, public :: search_t
     integer :: guards, functions, terms
-    complex(wp) :: exponent(most_terms), term(most_terms, most_functions)
-    complex(wp), allocatable :: turn(:, :)
-    real(wp) :: decay(most_terms), size_of_exponent(most_terms), size_of_term(most_terms, most_functions)
+    complex(wp), pointer, contiguous, dimension(:, :) :: term => null(), turn => null()
+    complex(wp), pointer, contiguous :: exponent(:)
+    real(wp), pointer, contiguous :: decay(:), size_of_exponent(:), size_of_term(:, :)
     !> Angular frequency of the first harmonic [rad/s].
     real(wp) :: frequency
-    real(wp) :: power(0:3, most_functions)
+    real(wp), pointer, contiguous :: power(:, :)
     !> Bounds from the powers and harmonics on derivatives 0 to 6.
-    real(wp) :: steady(0:6, most_functions)
+    real(wp), pointer, contiguous :: steady(:, :)
     !> Size of the sums that the amplitudes are, as the value and first three derivatives of a guard have it.
-    real(wp) :: blur(0:3, most_guards)
+    real(wp), pointer, contiguous :: blur(:, :)
     !> By how much guards are raised that are nothing but rounding at the start, 0 for the others.
-    real(wp) :: lift(most_guards) = 0
+    real(wp), pointer, contiguous :: lift(:)
   end type search_t
 
 contains
@@ -45,7 +43,7 @@ contains
     type(path_t), intent(in) :: path
     type(joint_guard_t), intent(in) :: list(:)
     integer, intent(in) :: count_guards, watched
-    type(search_t), intent(out) :: search
+    type(search_t), intent(inout) :: search
     real(wp) :: position(0:3), force(0:3), w, largest
     integer :: g, k, m, n, order
     search%guards = count_guards
@@ -56,7 +54,7 @@ contains
     search%frequency = machine%frequency
     search%decay(:n) = real(flow%exponent)
     search%size_of_exponent(:n) = flow%size_of_exponent
-    allocate (search%turn(size(path%turning), search%functions))
+    search%lift = 0
     do g = 1, count_guards
       associate (guard => list(g))
         position = position_powers(machine, path, guard%joint)

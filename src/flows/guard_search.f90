@@ -8,7 +8,7 @@ module guard_search
   use elementary, only: exponential, logarithm
   use guard_functions, only: bases_at, bound, derivatives, search_t
   use guard_zero, only: approach, stays_positive, walk
-  use guards, only: joint_guard_t, meets_lower, meets_upper, most_guards
+  use guards, only: joint_guard_t, meets_lower, meets_upper
   use kinds, only: wp
   implicit none
   private
@@ -43,7 +43,7 @@ contains
     integer, intent(out) :: evaluations
     complex(wp) :: growth(search%terms), turning(size(search%turn, 1))
     real(wp), dimension(0:3, search%functions) :: here, there
-    real(wp), dimension(most_guards) :: certified, root
+    real(wp), dimension(search%guards) :: certified, root
     real(wp) :: a, b, length, longest, tie
     integer :: g, panels
     evaluations = 1

@@ -5,17 +5,15 @@
 !> of one form, constant + position s + speed u + force lambda of a joint.
 module guards
   use contact_law, only: contact_kelvin_voigt
-  use multibody, only: joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, joint_spring, most_joints, &
-    most_load_switches, multibody_t
+  use multibody, only: count_switches, joint_contact, joint_elastic, joint_friction, joint_section, joint_soft, joint_spring, &
+    multibody_t
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   implicit none
   private
 
-  public :: guards_of
-
-  integer, parameter, public :: most_guards = 3*most_joints + most_load_switches
+  public :: guards_of, room_for_guards
 
   !> What a triggered guard means: a slide ends; friction gives way upwards or downwards; the upper or lower stop is reached; a
   !> closed contact is let go; a pressed one is without force; one without force pushes again; a soft stop is left; the watched
@@ -40,12 +38,18 @@ module guards
 
 contains
 
+  !> Most guards of a machine in any mode.
+  pure integer function room_for_guards(machine)
+    type(multibody_t), intent(in) :: machine
+    room_for_guards = 3*size(machine%joints) + count_switches(machine)
+  end function room_for_guards
+
   !> The guards of a state, at the beginning of `list`.
   pure subroutine guards_of(machine, flow, state, list, count_guards)
     type(multibody_t), intent(in) :: machine
     type(mode_flow_t), intent(in) :: flow
     type(multibody_state_t), intent(in) :: state
-    type(joint_guard_t), intent(inout) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(:)
     integer, intent(out) :: count_guards
     integer :: j, phase, held
     real(wp) :: level, d, k

@@ -6,7 +6,7 @@ module linear_flight
   use flight_path, only: begin_path, path_at, path_t, series_step, terms
   use guard_functions, only: prepare_search, search_t
   use guard_search, only: find_first
-  use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards
+  use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper
   use multibody, only: multibody_t
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
@@ -40,28 +40,56 @@ contains
     type(mode_flow_t), intent(in) :: flow
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
-    type(joint_guard_t), intent(inout) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(:)
     integer, intent(out) :: count_guards
-    logical, intent(out) :: triggered(most_guards)
+    logical, intent(out) :: triggered(:)
     type(path_t), intent(out) :: path
     type(watch_t), intent(inout) :: watch
-    type(search_t) :: search
     real(wp) :: time
-    integer :: evaluations
     call guards_of(machine, flow, state, list, count_guards)
     call begin_path(machine, flow, state, path)
     if (flow%modal) then
-      call prepare_search(machine, flow, path, list, count_guards, machine%watched, search)
-      call find_first(search, list, path%start, until - path%start, watch%needs_speed, watch%needs_margin, time, triggered, &
-                      watch%extremes, watch%top_speed, watch%margin, evaluations)
-      watch%evaluations = watch%evaluations + evaluations
-      call path_at(machine, flow, path, time, state%q, state%v)
+      call fly_modal(machine, flow, path, list(:count_guards), until - path%start, state, time, triggered, watch)
     else
       call fly_series(machine, flow, path, list, count_guards, until - path%start, state, time, triggered, watch)
     end if
     state%time = path%start + time
     if (.not. any(triggered)) state%time = until
   end subroutine fly_linear
+
+  !> The same in closed form.
+  pure subroutine fly_modal(machine, flow, path, list, duration, state, time, triggered, watch)
+    type(multibody_t), intent(in) :: machine
+    type(mode_flow_t), intent(in) :: flow
+    type(path_t), intent(in) :: path
+    type(joint_guard_t), intent(in) :: list(:)
+    real(wp), intent(in) :: duration
+    type(multibody_state_t), intent(inout) :: state
+    real(wp), intent(out) :: time
+    logical, intent(out) :: triggered(:)
+    type(watch_t), intent(inout) :: watch
+    type(search_t) :: search
+    complex(wp), target :: exponent(size(flow%exponent)), term(size(flow%exponent), size(list) + 1), &
+      turn(size(path%turning), size(list) + 1)
+    real(wp), target :: decay(size(exponent)), size_of_exponent(size(exponent)), size_of_term(size(exponent), size(list) + 1), &
+      power(0:3, size(list) + 1), steady(0:6, size(list) + 1), blur(0:3, size(list)), lift(size(list))
+    integer :: evaluations
+    search%exponent => exponent
+    search%term => term
+    search%turn => turn
+    search%decay => decay
+    search%size_of_exponent => size_of_exponent
+    search%size_of_term => size_of_term
+    search%power => power
+    search%steady => steady
+    search%blur => blur
+    search%lift => lift
+    call prepare_search(machine, flow, path, list, size(list), machine%watched, search)
+    call find_first(search, list, path%start, duration, watch%needs_speed, watch%needs_margin, time, triggered, &
+                    watch%extremes, watch%top_speed, watch%margin, evaluations)
+    watch%evaluations = watch%evaluations + evaluations
+    call path_at(machine, flow, path, time, state%q, state%v)
+  end subroutine fly_modal
 
   !> The same by intervals of the exponential series.
   pure subroutine fly_series(machine, flow, path, list, count_guards, duration, state, time, triggered, watch)
@@ -76,8 +104,8 @@ contains
     logical, intent(out) :: triggered(:)
     type(watch_t), intent(inout) :: watch
     real(wp), dimension(size(path%unknowns)) :: y, size_of_y
-    real(wp) :: powers(size(path%unknowns), 0:terms), row(size(path%unknowns), most_guards)
-    real(wp) :: length, p(0:order), gap(0:terms, most_guards), root(most_guards), lift(most_guards), first, fraction
+    real(wp) :: powers(size(path%unknowns), 0:terms), row(size(path%unknowns), count_guards)
+    real(wp) :: length, p(0:order), gap(0:terms, count_guards), root(max(count_guards, 1)), lift(count_guards), first, fraction
     integer :: g, i, k, n, intervals
     n = machine%n
     triggered = .false.

@@ -6,7 +6,7 @@ module marched_flight
   use contact_law, only: contact_t
   use flight_path, only: begin_series, constant_forces, path_t
   use guarded_march, only: begin_march, guard_t, march_failed, march_goes_on, march_t, march_time_over, take_step
-  use guards, only: guards_of, joint_guard_t, most_guards
+  use guards, only: guards_of, joint_guard_t, room_for_guards
   use multibody, only: joint_soft, multibody_t
   use multibody_state, only: is_curved, multibody_state_t, turning_at
   use elementary, only: exponential, logarithm
@@ -36,12 +36,11 @@ module marched_flight
   type, public :: marched_flight_t
     type(marched_t) :: system
     type(march_t) :: march
-    type(guard_t) :: guards(most_guards)
-    type(joint_guard_t) :: list(most_guards)
+    type(guard_t), allocatable :: guards(:)
+    type(joint_guard_t), allocatable :: list(:)
     integer :: count_guards = 0
     !> Sizes of the guards, for their rounding; coordinates at the start [m].
-    real(wp) :: size_of_guard(most_guards) = 0
-    real(wp), allocatable :: origin(:)
+    real(wp), allocatable :: size_of_guard(:), origin(:)
     !> Depth of the thinnest contact that is pressed [m], huge without one.
     real(wp) :: depth = huge(1.0_wp)
   end type marched_flight_t
@@ -59,7 +58,9 @@ contains
     real(wp) :: y(2*machine%n), scale(2*machine%n), contact_time, duration
     integer :: g, n
     n = machine%n
+    allocate (flight%list(room_for_guards(machine)))
     call guards_of(machine, flow, state, flight%list, flight%count_guards)
+    allocate (flight%guards(flight%count_guards), flight%size_of_guard(flight%count_guards))
     path%start = state%time
     path%turning = turning_at(machine%frequency, state%time, harmonics_of(machine))
     call constant_forces(machine, state, path%force(:n), path%force_rate(:n))
@@ -240,9 +241,9 @@ contains
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
     type(path_t), intent(inout) :: path
-    logical, intent(out) :: triggered(most_guards), ended, failed
+    logical, intent(out) :: triggered(:), ended, failed
     type(watch_t), intent(inout) :: watch
-    real(wp) :: before(most_guards), y(2*machine%n)
+    real(wp) :: before(flight%count_guards), y(2*machine%n)
     integer :: triggered_guard, g, n
     n = machine%n
     if (maxval(abs(flight%march%y(:n))) > far*flight%depth) call count_anew(flight)

@@ -10,7 +10,7 @@ module mode_flow
   use eigen, only: general_eigen, modulus, refine_mode, solve_complex, symmetric_eigen, undamped_modes
   use multibody, only: harmonics_in, integral_of, joint_contact, joint_soft, multibody_t, offset_of
   use multibody_state, only: is_held
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use matrices, only: solve
   use mode_flow_type, only: mode_flow_t
   use mode_matrix, only: set_matrix
@@ -47,7 +47,7 @@ contains
   !> The flow of the mode `key` (a bit per joint); `with_matrix` asks for the series beside the modes.
   pure subroutine build_flow(machine, key, with_matrix, flow)
     type(multibody_t), intent(in) :: machine
-    integer, intent(in) :: key
+    integer(int64), intent(in) :: key
     logical, intent(in) :: with_matrix
     type(mode_flow_t), intent(out) :: flow
     complex(wp), allocatable :: forcing(:, :), surface(:, :)

@@ -3,12 +3,13 @@
 
 !> What the linear motion of a multibody structure in one mode of its joints is made of.
 module mode_flow_type
-  use kinds, only: wp
+  use kinds, only: int64, wp
   implicit none
   private
 
   type, public :: mode_flow_t
-    integer :: key = -1
+    !> A bit per joint.
+    integer(int64) :: key = -1
     logical :: modal = .false.
     !> Joints that are constraints, and those of them that do not depend on the others.
     integer, allocatable :: held(:), independent(:)

@@ -28,7 +28,6 @@ module body_machine
     type(motion_t) :: body
   contains
     procedure :: coordinates
-    procedure :: section_obstacle
     procedure :: start
     procedure :: allows
     procedure :: resume
@@ -43,9 +42,7 @@ module body_machine
     procedure :: energy => energy_now
     procedure :: sample
     procedure :: without_stops
-    procedure :: stays_clear
     procedure :: sample_columns
-    procedure :: event_columns
     procedure :: contact_forces
     procedure :: kinetic_energies
     procedure :: has_mode
@@ -109,12 +106,6 @@ contains
     class(body_machine_t), intent(in) :: self
     n = merge(1, coordinates_of_body(self%body), self%by_event)
   end function coordinates
-
-  pure function section_obstacle(self) result(text)
-    class(body_machine_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    text = ''
-  end function section_obstacle
 
   pure function start(self, values) result(section)
     class(body_machine_t), intent(in) :: self
@@ -248,15 +239,6 @@ contains
     allocate (free, source=same)
   end subroutine without_stops
 
-  pure logical function stays_clear(self, section, tally, periods, distance) result(clear)
-    class(body_machine_t), intent(in) :: self
-    class(section_state_t), intent(in) :: section
-    type(tally_t), intent(in) :: tally
-    integer, intent(in) :: periods
-    real(wp), intent(in) :: distance
-    clear = distance < tally%grazing_margin
-  end function stays_clear
-
   !> Position of the foot of the spring at the samples.
   pure function sample_columns(self, crank_angle, log) result(columns)
     class(body_machine_t), intent(in) :: self
@@ -273,13 +255,6 @@ contains
       call set_column(columns(1), 'drive', unit_of('m', machine%restoring%turn > 0), 'position of the foot of the spring', foot)
     end associate
   end function sample_columns
-
-  pure function event_columns(self, log) result(columns)
-    class(body_machine_t), intent(in) :: self
-    type(log_t), intent(in) :: log
-    type(machine_column_t), allocatable :: columns(:)
-    allocate (columns(0))
-  end function event_columns
 
   pure function contact_forces(self, log) result(values)
     class(body_machine_t), intent(in) :: self

@@ -22,9 +22,21 @@ module build_motion
   implicit none
   private
 
-  public :: body_of, bodies_of, has_several, machine_of, period_of
+  public :: body_of, bodies_of, kind_of, machine_of, period_of
+
+  !> One body; several, or two that friction or play couples; one with a motor; one by expressions.
+  integer, parameter, public :: kind_body = 1, kind_bodies = 2, kind_motor = 3, kind_own = 4
 
 contains
+
+  !> Of which kind the machine is that `laws` describe.
+  pure integer function kind_of(laws) result(kind)
+    type(law_choice_t), intent(in) :: laws(:)
+    kind = kind_body
+    if (is_multibody(laws) .or. is_pair(laws)) kind = kind_bodies
+    if (has_own(laws)) kind = kind_own
+    if (has_motor(laws)) kind = kind_motor
+  end function kind_of
 
   !> The machine that `laws` describe.
   subroutine machine_of(laws, options, machine, error)
@@ -36,26 +48,21 @@ contains
     type(multibody_machine_t) :: bodies
     type(motor_machine_t) :: driven
     type(own_machine_t) :: own
-    if (has_motor(laws)) then
+    select case (kind_of(laws))
+    case (kind_motor)
       call prepare_motor_machine(laws, options, driven, error)
       if (.not. allocated(error)) allocate (machine, source=driven)
-    else if (has_own(laws)) then
+    case (kind_own)
       call prepare_own_machine(laws, options, own, error)
       if (.not. allocated(error)) allocate (machine, source=own)
-    else if (has_several(laws)) then
+    case (kind_bodies)
       call bodies_of(laws, options, bodies, error)
       if (.not. allocated(error)) allocate (machine, source=bodies)
-    else
+    case default
       call body_of(laws, options, body, error)
       if (.not. allocated(error)) allocate (machine, source=body)
-    end if
+    end select
   end subroutine machine_of
-
-  !> Whether a machine has several bodies.
-  pure logical function has_several(laws)
-    type(law_choice_t), intent(in) :: laws(:)
-    has_several = is_multibody(laws) .or. is_pair(laws)
-  end function has_several
 
   !> The machine of one body that `laws` describe.
   pure subroutine body_of(laws, options, machine, error)
@@ -94,32 +101,14 @@ contains
   end subroutine structure_of_two
 
   !> Period of the section of the machine that `laws` describe [s].
-  pure subroutine period_of(laws, period, error)
+  subroutine period_of(laws, period, error)
     type(law_choice_t), intent(in) :: laws(:)
     real(wp), intent(out) :: period
     type(error_t), allocatable, intent(out) :: error
-    type(oscillator_t) :: machine
-    type(pair_t) :: pair
-    type(multibody_t) :: multibody
-    type(motor_machine_t) :: driven
-    type(own_machine_t) :: own
+    class(machine_t), allocatable :: machine
     period = 0
-    if (has_motor(laws)) then
-      call prepare_motor_machine(laws, options_t(), driven, error)
-      if (.not. allocated(error)) period = driven%period
-    else if (has_own(laws)) then
-      call prepare_own_machine(laws, options_t(), own, error)
-      if (.not. allocated(error)) period = own%period
-    else if (is_multibody(laws)) then
-      call multibody_of(laws, multibody, error)
-      if (.not. allocated(error)) period = multibody%period
-    else if (is_pair(laws)) then
-      call build_pair(laws, pair, error)
-      if (.not. allocated(error)) period = pair%period
-    else
-      call build_oscillator(laws, machine, error)
-      if (.not. allocated(error)) period = machine%period
-    end if
+    call machine_of(laws, options_t(), machine, error)
+    if (.not. allocated(error)) period = machine%period
   end subroutine period_of
 
 end module build_motion

@@ -2,7 +2,9 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A machine on its section: all that the layers above the event loops need. Another kind of machine is another extension of
-!> `machine_t`: it implements the deferred procedures, and its builder sets the facts. The layers above never ask which it is.
+!> `machine_t`: it implements the deferred procedures, and its builder sets the facts. The others hold for a machine with neither
+!> stops nor a driving body, whose state is `state` alone; an extension overrides those that do not hold for it. The layers above
+!> never ask which it is.
 !> The section is that of a drive period or, with `by_event`, where the motion of a machine without a clock turns round
 !> (`turn_section`).
 module machine_type
@@ -10,30 +12,13 @@ module machine_type
   use effect_law, only: sensor_t
   use kinds, only: int64, wp
   use machine_columns, only: machine_column_t
-  use motion_state, only: log_t, options_t, reset_tally, state_t, tally_t
-  use motor_state, only: motor_state_t
-  use multibody_state, only: multibody_state_t
+  use motion_state, only: log_t, options_t, reset_tally, tally_t
   use section_size, only: most_coordinates
+  use section_state, only: copy_of, scales_t, section_state_t
   implicit none
   private
 
-  public :: copy_of
-
-  !> `state` is that of the body, or of the watched one of several.
-  type, public :: section_state_t
-    type(state_t) :: state
-    type(multibody_state_t) :: multibody
-    type(motor_state_t) :: motor
-    !> The last `advance` ended on the section, where that does not come at given times.
-    logical :: passed = .false.
-    !> Time from the last section to this one [s].
-    real(wp) :: lasted = 0
-  end type section_state_t
-
-  !> Length [m], time [s] and mass [kg] that a machine itself sets.
-  type, public :: scales_t
-    real(wp) :: length = 1, time = 1, mass = 1
-  end type scales_t
+  public :: copy_of, scales_t, section_state_t
 
   type, abstract, public :: machine_t
     !> Time from section to section [s], and its circular frequency [rad/s].
@@ -82,33 +67,33 @@ module machine_type
     type(sensor_t) :: sensor
   contains
     procedure(count_of_machine), deferred :: coordinates
-    procedure(text_of_machine), deferred :: section_obstacle
     procedure(start_interface), deferred :: start
-    procedure(allows_interface), deferred :: allows
-    procedure(resume_interface), deferred :: resume
     procedure(at_interface), deferred :: state_at
     procedure(point_interface), deferred :: point_of
-    procedure(point_interface), deferred :: turn_point
     procedure(scales_interface), deferred :: scales
     procedure(advance_interface), deferred :: advance
     procedure(past_event_interface), deferred :: advance_past_event
     procedure(to_section_interface), deferred :: advance_to_section
-    procedure(to_turn_interface), deferred :: advance_to_turn
     procedure(energy_interface), deferred :: energy
     procedure(sample_interface), deferred :: sample
-    procedure(without_stops_interface), deferred :: without_stops
-    procedure(stays_clear_interface), deferred :: stays_clear
-    procedure(sample_columns_interface), deferred :: sample_columns
-    procedure(event_columns_interface), deferred :: event_columns
-    procedure(samples_interface), deferred :: contact_forces
     procedure(samples_interface), deferred :: kinetic_energies
+    procedure :: section_obstacle
+    procedure :: allows
+    procedure :: resume
+    procedure :: turn_point
+    procedure :: advance_to_turn
+    procedure :: without_stops
+    procedure :: stays_clear
+    procedure :: sample_columns
+    procedure :: event_columns
+    procedure :: contact_forces
+    procedure :: has_mode
+    procedure :: contact_sizes
+    procedure :: free_multipliers
     procedure :: rests_at_end
     procedure :: bound_to_rest
-    procedure(fact_of_machine), deferred :: has_mode
     procedure :: driver
     procedure :: contacts_in_row
-    procedure(sizes_interface), deferred :: contact_sizes
-    procedure(multipliers_interface), deferred :: free_multipliers
     procedure :: measured_force
     procedure :: force_at
     procedure(options_interface), deferred :: options
@@ -127,19 +112,6 @@ module machine_type
       class(machine_t), intent(in) :: self
     end function count_of_machine
 
-    !> Why the state on the section does not determine what follows; '' if it does.
-    pure function text_of_machine(self) result(text)
-      import :: machine_t
-      class(machine_t), intent(in) :: self
-      character(len=:), allocatable :: text
-    end function text_of_machine
-
-    !> Whether the section of a machine without a drive is a period of its slowest mode; else it is only a unit of time.
-    pure logical function fact_of_machine(self) result(fact)
-      import :: machine_t
-      class(machine_t), intent(in) :: self
-    end function fact_of_machine
-
     !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as in its machine. What follows in `values` are
     !> positions and velocities of the coordinates of several bodies, in place of those of the machine; with a motor the speed of
     !> the crank [rad/s] and current [A] or integral of the control [rad].
@@ -149,23 +121,6 @@ module machine_type
       real(wp), intent(in) :: values(:)
       type(section_state_t) :: section
     end function start_interface
-
-    !> Whether no body starts beyond a rigid stop: values as in `start`.
-    pure logical function allows_interface(self, values) result(allowed)
-      import :: machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp), intent(in) :: values(:)
-    end function allows_interface
-
-    !> The state of another machine given to this one, on the section with the crank at an angle [rad]; a driving body whose
-    !> motion is given has that of the new machine. What was never moved starts as in the new machine.
-    pure function resume_interface(self, before, angle) result(section)
-      import :: machine_t, section_state_t, wp
-      class(machine_t), intent(in) :: self
-      type(section_state_t), intent(in) :: before
-      real(wp), intent(in) :: angle
-      type(section_state_t) :: section
-    end function resume_interface
 
     !> The state on the section with the coordinates `point`; what they leave open is zero.
     pure function at_interface(self, point) result(section)
@@ -223,15 +178,6 @@ module machine_type
       type(log_t), intent(inout), optional :: log
     end subroutine to_section_interface
 
-    !> Moves a machine without a clock to where it turns round; `reason` is `reason_time_over` if it does not.
-    pure subroutine to_turn_interface(self, section, tally, reason)
-      import :: machine_t, section_state_t, tally_t
-      class(machine_t), intent(in) :: self
-      class(section_state_t), intent(inout) :: section
-      type(tally_t), intent(inout) :: tally
-      integer, intent(out) :: reason
-    end subroutine to_turn_interface
-
     !> Energy of the machine [J].
     pure real(wp) function energy_interface(self, section) result(energy)
       import :: machine_t, section_state_t, wp
@@ -247,68 +193,13 @@ module machine_type
       type(log_t), intent(inout) :: log
     end subroutine sample_interface
 
-    !> The same machine without stops, not allocated on entry, and how many first coordinates, positions, this takes away; -1 if it
-    !> takes away others.
-    pure subroutine without_stops_interface(self, free, positions)
-      import :: machine_t
-      class(machine_t), intent(in) :: self
-      class(machine_t), allocatable, intent(inout) :: free
-      integer, intent(out) :: positions
-    end subroutine without_stops_interface
-
-    !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of one body the tally
-    !> has by how much it missed them.
-    pure logical function stays_clear_interface(self, section, tally, periods, distance) result(clear)
-      import :: machine_t, section_state_t, tally_t, wp
-      class(machine_t), intent(in) :: self
-      class(section_state_t), intent(in) :: section
-      type(tally_t), intent(in) :: tally
-      integer, intent(in) :: periods
-      real(wp), intent(in) :: distance
-    end function stays_clear_interface
-
-    !> What a log holds beside time, position and velocity, at the samples of a motion that began with the crank at `crank_angle`
-    !> [rad].
-    pure function sample_columns_interface(self, crank_angle, log) result(columns)
-      import :: log_t, machine_column_t, machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp), intent(in) :: crank_angle
-      type(log_t), intent(in) :: log
-      type(machine_column_t), allocatable :: columns(:)
-    end function sample_columns_interface
-
-    !> The same at the events.
-    pure function event_columns_interface(self, log) result(columns)
-      import :: log_t, machine_column_t, machine_t
-      class(machine_t), intent(in) :: self
-      type(log_t), intent(in) :: log
-      type(machine_column_t), allocatable :: columns(:)
-    end function event_columns_interface
-
-    !> Forces of soft stops [N], kinetic energy [J], at the samples of a log.
+    !> Kinetic energy [J] at the samples of a log.
     pure function samples_interface(self, log) result(values)
       import :: log_t, machine_t, wp
       class(machine_t), intent(in) :: self
       type(log_t), intent(in) :: log
       real(wp) :: values(log%samples)
     end function samples_interface
-
-    !> What presses a soft stop: the mass that an impact feels [kg], the size of the forces [N], and whether the contact is flown
-    !> in closed form.
-    pure subroutine sizes_interface(self, mass, force, closed_form)
-      import :: machine_t, wp
-      class(machine_t), intent(in) :: self
-      real(wp), intent(out) :: mass, force
-      logical, intent(out) :: closed_form
-    end subroutine sizes_interface
-
-    !> Multipliers of the motion of a machine that is `linear` over some drive periods.
-    pure function multipliers_interface(self, periods) result(multipliers)
-      import :: machine_t, wp
-      class(machine_t), intent(in) :: self
-      integer, intent(in) :: periods
-      complex(wp) :: multipliers(2)
-    end function multipliers_interface
 
     !> How the machine is flown.
     pure type(options_t) function options_interface(self) result(options)
@@ -325,6 +216,119 @@ module machine_type
   end interface
 
 contains
+
+  !> Why the state on the section does not determine what follows; '' if it does.
+  pure function section_obstacle(self) result(text)
+    class(machine_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    text = ''
+  end function section_obstacle
+
+  !> Whether no body starts beyond a rigid stop: values as in `start`.
+  pure logical function allows(self, values) result(allowed)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(in) :: values(:)
+    allowed = .true.
+  end function allows
+
+  !> The state of another machine given to this one, on the section with the crank at an angle [rad]; a driving body whose
+  !> motion is given has that of the new machine. What was never moved starts as in the new machine.
+  pure function resume(self, before, angle) result(section)
+    class(machine_t), intent(in) :: self
+    type(section_state_t), intent(in) :: before
+    real(wp), intent(in) :: angle
+    type(section_state_t) :: section
+    section = self%start([before%state%x, before%state%v, angle])
+  end function resume
+
+  !> Coordinates of a state where the motion turns round.
+  pure function turn_point(self, section) result(point)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    real(wp) :: point(most_coordinates)
+    point = self%point_of(section)
+  end function turn_point
+
+  !> Moves a machine without a clock to where it turns round; `reason` is `reason_time_over` if it does not.
+  pure subroutine advance_to_turn(self, section, tally, reason)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(inout) :: section
+    type(tally_t), intent(inout) :: tally
+    integer, intent(out) :: reason
+    call self%advance_to_section(section, tally, reason)
+  end subroutine advance_to_turn
+
+  !> The same machine without stops, not allocated on entry, and how many first coordinates, positions, this takes away; -1 if it
+  !> takes away others.
+  pure subroutine without_stops(self, free, positions)
+    class(machine_t), intent(in) :: self
+    class(machine_t), allocatable, intent(inout) :: free
+    integer, intent(out) :: positions
+    positions = 0
+    allocate (free, source=self)
+  end subroutine without_stops
+
+  !> Whether a motion on the section comes no nearer to a stop than `distance` [m] in the next `periods`; of one body the tally
+  !> has by how much it missed them.
+  pure logical function stays_clear(self, section, tally, periods, distance) result(clear)
+    class(machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    type(tally_t), intent(in) :: tally
+    integer, intent(in) :: periods
+    real(wp), intent(in) :: distance
+    clear = distance < tally%grazing_margin
+  end function stays_clear
+
+  !> What a log holds beside time, position and velocity, at the samples of a motion that began with the crank at `crank_angle`
+  !> [rad].
+  pure function sample_columns(self, crank_angle, log) result(columns)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(in) :: crank_angle
+    type(log_t), intent(in) :: log
+    type(machine_column_t), allocatable :: columns(:)
+    allocate (columns(0))
+  end function sample_columns
+
+  !> The same at the events.
+  pure function event_columns(self, log) result(columns)
+    class(machine_t), intent(in) :: self
+    type(log_t), intent(in) :: log
+    type(machine_column_t), allocatable :: columns(:)
+    allocate (columns(0))
+  end function event_columns
+
+  !> Forces of soft stops [N] at the samples of a log.
+  pure function contact_forces(self, log) result(values)
+    class(machine_t), intent(in) :: self
+    type(log_t), intent(in) :: log
+    real(wp) :: values(log%samples)
+    values = 0
+  end function contact_forces
+
+  !> Whether the section of a machine without a drive is a period of its slowest mode; else it is only a unit of time.
+  pure logical function has_mode(self) result(fact)
+    class(machine_t), intent(in) :: self
+    fact = .false.
+  end function has_mode
+
+  !> What presses a soft stop: the mass that an impact feels [kg], the size of the forces [N], and whether the contact is flown
+  !> in closed form.
+  pure subroutine contact_sizes(self, mass, force, closed_form)
+    class(machine_t), intent(in) :: self
+    real(wp), intent(out) :: mass, force
+    logical, intent(out) :: closed_form
+    mass = self%sizes%mass
+    force = 0
+    closed_form = .false.
+  end subroutine contact_sizes
+
+  !> Multipliers of the motion of a machine that is `linear` over some drive periods.
+  pure function free_multipliers(self, periods) result(multipliers)
+    class(machine_t), intent(in) :: self
+    integer, intent(in) :: periods
+    complex(wp) :: multipliers(2)
+    multipliers = 0
+  end function free_multipliers
 
   !> Whether a machine that nothing drives has come to rest over the samples of a log after `since` [s], in a motion of this
   !> `amplitude` [m].
@@ -373,16 +377,6 @@ contains
     real(wp) :: force(size(times))
     force = 0
   end function force_at
-
-  !> A copy of a state, to be moved on its own.
-  pure type(section_state_t) function copy_of(section) result(copy)
-    class(section_state_t), intent(in) :: section
-    copy%state = section%state
-    copy%multibody = section%multibody
-    copy%motor = section%motor
-    copy%passed = section%passed
-    copy%lasted = section%lasted
-  end function copy_of
 
   !> So many events and steps a trajectory may take at most, or fewer where it may take fewer already.
   pure subroutine limit_budgets(self, events, steps)

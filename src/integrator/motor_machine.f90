@@ -37,30 +37,24 @@ module motor_machine
     real(wp) :: own_start(2) = 0
   contains
     procedure :: coordinates
-    procedure :: section_obstacle
     procedure :: start
     procedure :: allows
     procedure :: bound_to_rest
     procedure :: resume
     procedure :: state_at
     procedure :: point_of
-    procedure :: turn_point => point_of
     procedure :: scales
     procedure :: advance => advance_both
     procedure :: advance_past_event
     procedure :: advance_to_section
-    procedure :: advance_to_turn
     procedure :: energy => energy_now
     procedure :: sample
     procedure :: without_stops
-    procedure :: stays_clear
     procedure :: sample_columns
     procedure :: event_columns
-    procedure :: contact_forces
     procedure :: kinetic_energies
     procedure :: has_mode
     procedure :: contact_sizes
-    procedure :: free_multipliers
     procedure :: options => options_now
     procedure :: set_options
   end type motor_machine_t
@@ -108,12 +102,6 @@ contains
     class(motor_machine_t), intent(in) :: self
     n = merge(4, 3, self%motor%system%control%has_own)
   end function coordinates
-
-  pure function section_obstacle(self) result(text)
-    class(motor_machine_t), intent(in) :: self
-    character(len=:), allocatable :: text
-    text = ''
-  end function section_obstacle
 
   pure function start(self, values) result(section)
     class(motor_machine_t), intent(in) :: self
@@ -230,14 +218,6 @@ contains
     if (reason == 0 .and. .not. section%passed) reason = reason_time_over
   end subroutine advance_to_section
 
-  pure subroutine advance_to_turn(self, section, tally, reason)
-    class(motor_machine_t), intent(in) :: self
-    class(section_state_t), intent(inout) :: section
-    type(tally_t), intent(inout) :: tally
-    integer, intent(out) :: reason
-    call self%advance_to_section(section, tally, reason)
-  end subroutine advance_to_turn
-
   pure real(wp) function energy_now(self, section) result(energy)
     class(motor_machine_t), intent(in) :: self
     class(section_state_t), intent(in) :: section
@@ -262,15 +242,6 @@ contains
     positions = 0
     allocate (free, source=same)
   end subroutine without_stops
-
-  pure logical function stays_clear(self, section, tally, periods, distance) result(clear)
-    class(motor_machine_t), intent(in) :: self
-    class(section_state_t), intent(in) :: section
-    type(tally_t), intent(in) :: tally
-    integer, intent(in) :: periods
-    real(wp), intent(in) :: distance
-    clear = distance < tally%grazing_margin
-  end function stays_clear
 
   pure function sample_columns(self, crank_angle, log) result(columns)
     class(motor_machine_t), intent(in) :: self
@@ -309,14 +280,6 @@ contains
     call set_column(columns(2), 'crank_speed', 'rad/s', 'speed of the crank', values(2, :))
   end subroutine set_crank
 
-  !> Zeros: there are no soft stops with a motor.
-  pure function contact_forces(self, log) result(values)
-    class(motor_machine_t), intent(in) :: self
-    type(log_t), intent(in) :: log
-    real(wp) :: values(log%samples)
-    values = 0
-  end function contact_forces
-
   pure function kinetic_energies(self, log) result(values)
     class(motor_machine_t), intent(in) :: self
     type(log_t), intent(in) :: log
@@ -337,14 +300,6 @@ contains
     force = self%motor%system%stiffness*self%sizes%length
     closed_form = .false.
   end subroutine contact_sizes
-
-  !> Zeros: it is never `linear`.
-  pure function free_multipliers(self, periods) result(multipliers)
-    class(motor_machine_t), intent(in) :: self
-    integer, intent(in) :: periods
-    complex(wp) :: multipliers(2)
-    multipliers = 0
-  end function free_multipliers
 
   pure type(options_t) function options_now(self) result(options)
     class(motor_machine_t), intent(in) :: self

@@ -58,7 +58,6 @@ module multibody_machine
     procedure :: driver
     procedure :: contacts_in_row
     procedure :: contact_sizes
-    procedure :: free_multipliers
     procedure :: options => options_now
     procedure :: set_options
   end type multibody_machine_t
@@ -405,14 +404,6 @@ contains
       closed_form = acts_as_spring(machine%joints(stop), 1)
     end associate
   end subroutine contact_sizes
-
-  !> Of no meaning here, as no structure is `linear` in the sense of `machine_t`.
-  pure function free_multipliers(self, periods) result(multipliers)
-    class(multibody_machine_t), intent(in) :: self
-    integer, intent(in) :: periods
-    complex(wp) :: multipliers(2)
-    multipliers = 0
-  end function free_multipliers
 
   pure type(options_t) function options_now(self) result(options)
     class(multibody_machine_t), intent(in) :: self

@@ -17,6 +17,7 @@ module own_machine
   use motor_system, only: w_at
   use section_size, only: most_coordinates
   use status, only: reason_time_over
+  use stored_jumps, only: jump_until_now
   use tape_value, only: evaluate
   implicit none
   private
@@ -48,6 +49,7 @@ module own_machine
     procedure :: without_stops
     procedure :: sample_columns
     procedure :: event_columns
+    procedure :: record_end
     procedure :: has_mode
   end type own_machine_t
 
@@ -337,6 +339,16 @@ contains
                       values(6 + i, :))
     end do
   end function sample_columns
+
+  !> Closes the balance of a log: a jump of the foot at this instant has been, or not, as the energy has it.
+  pure subroutine record_end(self, section, sampled, log)
+    class(own_machine_t), intent(in) :: self
+    class(section_state_t), intent(in) :: section
+    logical, intent(in) :: sampled
+    type(log_t), intent(inout) :: log
+    call self%motor_machine_t%record_end(section, sampled, log)
+    log%balance%work = log%balance%work + jump_until_now(self%motor%system, section%state, section%motor, log)
+  end subroutine record_end
 
   pure function event_columns(self, log) result(columns)
     class(own_machine_t), intent(in) :: self

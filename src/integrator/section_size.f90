@@ -6,6 +6,6 @@ module section_size
   implicit none
   private
 
-  integer, parameter, public :: most_coordinates = 16
+  integer, parameter, public :: most_coordinates = 128
 
 end module section_size

@@ -15,13 +15,16 @@ module map_packing
   use kinds, only: int64, int8, real64
   use slabs, only: chunk_count, chunk_corner, final_chunk, slab, slab_count
   use status, only: exit_io
-  use system, only: monotonic_seconds
+  use system, only: keep_memory, monotonic_seconds
   use team, only: team_t
   use tile_record, only: values_t
   use tile_store, only: tile_store_t
   use value_types, only: bytes_of
   implicit none
   private
+
+  !> Memory of slabs and chunks that stays with a rank from one to the next [bytes].
+  integer, parameter :: kept = 2**26
 
   !> What is packed, and what is known of it.
   type, public :: packing_t
@@ -83,6 +86,7 @@ contains
     integer(int64) :: first, count
     integer :: i
     self%is_packed = .true.
+    call keep_memory(kept)
     call file%open(path, .true., error)
     do i = 1, size(datasets)
       if (team%is_root() .and. .not. allocated(error)) call h5_open_dataset(new, trim(self%names(i)), datasets(i), error)

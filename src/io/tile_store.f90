@@ -124,7 +124,8 @@ contains
     end if
     if (.not. was_damaged) return
     call self%file%write(self%head, 0_int64, error)
-    if (.not. allocated(error) .and. length < self%length) call self%file%write([0_int8], self%length - 1, error)
+    ! Nothing is written there: other ranks may be writing their records.
+    if (.not. allocated(error) .and. length < self%length) call self%file%set_length(self%length, error)
   end subroutine restore_head
 
   !> Writes what waits and closes the file; one that is not open stays so.

@@ -165,6 +165,8 @@ contains
     real(wp) :: level(lane_functions, lane_powers)
     type(path_t) :: path
     integer :: d
+    path%force = 0
+    path%force_rate = 0
     do d = 1, nint(mode%drifts)
       path%powers = 0
       path%powers(:machine%n, 0) = mode%drift(:machine%n, d)

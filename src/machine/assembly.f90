@@ -271,19 +271,7 @@ contains
         - (machine%stiffness(rest, at) + iw*machine%damping(rest, at) - w**2*machine%mass(rest, at))*wave%harmonic(m)
     end do
     do i = 1, size(machine%joints)
-      call take_out_of_row(machine%joints(i)%row, machine%joints(i)%offset, at, rest, wave)
-      if (allocated(machine%joints(i)%memory)) then
-        associate (memory => machine%joints(i)%memory)
-          call take_out_of_row(memory%slide%row, memory%slide%offset, at, rest, wave)
-          memory%deflection = memory%deflection(rest)
-        end associate
-      end if
-      if (.not. allocated(machine%joints(i)%load)) cycle
-      associate (sources => machine%joints(i)%load%sources)
-        do m = 1, size(sources)
-          call take_out_of_row(sources(m)%row, sources(m)%offset, at, rest, wave)
-        end do
-      end associate
+      call take_out_of_joint(machine%joints(i), at, rest, wave)
     end do
     if (machine%watched == at) then
       machine%watched = 1
@@ -301,6 +289,25 @@ contains
     machine%start_shape = machine%start_shape(rest, :)
     machine%n = size(rest)
   end subroutine take_out
+
+  !> The same of the rows of one joint, its memory and its load.
+  pure subroutine take_out_of_joint(joint, at, rest, wave)
+    type(joint_t), intent(inout) :: joint
+    integer, intent(in) :: at, rest(:)
+    type(wave_t), intent(in) :: wave
+    integer :: m
+    call take_out_of_row(joint%row, joint%offset, at, rest, wave)
+    if (allocated(joint%memory)) then
+      call take_out_of_row(joint%memory%slide%row, joint%memory%slide%offset, at, rest, wave)
+      joint%memory%deflection = joint%memory%deflection(rest)
+    end if
+    if (.not. allocated(joint%load)) return
+    associate (sources => joint%load%sources)
+      do m = 1, size(sources)
+        call take_out_of_row(sources(m)%row, sources(m)%offset, at, rest, wave)
+      end do
+    end associate
+  end subroutine take_out_of_joint
 
   !> A coordinate w'q + offset(t) without the body number `at`, which moves as `wave`.
   pure subroutine take_out_of_row(row, offset, at, rest, wave)
@@ -327,9 +334,11 @@ contains
     real(wp) :: values(machine%n), vectors(machine%n, machine%n)
     integer :: i
     if (machine%n > most_degrees) then
-      call fail(error, exit_bad_case, 'body: found too many bodies, allowed at most 16 coordinates')
+      call fail(error, exit_bad_case, 'body: found '//to_text(machine%n)//' coordinates, allowed at most '// &
+                to_text(most_degrees))
     else if (size(machine%joints) >= most_joints) then
-      call fail(error, exit_bad_case, 'joints: found too many, allowed at most 12')
+      call fail(error, exit_bad_case, 'joints: found '//to_text(size(machine%joints))//' joints, allowed at most '// &
+                to_text(most_joints - 1))
     end if
     if (count_switches(machine) > most_load_switches) call fail(error, exit_bad_case, 'body: found '// &
       to_text(count_switches(machine))//' of abs, sign, min, max and if in the expressions of a machine (a load has one more), '// &

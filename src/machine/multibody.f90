@@ -17,7 +17,7 @@ module multibody
   public :: wave_value, harmonics_in, offset_of, is_stop, integral_of, reads_clock, count_switches
 
   !> One joint more than a machine may have: the section of a motion without a clock.
-  integer, parameter, public :: most_degrees = 16, most_joints = 13
+  integer, parameter, public :: most_degrees = 64, most_joints = 49
 
   !> Most switching functions of all expressions of a machine.
   integer, parameter, public :: most_load_switches = 32

@@ -7,7 +7,7 @@ module multibody_state
   use elementary, only: sine_cosine
   use joint_forces, only: acts_as_spring, is_curved, is_held, joint_energy, joint_force, spring_force, spring_terms, strength_now
   use multibody, only: controller_t, joint_contact, load_t, multibody_t, most_degrees, most_joints, source_t, wave_value
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use tape_series, only: expand, prepare_series, series_t
   use tape_value, only: evaluate, sizes_of_nodes
   implicit none
@@ -100,7 +100,7 @@ contains
   end function is_marched
 
   !> One bit for each joint that is a constraint or a spring.
-  pure integer function key_of(machine, phase)
+  pure integer(int64) function key_of(machine, phase)
     type(multibody_t), intent(in) :: machine
     integer, intent(in) :: phase(:)
     integer :: j

@@ -268,7 +268,6 @@ contains
     type(links_t), intent(in) :: links
     type(line_t), allocatable, intent(out) :: lines(:)
     integer, allocatable :: first(:), incident(:), walked(:)
-    type(line_t), allocatable :: longer(:)
     logical, allocatable :: used(:)
     integer :: p, k, count, length, round
     call incidence(size(points), links, first, incident)
@@ -281,11 +280,7 @@ contains
         do k = first(p), first(p + 1) - 1
           if (used(incident(k))) cycle
           call walk(p, incident(k), length)
-          if (count == size(lines)) then
-            allocate (longer(2*count))
-            longer(:count) = lines
-            call move_alloc(longer, lines)
-          end if
+          if (count == size(lines)) call make_room(lines)
           count = count + 1
           lines(count)%closed = length > 1 .and. walked(1) == walked(length) .and. round == 2
           if (lines(count)%closed) length = length - 1
@@ -326,6 +321,15 @@ contains
     end subroutine walk
 
   end subroutine trace
+
+  !> Room for twice as many lines.
+  subroutine make_room(lines)
+    type(line_t), allocatable, intent(inout) :: lines(:)
+    type(line_t), allocatable :: longer(:)
+    allocate (longer(2*size(lines)))
+    longer(:size(lines)) = lines
+    call move_alloc(longer, lines)
+  end subroutine make_room
 
   !> The links of each point: those of point p from `first(p)` to `first(p + 1) - 1`.
   pure subroutine incidence(n, links, first, incident)

@@ -225,7 +225,7 @@ contains
   end subroutine slice_motion
 
   !> Drive period of a slice's machine [s].
-  pure subroutine slice_period(grid, slice, period, error)
+  subroutine slice_period(grid, slice, period, error)
     type(grid_t), intent(in) :: grid
     integer(int64), intent(in) :: slice
     real(wp), intent(out) :: period

@@ -8,13 +8,14 @@ module build_memory
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: law_choice_t, list_of, path_of, value_of
+  use reference_points, only: number
   use multibody, only: joint_bristle, joint_elastic, joint_t, multibody_t, wave_t
   use status, only: exit_bad_case
   use text, only: to_text
   implicit none
   private
 
-  public :: has_bristles, add_deflections, add_bristles, add_elements
+  public :: has_bristles, add_deflections, add_bristles, add_elements, check_static
 
 contains
 
@@ -51,6 +52,21 @@ contains
     name = trim(choice%label)//'.1'
   end function deflection_of
 
+  !> Code 65 for a `static` level of friction below that of sliding [N, or 1 where they are coefficients].
+  pure subroutine check_static(choice, static, sliding, error)
+    type(law_choice_t), intent(in) :: choice
+    real(wp), intent(in) :: static, sliding
+    type(error_t), allocatable, intent(inout) :: error
+    if (.not. static < sliding) return
+    if (choice%name == 'friction:coulomb_load') then
+      call fail(error, exit_bad_case, path_of(choice)//'.static_coefficient: found '//number(static)// &
+                ', allowed at least the kinetic_coefficient '//number(sliding))
+    else
+      call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(static)// &
+                ' N, allowed at least the force '//number(sliding)//' N')
+    end if
+  end subroutine check_static
+
   !> The joints of bristles between surfaces along `row`. Code 65 for a static force below that of sliding.
   pure subroutine add_bristles(machine, choice, row, error)
     type(multibody_t), intent(inout) :: machine
@@ -60,13 +76,9 @@ contains
     type(joint_t) :: joint
     type(wave_t) :: belt
     if (choice%name == 'friction:lugre') then
-      if (value_of(choice, 'static_force') < value_of(choice, 'force')) then
-        call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '// &
-                  to_text(real(value_of(choice, 'static_force'), kind(1d0)))//' N, allowed at least the force '// &
-                  to_text(real(value_of(choice, 'force'), kind(1d0)))//' N')
-        return
-      end if
+      call check_static(choice, value_of(choice, 'static_force'), value_of(choice, 'force'), error)
     end if
+    if (allocated(error)) return
     joint%name = path_of(choice)
     joint%kind = joint_bristle
     joint%row = row

@@ -6,7 +6,7 @@ module build_multibody
   use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, move_surface
   use build_control, only: add_controllers, add_impulses
   use build_load, only: set_expression
-  use build_memory, only: add_bristles, add_deflections, add_elements, has_bristles
+  use build_memory, only: add_bristles, add_deflections, add_elements, check_static, has_bristles
   use contact_law, only: contact_kelvin_voigt, contact_of, contact_t
   use errors, only: error_t, fail
   use friction_law, only: friction_of_part
@@ -257,16 +257,8 @@ contains
     joint%kind = joint_friction
     joint%row = row
     joint%friction = friction_of_part(choice)
-    if (joint%friction%break_away < joint%friction%kinetic) then
-      if (choice%name == 'friction:coulomb_load') then
-        call fail(error, exit_bad_case, path_of(choice)//'.static_coefficient: found '//number(joint%friction%break_away)// &
-                  ', allowed at least the kinetic_coefficient '//number(joint%friction%kinetic))
-      else
-        call fail(error, exit_bad_case, path_of(choice)//'.static_force: found '//number(joint%friction%break_away)// &
-                  ' N, allowed at least the force '//number(joint%friction%kinetic)//' N')
-      end if
-      return
-    end if
+    call check_static(choice, joint%friction%break_away, joint%friction%kinetic, error)
+    if (allocated(error)) return
     if (choice%name == 'friction:elastic_coulomb') then
       joint%kind = joint_elastic
       joint%stiffness = value_of(choice, 'stiffness')

@@ -21,7 +21,7 @@ module mode_lcp
     real(wp), dimension(most_joints) :: lower = 0, upper = 0
     !> No longer part of the problem: no force is sought.
     logical :: fixed(most_joints) = .false.
-    real(wp) :: g(most_joints, most_joints) = 0
+    real(wp) :: g(most_joints, most_joints)
     real(wp) :: tolerance = 0
   end type mode_lcp_t
 

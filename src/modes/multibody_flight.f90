@@ -5,7 +5,7 @@
 !> is not linear.
 module multibody_flight
   use flight_path, only: path_t
-  use guards, only: joint_guard_t, most_guards
+  use guards, only: joint_guard_t
   use multibody, only: multibody_t
   use multibody_log, only: log_flight
   use multibody_state, only: is_marched, multibody_state_t
@@ -31,9 +31,9 @@ contains
     type(options_t), intent(in) :: options
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
-    type(joint_guard_t), intent(inout) :: list(most_guards)
+    type(joint_guard_t), intent(inout) :: list(:)
     integer, intent(out) :: count_guards, reason
-    logical, intent(out) :: triggered(most_guards)
+    logical, intent(out) :: triggered(:)
     type(watch_t), intent(inout) :: watch
     integer(int64), intent(inout) :: steps
     type(log_t), intent(inout), optional :: log
@@ -43,7 +43,7 @@ contains
     logical :: ended, failed, hopeless
     reason = 0
     if (.not. (options%flight == flight_adaptive .or. is_marched(machine, state%phase))) then
-      start = state
+      if (present(log)) start = state
       ! Intervals of a series, of which a stiff structure has many.
       if (.not. flow%modal .and. flow%rate*(until - state%time) > options%step_budget) then
         triggered = .false.
@@ -64,7 +64,7 @@ contains
       list = flight%list
       count_guards = flight%count_guards
       do
-        start = state
+        if (present(log)) start = state
         call step_flight(machine, flight, state, until, path, triggered, ended, failed, watch)
         if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
         steps = steps + 1

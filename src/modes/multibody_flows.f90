@@ -4,7 +4,7 @@
 !> A multibody structure ready to move: the machine, how it is integrated, and the flows of the modes that it will meet.
 module multibody_flows
   use multibody, only: is_stop, joint_contact, joint_section, joint_t, multibody_t, most_degrees
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use mode_flow, only: build_flow, harmonics_of, mode_flow_t
   use motion_state, only: flight_adaptive, options_t
   use section_directions, only: directions_of, speeds_of
@@ -41,7 +41,8 @@ contains
     type(options_t), intent(in) :: options
     type(multibody_motion_t), intent(out) :: moving
     real(wp) :: directions(most_degrees, most_degrees)
-    integer :: key, joints, i, positions
+    integer(int64) :: key
+    integer :: joints, i, positions
     moving%machine = machine
     moving%options = options
     moving%harmonics = harmonics_of(machine)
@@ -61,14 +62,14 @@ contains
     end if
     if (joints <= few_joints) then
       allocate (moving%flows(2**joints))
-      do key = 0, 2**joints - 1
+      do key = 0, 2_int64**joints - 1
         call build_flow(moving%machine, key, with_matrix(moving), moving%flows(key + 1))
       end do
     else
       allocate (moving%flows(joints + 1))
-      call build_flow(moving%machine, 0, with_matrix(moving), moving%flows(1))
+      call build_flow(moving%machine, 0_int64, with_matrix(moving), moving%flows(1))
       do i = 1, joints
-        call build_flow(moving%machine, ibset(0, i - 1), with_matrix(moving), moving%flows(i + 1))
+        call build_flow(moving%machine, ibset(0_int64, i - 1), with_matrix(moving), moving%flows(i + 1))
       end do
     end if
   end subroutine prepare_multibody
@@ -111,10 +112,10 @@ contains
   !> Number of the flow that is ready for a mode, 0 if there is none.
   pure integer function ready(moving, key)
     type(multibody_motion_t), intent(in) :: moving
-    integer, intent(in) :: key
+    integer(int64), intent(in) :: key
     ready = 0
-    if (key + 1 <= size(moving%flows)) then
-      if (moving%flows(key + 1)%key == key) ready = key + 1
+    if (key < size(moving%flows)) then
+      if (moving%flows(key + 1)%key == key) ready = int(key) + 1
     end if
     if (ready == 0) ready = findloc(moving%flows%key, key, 1)
   end function ready

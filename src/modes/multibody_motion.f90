@@ -5,7 +5,7 @@
 module multibody_motion
   use constants, only: two_pi
   use control, only: error_of
-  use guards, only: joint_guard_t, most_guards, turns_round
+  use guards, only: joint_guard_t, room_for_guards, turns_round
   use multibody, only: integral_of, joint_bristle, joint_contact, joint_elastic, joint_friction, joint_soft, joint_spring, &
     most_joints
   use multibody_flight, only: fly
@@ -98,12 +98,12 @@ contains
     logical, intent(in), optional :: one_event
     type(multibody_state_t) :: start
     type(mode_flow_t) :: spare
-    type(joint_guard_t) :: list(most_guards)
+    type(joint_guard_t) :: list(room_for_guards(moving%machine))
     type(watch_t) :: watch
     real(wp) :: before, until, from
     type(progress_watch_t) :: idle_steps
-    integer :: key
-    logical :: triggered(most_guards), turned, counts_on, timed, slips, held
+    integer(int64) :: key
+    logical :: triggered(room_for_guards(moving%machine)), turned, counts_on, timed, slips, held
     reason = 0
     counts_on = .false.
     if (present(one_event)) counts_on = one_event
@@ -164,12 +164,12 @@ contains
   !> One flight in the mode `key`, by the flow that is ready for it or else by `spare`, which is made for it.
   pure subroutine fly_in_mode(moving, key, spare, state, until, list, triggered, watch, steps, reason, log)
     type(multibody_motion_t), intent(in) :: moving
-    integer, intent(in) :: key
+    integer(int64), intent(in) :: key
     type(mode_flow_t), intent(inout) :: spare
     type(multibody_state_t), intent(inout) :: state
     real(wp), intent(in) :: until
-    type(joint_guard_t), intent(inout) :: list(most_guards)
-    logical, intent(out) :: triggered(most_guards)
+    type(joint_guard_t), intent(inout) :: list(:)
+    logical, intent(out) :: triggered(:)
     type(watch_t), intent(inout) :: watch
     integer(int64), intent(inout) :: steps
     integer, intent(out) :: reason
@@ -212,7 +212,7 @@ contains
     type(transitions_t), intent(inout), optional :: transitions
     type(multibody_state_t) :: start
     logical :: ok
-    start = state
+    if (present(log) .or. present(transitions)) start = state
     call transition(moving, state, list, triggered, held, tally, ok)
     if (.not. ok) reason = reason_step_failed
     if (present(log) .and. ok) call log_transition(moving, start, state, list, triggered, log)
@@ -228,9 +228,10 @@ contains
     integer, intent(inout) :: reason
     if (tally%steps > moving%options%step_budget) reason = reason_step_budget
     if (.not. all(abs(state%q(:moving%machine%n)) <= moving%options%domain)) reason = reason_left_domain
-    if (any(state%q /= state%q) .or. any(state%v /= state%v)) then
+    associate (q => state%q(:moving%machine%n), v => state%v(:moving%machine%n))
+      if (.not. (any(q /= q) .or. any(v /= v))) return
       if (.not. max(-watch%extremes(1), watch%extremes(2)) > moving%options%domain) reason = reason_not_finite
-    end if
+    end associate
   end subroutine check_limits
 
   !> Notes a transition; what was `held` for an instant, or several at once, is not certain.
@@ -334,7 +335,7 @@ contains
   pure logical function moves(moving, state, key)
     type(multibody_motion_t), intent(in) :: moving
     type(multibody_state_t), intent(in) :: state
-    integer, intent(in) :: key
+    integer(int64), intent(in) :: key
     integer :: at
     if (allocated(moving%machine%driver)) then
       moves = slides_on(moving%machine, state)

@@ -21,8 +21,8 @@ module progress_watch
     integer :: idle_steps = 0, holds = 0, in_a_row = 0
     real(wp) :: last_hold = -huge(1.0_wp)
     !> The modes and speeds at this instant so far.
-    integer :: phase(most_joints, most_idle_steps) = 0, left(most_joints, most_idle_steps) = 0
-    real(wp) :: v(most_degrees, most_idle_steps) = 0
+    integer :: phase(most_joints, most_idle_steps), left(most_joints, most_idle_steps)
+    real(wp) :: v(most_degrees, most_idle_steps)
   end type progress_watch_t
 
 contains
@@ -36,7 +36,9 @@ contains
     type(multibody_state_t), intent(in) :: state
     logical, intent(out) :: held
     real(wp) :: rounding
-    integer :: i
+    integer :: i, n, joints
+    n = machine%n
+    joints = size(machine%joints)
     held = .false.
     if (state%time > before) then
       watch%idle_steps = 0
@@ -44,13 +46,14 @@ contains
     end if
     rounding = machine%negligible_speed + 64*epsilon(rounding)*maxval(abs(state%v(:machine%n)))
     do i = 1, watch%idle_steps
-      held = held .or. (all(watch%phase(:, i) == state%phase) .and. all(watch%left(:, i) == state%left) .and. &
-                        all(abs(watch%v(:, i) - state%v) <= rounding))
+      held = held .or. (all(watch%phase(:joints, i) == state%phase(:joints)) .and. &
+                        all(watch%left(:joints, i) == state%left(:joints)) .and. &
+                        all(abs(watch%v(:n, i) - state%v(:n)) <= rounding))
     end do
     watch%idle_steps = min(watch%idle_steps + 1, most_idle_steps)
-    watch%phase(:, watch%idle_steps) = state%phase
-    watch%left(:, watch%idle_steps) = state%left
-    watch%v(:, watch%idle_steps) = state%v
+    watch%phase(:joints, watch%idle_steps) = state%phase(:joints)
+    watch%left(:joints, watch%idle_steps) = state%left(:joints)
+    watch%v(:n, watch%idle_steps) = state%v(:n)
     held = held .or. watch%idle_steps >= most_idle_steps
   end subroutine note_flight
 

@@ -9,6 +9,7 @@ module motor_log
   use motor_now, only: node_values
   use motor_system, only: motor_system_t
   use motor_state, only: motor_state_t
+  use stored_jumps, only: jump_until_now
   implicit none
   private
 
@@ -61,6 +62,7 @@ contains
     values = motor_values(system, state, crank)
     balance = log%balance
     balance%at_end = values(6)
+    balance%work = balance%work + jump_until_now(system, state, crank, log)
     call put_column(log%sample_coordinates, log%samples + 1, [values(:5), values(7), crank%own(:system%variables - 4)])
     call record_sample(log, state, driver=crank_of(crank), balance=balance)
   end subroutine add_sample

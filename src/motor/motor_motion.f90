@@ -28,6 +28,7 @@ module motor_motion
     flight_reached, flight_step_budget, flight_t, flight_wrong_branch
   use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
     reason_step_failed
+  use stored_jumps, only: add_jump, keep_stored
   implicit none
   private
 
@@ -165,6 +166,7 @@ contains
     call begin_mode(moving%system, state, crank, tally%needs_v_max, merge(1, 0, present(log)), flight, fault)
     status = merge(flight_left_domain, flight_reached, fault > 0)
     if (fault < 0) status = flight_wrong_branch
+    if (fault == 0) call add_jump(moving%system, flight, state, crank, log)
     at_switch = flight%time
     idle = 0
     do while (status == flight_reached .or. status == flight_crossed)
@@ -183,6 +185,7 @@ contains
         tally%v_max = max(tally%v_max, state%v)
         if (any(flight%crossed(:guard_fastest - 1)) .or. any(flight%crossed(guard_fastest + 1:guard_count))) exit
         call pass_switches(flight, at_switch, idle, status)
+        call add_jump(moving%system, flight, state, crank, log)
         ! A jump of the forces may release what was held.
         if (any(flight%crossed(guard_count + 1:)) .and. .not. slips(state%mode)) exit
       end if
@@ -231,6 +234,7 @@ contains
     log%balance%friction = log%balance%friction + flight%state(n + 2)
     log%balance%damping = log%balance%damping + flight%state(n + 3)
     flight%state(n + 1:) = 0
+    call keep_stored(system, flight, log)
   end subroutine take_state
 
   !> What happens where guards crossed zero; `passed`: the section.

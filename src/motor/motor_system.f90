@@ -54,6 +54,8 @@ module motor_system
     real(wp) :: rotor_inertia = 1
     !> Nodes: torque of the motor, of the spring or body on the crank, foot, its slope, energies, inertia, its slope, current.
     integer :: torque = 0, load = 0, foot = 0, foot_slope = 0, kinetic = 0, energy = 0, inertia = 0, inertia_slope = 0, current = 0
+    !> Node of the energy of the spring, where its foot follows an expression; 0 otherwise.
+    integer :: stored = 0
     !> Nodes, by mode: what holds the body [N] and the crank [N m] or would if they were at rest.
     integer :: body_hold(4) = 0, crank_hold(4) = 0
     !> Nothing is driven by a motor: the first variable is the time [s], the second one the phase [rad].

@@ -376,6 +376,7 @@ contains
       system%foot = node_of(sheet, 'foot')
       system%kinetic = node_of(sheet, 'kinetic_energy')
       system%energy = node_of(sheet, 'energy')
+      system%stored = node_of(sheet, 'stored')
       system%torque = node_of(sheet, 'zero')
       system%load = node_of(sheet, 'zero')
       system%inertia = node_of(sheet, 'one')

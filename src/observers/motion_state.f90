@@ -113,6 +113,9 @@ module motion_state
     !> Energy balance until now, and until each sample: rows as in `energy_balance_t`, `at_end` being the energy then.
     type(energy_balance_t) :: balance
     real(wp), allocatable :: sample_balance(:, :)
+    !> Energy of a spring whose foot may jump [J], as the motion so far left it.
+    real(wp) :: stored = 0
+    logical :: has_stored = .false.
     !> Speed at which the last contact with a soft barrier began, at samples; one row.
     real(wp), allocatable :: sample_touch(:, :)
     !> Of several bodies: coordinates and speeds at samples; number, coordinate, and speed before and after of the joint of an

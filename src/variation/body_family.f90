@@ -5,7 +5,7 @@
 module body_family
   use body_events, only: events_of_body
   use body_machine, only: body_machine_t
-  use build_motion, only: body_of, has_several
+  use build_motion, only: body_of, kind_bodies, kind_of
   use errors, only: error_t, fail
   use hybrid_machine, only: event_t
   use kinds, only: real64, wp
@@ -63,7 +63,7 @@ contains
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
-    if (has_several(laws)) then
+    if (kind_of(laws) == kind_bodies) then
       call fail(error, exit_bad_case, 'body.law: found several bodies, allowed one: their variations are those of a structure')
       return
     end if

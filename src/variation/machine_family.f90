@@ -4,12 +4,11 @@
 !> Machines over a parameter of their laws, whatever they are made of: one body, with a motor or without, or a structure.
 module machine_family
   use body_family, only: body_of_family, family_t
-  use build_motion, only: has_several
+  use build_motion, only: kind_bodies, kind_body, kind_motor, kind_of, kind_own
   use errors, only: error_t, fail
   use hybrid_machine, only: hybrid_t, neighbour_t, neighbourhood_t
   use kinds, only: wp
   use motor_body, only: motor_body_t
-  use motor_choices, only: has_motor
   use motor_family, only: motor_body_of_family
   use one_body, only: one_body_t
   use status, only: exit_bad_case
@@ -38,16 +37,20 @@ contains
     type(structure_t) :: structure
     type(motor_body_t) :: driven
     if (allocated(machine)) deallocate (machine)
-    if (has_motor(family%laws)) then
+    select case (kind_of(family%laws))
+    case (kind_motor)
       call motor_body_of_family(family, value, driven, error)
       if (.not. allocated(error)) allocate (machine, source=driven)
-    else if (has_several(family%laws)) then
+    case (kind_bodies)
       call structure_of_family(family, value, structure, error)
       if (.not. allocated(error)) allocate (machine, source=structure)
-    else
+    case (kind_body, kind_own)
+      ! The second is refused with the keys that it has.
       call body_of_family(family, value, body, error)
       if (.not. allocated(error)) allocate (machine, source=body)
-    end if
+    case default
+      call fail(error, exit_bad_case, 'the variations of this kind of machine are not known')
+    end select
   end subroutine machine_of_family
 
   !> The machine and its neighbours in the parameter.

@@ -4,7 +4,7 @@
 !> A multibody structure as a hybrid machine. Its state has the positions and the velocities on which anything depends (see
 !> `section_directions`), and the extensions of the springs of elastic friction, which are constant while those slide.
 module structure
-  use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, most_guards, slide_ends, turns_round
+  use guards, only: guards_of, joint_guard_t, meets_lower, meets_upper, room_for_guards, slide_ends, turns_round
   use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
   use machine_type, only: section_state_t
   use motion_state, only: tally_t
@@ -335,7 +335,7 @@ pure subroutine guard_in(self, flow, event, state, t, value, by_state, by_time)
   type(multibody_state_t), intent(in) :: state
   real(wp), intent(in) :: t
   real(wp), intent(out) :: value, by_state(:), by_time
-  type(joint_guard_t) :: list(most_guards)
+  type(joint_guard_t) :: list(room_for_guards(self%frame%moving%machine))
   complex(wp) :: turning(self%frame%moving%harmonics)
   real(wp) :: s, u, given
   integer :: g, count_guards, i

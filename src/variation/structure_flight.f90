@@ -10,7 +10,7 @@ module structure_flight
   use multibody_flows, only: multibody_motion_t, ready, with_matrix
   use multibody_state, only: free_force, is_held, is_marched, joint_force, joint_motion, multibody_state_t, key_of, &
     spring_force, strength_now, turning_at
-  use kinds, only: wp
+  use kinds, only: int64, wp
   use mode_flow, only: build_flow, mode_flow_t
   use motion_state, only: flight_adaptive
   implicit none
@@ -51,7 +51,7 @@ contains
     integer, intent(in) :: phase(:)
     integer, intent(out) :: at
     type(mode_flow_t), intent(out) :: spare
-    integer :: key
+    integer(int64) :: key
     key = key_of(moving%machine, phase)
     at = ready(moving, key)
     if (at == 0) call build_flow(moving%machine, key, with_matrix(moving), spare)

@@ -4,7 +4,7 @@
 !> A structure without a clock where nothing moves: the modes in which it may be, its rates there with their derivatives, and what
 !> keeps it in its mode.
 module structure_rest
-  use guards, only: guards_of, joint_guard_t, most_guards
+  use guards, only: guards_of, joint_guard_t, room_for_guards
   use hybrid_machine, only: event_t
   use multibody, only: is_stop, joint_elastic, joint_friction, most_joints
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
@@ -103,7 +103,7 @@ contains
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:)
     real(wp), allocatable :: margins(:)
-    type(joint_guard_t) :: list(most_guards)
+    type(joint_guard_t) :: list(room_for_guards(structure%frame%moving%machine))
     type(multibody_state_t) :: state
     type(mode_flow_t) :: spare
     type(event_t) :: event

@@ -170,7 +170,8 @@ def _parser() -> Parser:
         prog="separatrix-discover",
         description="Find where records and a case disagree, name the missing effect, add it, and prove it.",
         epilog="Exit codes: 0 done, 64 usage, 65 bad case or record, 66 no such file, 70 internal error, "
-        "71 not enough memory, 73 cannot write, 130 interrupted, 143 terminated.",
+        "71 not enough memory, 73 cannot write, 75 no verdict within the time limit, 130 interrupted, "
+        "143 terminated.",
     )
     parser.add_argument(
         "base", metavar="BASE.toml", type=Path, help="case of the machine as it is believed to be"

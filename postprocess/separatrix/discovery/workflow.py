@@ -13,14 +13,15 @@ from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.decision.verdict import Findings, verdict_of
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
-from separatrix.discovery.fitting.data import fit_stages
+from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.machine import on_other_records, with_values
 from separatrix.discovery.fitting.observations import Observation, observation_of
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.time_limit import OutOfTimeError, TimeLimit, kept
 from separatrix.discovery.measured.records import Record, read_record, unique_names
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import RECORDS
-from separatrix.errors import USAGE, SeparatrixError
+from separatrix.errors import STOPPED, USAGE, SeparatrixError
 from separatrix.library import Model
 
 
@@ -61,21 +62,37 @@ def investigate(
         )
     data = seen.gather(prepared[0], options)
     predicted = seen.gather(prepared[1], options) if held_out else None
-    options.progress("fitting the base machine", 0.05)
-    fitted = fit_base(data, seen.model, seen.mass)
-    if not fitted.fit.good.any():
-        raise SeparatrixError("the base machine cannot follow any segment of these records: another machine?")
-    data.base_starts = fitted.fit.starts
-    scales = seen.scales(data, fitted)
-    if predicted is not None:
-        _prepare_held_out(predicted, data, seen.model, fitted, scales.mass)
-    context = SearchContext(data, predicted, scales, options, deadline=began + (options.time_limit or np.inf))
-    found = search(SearchState(context, fitted))
+    limit = TimeLimit(began + (options.time_limit or np.inf))
+    with kept(limit):
+        fitted = _fitted_base(data, predicted, seen, options)
+        scales = seen.scales(data, fitted)
+        found = search(SearchState(SearchContext(data, predicted, scales, options, limit=limit), fitted))
     # the noise of the base may have been measured again
     findings = Findings(found.context, found.round.base, found.decision, chosen, found.steps, found.stopped)
     verdict = verdict_of(findings)
     verdict["runtime_s"] = round(time.monotonic() - began, 3)
     return verdict, findings
+
+
+def _fitted_base(data: Data, predicted: Data | None, seen: Observation, options: Options) -> Fitted:
+    """The machine of the case, fitted to the records; what is predicted is made ready by it."""
+    options.progress("fitting the base machine", 0.05)
+    try:
+        fitted = fit_base(data, seen.model, seen.mass)
+        if not fitted.fit.good.any():
+            raise SeparatrixError(
+                "the base machine cannot follow any segment of these records: another machine?"
+            )
+        data.base_starts = fitted.fit.starts
+        if predicted is not None:
+            _prepare_held_out(predicted, data, seen.model, fitted, seen.scales(data, fitted).mass)
+    except OutOfTimeError:
+        raise SeparatrixError(
+            f"the search ended at its time limit of {options.time_limit:g} s, while the machine of the case "
+            "was fitted: no verdict, as no effect was tried yet",
+            STOPPED,
+        ) from None
+    return fitted
 
 
 def _prepare_held_out(held_out, training, model, fitted: Fitted, mass: float) -> None:

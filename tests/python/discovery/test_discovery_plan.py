@@ -117,20 +117,25 @@ def test_the_pages_show_stages_gates_and_thresholds_as_they_are(
     assert discovery.with_gates(guide) == guide
 
 
-def limited(monkeypatch, *stages: Stage, deadline: float = 0.0) -> SearchState:
-    """The end of a walk whose time limit is over once something is known."""
+def limited(monkeypatch, *stages: Stage) -> SearchState:
+    """The end of a walk along some stages."""
     monkeypatch.setattr(plan, "PLAN", stages)
     monkeypatch.setattr(SearchState, "in_words", lambda _: "")
-    context = SearchContext(None, None, None, Options(time_limit=60.0), deadline=deadline)
+    context = SearchContext(None, None, None, Options(time_limit=60.0))
     return search(SearchState(context, None))
 
 
-def knows(outcome: str):
-    """A stage that knows a best effect and decides."""
+def knows(outcome: str, end: float = 0.0):
+    """A stage that knows a best effect and decides, while the time limit passes."""
     gates = dict.fromkeys(("detect", "stable", "admissible", "converged", "adequate"), True)
     best = SimpleNamespace(gates=gates, evidence=100.0)
     decision = replace(NONE, outcome=outcome) if outcome else None
-    return lambda state: replace(state, one=Choice(best, []), decision=decision)
+
+    def stage(state: SearchState) -> SearchState:
+        state.context.limit.end = end
+        return replace(state, one=Choice(best, []), decision=decision)
+
+    return stage
 
 
 def test_a_name_that_the_time_limit_keeps_from_its_tests_is_in_doubt(monkeypatch) -> None:
@@ -147,15 +152,15 @@ def test_a_name_that_the_time_limit_keeps_from_its_tests_is_in_doubt(monkeypatch
 
 def test_a_stage_is_ended_in_its_middle(monkeypatch) -> None:
     def slow(state: SearchState) -> SearchState:
-        state.context.deadline = 0.0
+        state.context.limit.end = 0.0
         state.context.report("fitting the next one")
         pytest.fail("went on after the time limit")
 
     stages = (
-        Stage("one effect", lambda state: state.open, knows("not-in-catalogue"), "always"),
+        Stage("one effect", lambda state: state.open, knows("not-in-catalogue", np.inf), "always"),
         Stage("tests", lambda state: True, slow, "always"),
     )
-    found = limited(monkeypatch, *stages, deadline=np.inf)
+    found = limited(monkeypatch, *stages)
     assert (found.decision.outcome, found.stopped) == ("not-in-catalogue", "tests")
 
 

@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from separatrix.discovery import Options, discover
+from separatrix.discovery import discover
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
@@ -74,12 +74,3 @@ def test_laws_of_friction_are_distinguished_in_slow_stick_slip(slow_case, hidden
     paths = [folder / one for one in FILES]
     verdict = discover(folder / "base.toml", paths[:2], paths[2:], rest=folder / "rest.csv")
     assert (verdict["outcome"], verdict["effects"]) == ("named", [name])
-
-
-@pytest.mark.long
-def test_a_time_limit_ends_with_the_best_verdict_so_far(slow_case):
-    folder = slow_case("stribeck", 23)
-    paths = [folder / one for one in FILES]
-    verdict = discover(folder / "base.toml", paths[:2], paths[2:], Options(time_limit=1.0))
-    assert (verdict["outcome"], verdict["stopped_before"]) != ("named", "")
-    assert any("time limit" in one for one in verdict["reasons"])

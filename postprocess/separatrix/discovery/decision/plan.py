@@ -5,7 +5,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from separatrix.discovery.decision.rounds import OutOfTimeError
 from separatrix.discovery.decision.scoring import NOISE
 from separatrix.discovery.decision.stages.character import character, has_gap
 from separatrix.discovery.decision.stages.conclusions import few_segments, named, no_effect, not_all
@@ -30,6 +29,7 @@ from separatrix.discovery.decision.stages.rig_imperfections import (
 from separatrix.discovery.decision.stages.several_effects import another_effect, noise_again, several_effects
 from separatrix.discovery.decision.stages.table import table
 from separatrix.discovery.decision.state import SearchState, Step
+from separatrix.discovery.fitting.time_limit import OutOfTimeError
 
 # the part of a run that the search is: records and base machine come before, figures after
 _FIRST, _LAST = 0.1, 0.9
@@ -58,6 +58,7 @@ def search(state: SearchState) -> SearchState:
         span = done, done + (_LAST - done) * stage.work / (stage.work + left)
         known = state.one is not None
         state = replace(state, context=replace(state.context, span=span, has_result=known))
+        state.context.limit.work_counts = False
         try:
             state.context.report(f"{stage.name}: {stage.reason}")
             state = stage.run(state)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One round of the search: every candidate screened, refitted, and predicting the held-out records."""
 
-import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,12 +26,9 @@ from separatrix.discovery.fitting.refit import (
 )
 from separatrix.discovery.fitting.rig import cleaned, with_imperfections
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
+from separatrix.discovery.fitting.time_limit import TimeLimit
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH
-
-
-class OutOfTimeError(Exception):
-    """The time limit is over in the middle of a stage, whose work is lost."""
 
 
 @dataclass
@@ -45,19 +41,18 @@ class SearchContext:
     options: Options
     # the part of all work that the present stage is
     span: tuple[float, float] = (0.0, 1.0)
-    # clock time at which the search ends; whether something is known by then that may be reported
-    deadline: float = np.inf
+    limit: TimeLimit = field(default_factory=TimeLimit)
+    # whether something is known that may be reported at the time limit
     has_result: bool = False
 
     @property
     def late(self) -> bool:
         """Whether the time limit is over."""
-        return time.monotonic() > self.deadline
+        return self.limit.over
 
     def report(self, text: str, part: float = 0.0) -> None:
-        """Report what begins, a part of the present stage being over; out of time, the stage ends here."""
-        if self.has_result and self.late:
-            raise OutOfTimeError
+        """Report what begins, a part of the present stage being over; out of time, the stage may end here."""
+        self.limit.ends_fits()
         first, last = self.span
         self.options.progress(text, first + (last - first) * part)
 
@@ -141,6 +136,8 @@ def run_round(
     ranked = list(known)
     chosen.sort(key=lambda name: ranked.index(name) if name in ranked else len(ranked))
     for number, name in enumerate(chosen):
+        if found.scored and not context.has_result:
+            context.limit.work_counts = True
         if context.late and found.scored:
             break
         context.report(f"fitting {name}", number / len(chosen))
@@ -160,6 +157,8 @@ def run_round(
         if fitted.fit.converged and (rival is None or gain_over(fitted, rival)[0] > 0):
             rival = fitted
     found.rank()
+    if context.late:
+        return found
     _carry_on(context, found)
     _cross(context, found)
     _same_motion(context, found)
@@ -192,7 +191,10 @@ def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None
         else:
             candidates[name] = made
     context.report(f"screening {len(candidates)} effects")
-    shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
+    shown = {}
+    for name, one in candidates.items():
+        context.limit.ends_fits()
+        shown[name] = signature(base.problem, base.fit, one)
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
     absent = {name: absent[name] for name in every if name in absent}

@@ -15,6 +15,7 @@ from separatrix.discovery.fitting.normal_equations import (
     eliminate,
     gauss_newton_step,
 )
+from separatrix.discovery.fitting.time_limit import present_limit
 from separatrix.discovery.policy import FIT
 
 
@@ -146,7 +147,8 @@ def minimise(
     iterations = without_gain = 0
     begun_anew = exhausted = False
     most_without_gain = FIT.fit_patience if patient else FIT.fit_without_gain
-    while iterations < most:
+    limit = present_limit()
+    while iterations < most and not limit.ends_fits():
         iterations += 1
         if not descent.look(tolerance, rough):
             break

@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from separatrix.discovery.decision.state import Choice, Decision, SearchState
-from separatrix.errors import SeparatrixError
+from separatrix.errors import STOPPED, SeparatrixError
 
 
 def cut_short(state: SearchState, stage: str) -> SearchState:
@@ -22,7 +22,7 @@ def cut_short(state: SearchState, stage: str) -> SearchState:
     choices = [one for one in (state.several, state.after_several, state.function, state.one) if one]
     able = [one for one in choices if one.detected and _may_be_named(one)]
     if not able:
-        raise SeparatrixError(f"{reason}: no verdict, as no machine passes the gates yet")
+        raise SeparatrixError(f"{reason}: no verdict, as no machine passes the gates yet", STOPPED)
     best, rivals = max(able, key=lambda one: one.best.evidence)
     failed = [f"gate '{gate}' was not passed" for gate, passed in best.gates.items() if not passed]
     found = replace(
