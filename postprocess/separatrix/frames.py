@@ -3,8 +3,6 @@
 """Results as tables of rows, in memory and as CSV or Parquet files."""
 
 import importlib
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +10,7 @@ import xarray as xr
 
 from separatrix.errors import CANNOT_CREATE, NO_INPUT, USAGE, SeparatrixError
 from separatrix.open import TABLES, decode_flags, decode_words
+from separatrix.whole_files import written_whole
 
 if TYPE_CHECKING:
     import pandas
@@ -72,25 +71,11 @@ def write_frame(frame: "pandas.DataFrame", path: str | Path, overwrite: bool = F
         raise SeparatrixError(f"{path}: exists; overwrite=True replaces it", CANNOT_CREATE)
     # an index of plain row numbers has no meaning
     named = any(name is not None for name in frame.index.names)
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        os.close(handle)
-    except OSError as error:
-        raise SeparatrixError(f"{path}: cannot be written ({error.strerror})", CANNOT_CREATE) from error
-    temporary = Path(name)
-    try:
+    with written_whole(path) as temporary:
         if path.suffix == ".csv":
             frame.to_csv(temporary, index=named, lineterminator="\n")
         else:
             frame.to_parquet(temporary, engine="pyarrow", index=named)
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
-    except OSError as error:
-        raise SeparatrixError(f"{path}: cannot be written ({error.strerror})", CANNOT_CREATE) from error
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write a figure whole or not at all."""
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +9,7 @@ from matplotlib.figure import Figure
 
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 from separatrix.version import __version__
+from separatrix.whole_files import written_whole
 
 FORMATS = ("png", "pdf", "svg")
 
@@ -23,19 +22,10 @@ def save(figure: Figure, stem: Path, formats: Sequence[str], dpi: int) -> list[P
 def _save_one(figure: Figure, path: Path, suffix: str, dpi: int) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        os.close(handle)
     except OSError as error:
         raise SeparatrixError(f"{path}: cannot be written ({error.strerror})", CANNOT_CREATE) from error
-    temporary = Path(name)
-    try:
+    with written_whole(path) as temporary:
         figure.savefig(temporary, format=suffix, dpi=dpi, metadata=_metadata(suffix))
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
-    except OSError as error:
-        raise SeparatrixError(f"{path}: cannot be written ({error.strerror})", CANNOT_CREATE) from error
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 
@@ -45,9 +35,3 @@ def _metadata(suffix: str) -> dict:
     return {"png": {"Software": program}, "pdf": {"Creator": program, "CreationDate": None}}.get(
         suffix, {"Creator": program, "Date": None}
     )
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

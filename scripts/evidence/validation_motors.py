@@ -20,10 +20,11 @@ from scipy.optimize import brentq, minimize_scalar
 from separatrix import open_result
 from separatrix.open import flag_names
 from validation_motors_cycles import Cycle, closed, doubling, on_section
+from validation_sections import write_section
 
 EXAMPLES = SOURCE / "examples"
-#: The heading of the section in the page and the one after it.
-HEADING, NEXT = "## Machines with a motor\n", "## Measures of basins\n"
+#: The heading of the section in the page.
+HEADING = "Machines with a motor"
 FILES = {"I": "motor_impact", "P": "motor_lever", "RI": "motor_unbalance"}
 DRIVES = {"Y": 'law = "harmonic", amplitude = 0.02', "R": 'law = "unbalance", moment = 0.02'}
 BODY = """\
@@ -387,24 +388,10 @@ def numbers(program: Program) -> list[Row]:
     return found
 
 
-def between(page: str) -> str:
-    """The part of a page from the heading of the section to the next."""
-    return HEADING + page.split(HEADING)[1].split(NEXT)[0]
-
-
 def fields(found: list[Row]) -> dict[str, object]:
     """What the template names."""
     heads = ("machine", *COLUMNS)
     return {"motors": table_of(found, ("source", *COLUMNS), heads), "motor_count": len(found)}
-
-
-def write(found: list[Row], commit: str) -> None:
-    """The section of docs/validation.md anew, by its part of the template."""
-    path = SOURCE / "docs" / "validation.md"
-    page = path.read_text()
-    template = (SOURCE / "scripts/evidence/validation.md.in").read_text()
-    new = between(template).format(**fields(found), commit=commit)
-    path.write_text(page.replace(between(page), new))
 
 
 def main() -> int:
@@ -418,7 +405,8 @@ def main() -> int:
     os.environ["SEPARATRIX_LIBRARY"] = str(options.build.resolve() / "lib" / "libseparatrix.so")
     found = numbers(program)
     if options.write:
-        write(found, version_of(program.path)["commit"])
+        commit = version_of(program.path)["commit"]
+        write_section(HEADING, **fields(found), commit=commit)
     return show(found, options.json)
 
 

@@ -10,36 +10,21 @@ docs/validation.md in place of the one there; the exit code is 1 where a number 
 import os
 import sys
 
-from evidence_rows import COLUMNS, SOURCE, Row, arguments, show, table_of, version_of
+from evidence_rows import COLUMNS, Row, arguments, show, table_of, version_of
 from validation_public_closed import COMPUTED as IN_CLOSED_FORM
 from validation_public_printed import COMPUTED as PRINTED
 from validation_public_program import Program
 from validation_public_steps import COMPUTED as BY_STEPS
+from validation_sections import write_section
 
 COMPUTED = (*PRINTED, *IN_CLOSED_FORM, *BY_STEPS)
-#: The heading of the section in the page and the one after it.
-HEADING, NEXT = "## Public problems\n", "## Machines with a motor\n"
+#: The heading of the section in the page.
+HEADING = "Public problems"
 
 
 def numbers(program: Program) -> list[Row]:
     """All of them."""
     return [number for compute in COMPUTED for number in compute(program)]
-
-
-def between(page: str) -> str:
-    """The part of a page from the heading of the section to the next."""
-    return HEADING + page.split(HEADING)[1].split(NEXT)[0]
-
-
-def write(found: list[Row], commit: str) -> None:
-    """The section of docs/validation.md anew, by its part of the template."""
-    path = SOURCE / "docs" / "validation.md"
-    page = path.read_text()
-    template = (SOURCE / "scripts/evidence/validation.md.in").read_text()
-    new = between(template).format(
-        public=table_of(found, ("source", *COLUMNS)), public_count=len(found), commit=commit
-    )
-    path.write_text(page.replace(between(page), new))
 
 
 def main() -> int:
@@ -52,7 +37,10 @@ def main() -> int:
     os.environ["SEPARATRIX_PROGRAM"] = str(program.path)
     found = numbers(program)
     if options.write:
-        write(found, version_of(program.path)["commit"])
+        commit = version_of(program.path)["commit"]
+        write_section(
+            HEADING, public=table_of(found, ("source", *COLUMNS)), public_count=len(found), commit=commit
+        )
     return show(found, options.json)
 
 

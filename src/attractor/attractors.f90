@@ -11,7 +11,7 @@ module attractors
   private
 
   public :: most_coordinates, regime_of, wrap_range, make_points, find_capture, find_box, squared_distance, pack_attractor, &
-    packed_length, unpack_attractor, metric_numbers, is_packed
+    packed_length, packed_layout, unpack_attractor, metric_numbers, is_packed
 
   !> Regimes of a motion; stuck are two bodies that move as one.
   integer, parameter, public :: regime_unresolved = 0, regime_non_impact = 1, regime_impact = 2, &
@@ -295,6 +295,25 @@ contains
         [reshape(points, [size(points)]), reshape(metric, [size(metric)])]
     end associate
   end function pack_attractor
+
+  !> A number that two builds share if they pack attractors alike: made of where the values of one attractor are.
+  pure integer(int64) function packed_layout() result(layout)
+    type(attractor_t) :: marked
+    real(wp), allocatable :: packed(:)
+    integer :: i
+    marked%coordinates = 2
+    marked%id = 3
+    marked%period = 5
+    marked%scale(:2) = [7.0_wp, 11.0_wp]
+    call make_points(marked, 1)
+    marked%points(:2, 1) = [13.0_wp, 17.0_wp]
+    marked%metric(:, 1) = [19.0_wp, 23.0_wp, 29.0_wp]
+    packed = pack_attractor(marked)
+    layout = size(packed)
+    do i = 1, size(packed)
+      if (abs(packed(i)) < 100) layout = mod(131*layout + abs(nint(packed(i))), 2_int64**31 - 1)
+    end do
+  end function packed_layout
 
   !> The inverse of `pack_attractor`.
   pure function unpack_attractor(packed) result(attractor)

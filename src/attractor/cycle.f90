@@ -18,7 +18,7 @@ module cycle
   private
 
   public :: map_point, refine_cycle, scale_of, derivative, direction, back_substituted, matrix_of, rests_at, &
-    same_events, contracting_metric, eigenvalue_bounds
+    same_events, contracting_metric, eigenvalue_bounds, least_eigenvalue
 
   integer, parameter :: most_newton = 20, most_halvings = 30
   !> A cycle attracts if its largest multiplier is below this: nearer to 1 rounding of the derivatives decides.
@@ -300,14 +300,8 @@ contains
     type(attractor_t), intent(inout) :: attractor
     type(tally_t), intent(in) :: reference(:)
     logical, intent(out) :: found
-    real(wp) :: smallest, bounds(2)
     integer :: i
-    smallest = huge(smallest)
-    do i = 1, attractor%period
-      bounds = eigenvalue_bounds(attractor, i)
-      smallest = min(smallest, bounds(1))
-    end do
-    attractor%capture_radius = 0.5_wp*sqrt(smallest)
+    attractor%capture_radius = 0.5_wp*sqrt(least_eigenvalue(attractor))
     do i = 1, most_halvings
       found = contracts(moving, attractor, reference)
       if (found) return
@@ -323,6 +317,18 @@ contains
     section = moving%state_at(point)
     rests_at = section%state%mode /= mode_slip_plus .and. section%state%mode /= mode_slip_minus
   end function rests_at
+
+  !> The least eigenvalue of the metrics of a cycle.
+  pure real(wp) function least_eigenvalue(attractor) result(least)
+    type(attractor_t), intent(in) :: attractor
+    real(wp) :: bounds(2)
+    integer :: i
+    least = huge(least)
+    do i = 1, attractor%period
+      bounds = eigenvalue_bounds(attractor, i)
+      least = min(least, bounds(1))
+    end do
+  end function least_eigenvalue
 
   !> Bounds of the eigenvalues of the metric at the `i`-th point: exact up to two coordinates, else 1, which none is below,
   !> and their sum.

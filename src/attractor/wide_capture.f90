@@ -6,8 +6,8 @@
 !> Here the metric is one in which the linear part shortens all directions alike.
 module wide_capture
   use attractors, only: attractor_t, kind_rest, squared_distance
-  use cycle, only: back_substituted, contracting_metric, derivative, direction, directions, eigenvalue_bounds, map_point, &
-    matrix_of, rests_at, rings, same_events
+  use cycle, only: back_substituted, contracting_metric, derivative, direction, directions, eigenvalue_bounds, &
+    least_eigenvalue, map_point, matrix_of, rests_at, rings, same_events
   use kinds, only: wp
   use machine_type, only: machine_t
   use matrices, only: cholesky
@@ -77,18 +77,6 @@ contains
     end do
     if (reach_of(wider) > reach_of(attractor)) attractor = wider
   end subroutine grow
-
-  !> The least eigenvalue of the metrics of a cycle.
-  pure real(wp) function least_eigenvalue(attractor) result(least)
-    type(attractor_t), intent(in) :: attractor
-    real(wp) :: bounds(2)
-    integer :: i
-    least = huge(least)
-    do i = 1, attractor%period
-      bounds = eigenvalue_bounds(attractor, i)
-      least = min(least, bounds(1))
-    end do
-  end function least_eigenvalue
 
   !> Smallest semi-axis of the neighbourhoods of a cycle, in the scales of its coordinates.
   pure real(wp) function reach_of(attractor) result(reach)

@@ -5,7 +5,7 @@
 !> as the maps but in quadruple precision. Doubles go in and out; nothing else is visible outside.
 module reference_library
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_null_char
-  use attractors, only: attractor_t, unpack_attractor
+  use attractors, only: attractor_t, packed_layout, unpack_attractor
   use build_motion, only: machine_of
   use errors, only: error_t
   use kinds, only: wp
@@ -22,9 +22,9 @@ module reference_library
 
 contains
 
-  !> The fingerprint of the laws, whose rows are what the program passes.
+  !> The fingerprint of what the program passes: rows of the laws and packed attractors.
   integer(c_int64_t) function separatrix_reference_laws() bind(c)
-    separatrix_reference_laws = fingerprint()
+    separatrix_reference_laws = fingerprint() + packed_layout()
   end function separatrix_reference_laws
 
   !> Runs `points` trajectories. Laws and effects: row in the law table of each, their texts (`pack_texts`), lengths and values

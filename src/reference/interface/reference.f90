@@ -6,7 +6,7 @@
 module reference
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_procpointer, c_funptr, c_int, c_int64_t, &
     c_null_char, c_ptr
-  use attractors, only: attractor_t, pack_attractor
+  use attractors, only: attractor_t, pack_attractor, packed_layout
   use errors, only: error_t, fail
   use kinds, only: int64, wp
   use law_fingerprint, only: fingerprint
@@ -126,11 +126,11 @@ contains
       ' is not in lib/ beside the folder of the program; cmake --build BUILD --target separatrix_reference builds it')
   end subroutine load
 
-  !> Whether a library has the laws of this program, row by row.
+  !> Whether a library has the laws of this program, row by row, and reads attractors as it packs them.
   logical function has_these_laws(laws_of_library)
     procedure(reference_laws), pointer, intent(in) :: laws_of_library
     has_these_laws = .false.
-    if (associated(laws_of_library)) has_these_laws = laws_of_library() == fingerprint()
+    if (associated(laws_of_library)) has_these_laws = laws_of_library() == fingerprint() + packed_layout()
   end function has_these_laws
 
 end module reference

@@ -58,7 +58,8 @@ def test_every_row_and_every_case_is_in_the_page(numbers, source_dir):
 def test_machines_with_a_motor_stand_in_the_page(rows, program, source_dir):
     """Events, the cycle with rests and the run-up computed again; the page has every machine."""
     motors = importlib.import_module("validation_motors")
-    page = motors.between((source_dir / "docs" / "validation.md").read_text())
+    sections = importlib.import_module("validation_sections")
+    page = sections.section_of((source_dir / "docs" / "validation.md").read_text(), motors.HEADING)
     found = [row for compute in (motors.events, motors.stick, motors.run_up) for row in compute(program)]
     assert len(found) == 11
     assert [row for row in found if row.verdict != "agrees"] == []

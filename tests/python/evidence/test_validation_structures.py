@@ -64,7 +64,8 @@ def public(rows):
 def test_public_problems_agree_and_stand_in_the_page(
     public, separatrix, build_dir, tmp_path, source_dir, name, count
 ):
-    page = public.between((source_dir / "docs" / "validation.md").read_text())
+    sections = importlib.import_module("validation_sections")
+    page = sections.section_of((source_dir / "docs" / "validation.md").read_text(), public.HEADING)
     problems = {compute.__name__: compute for compute in public.COMPUTED}
     found = problems[name](public.Program(build_dir, tmp_path))
     assert len(found) == count

@@ -191,10 +191,7 @@ def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None
         else:
             candidates[name] = made
     context.report(f"screening {len(candidates)} effects")
-    shown = {}
-    for name, one in candidates.items():
-        context.limit.ends_fits()
-        shown[name] = signature(base.problem, base.fit, one)
+    shown = {name: signature(base.problem, base.fit, one) for name, one in candidates.items()}
     signatures = [one for one in shown.values() if one is not None]
     absent |= {name: "it changes nothing in these records" for name, one in shown.items() if one is None}
     absent = {name: absent[name] for name in every if name in absent}

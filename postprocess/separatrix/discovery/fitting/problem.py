@@ -8,6 +8,7 @@ import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.machine import SENSOR_BIAS, SENSOR_ZERO, Free, drive_amplitudes
+from separatrix.discovery.fitting.time_limit import present_limit
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, padded, seeing
 from separatrix.errors import SeparatrixError
@@ -138,6 +139,7 @@ class Problem:
 
         With `by_start_alone` derivatives by the parameters of the machine are 0, which is much quicker.
         """
+        present_limit().ends_fits()
         shape = self.segments.inside.shape
         count, length = shape
         measured = self._known_nuisances()
