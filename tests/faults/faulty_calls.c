@@ -7,8 +7,8 @@
    MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. `slow`: each
    such call takes $FAULT_AT milliseconds. `unlockable`: no such file can be locked, as on file systems
    without locks. `arrive`: the first barrier of MPI without
-   waiting takes $FAULT_AT seconds, once there is such a file. Without $FAULT_AT the number of calls is added
-   as a line to the file $FAULT_COUNT when the process ends. */
+   waiting takes $FAULT_AT seconds, once there is such a file. The number of calls is added as a line to the
+   file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
