@@ -111,7 +111,7 @@ SWEPT = (0.7, 1.8)
 SAME_MACHINE = {
     *("basin_coulomb", "basin_coulomb_refined", "basin_ratio_stack", "basin_stribeck", "basin_viscous"),
     *("trajectory_coulomb_crank_lever_rod", "pair_backlash", "basin_pair_regimes"),
-    # machines with a motor: docs/motor_checks.md
+    # machines with a motor: docs/validation.md
     *("motor_impact", "motor_lever", "motor_unbalance"),
     *(
         f"trajectory_{friction}_{ratio}"

@@ -13,6 +13,7 @@ import textwrap
 
 import validation_curves
 import validation_measures
+import validation_motors
 import validation_public
 import validation_rows as rows
 import validation_structures
@@ -37,9 +38,7 @@ def with_methods(found: list[Row]) -> str:
     return f"{table([*COLUMNS, 'method'], lines)}\n\nMethods:\n\n{methods}"
 
 
-def text_of(
-    found: list[Row], structures: list, public: list, measures: list, report: dict, version: dict[str, str]
-) -> str:
+def text_of(found: list[Row], others: dict[str, list[Row]], report: dict, version: dict[str, str]) -> str:
     """The text of docs/validation.md."""
     order = [theirs[:2] for theirs in THEIRS.values()]
     found = sorted(found, key=lambda row: order.index((row.source, row.what)))
@@ -51,10 +50,11 @@ def text_of(
         differs=table_of(missed, every) if missed else "None.",
         count=len(found),
         tables=sections(found, with_methods),
-        structures=table_of(structures, every),
-        public=table_of(public, every),
-        public_count=len(public),
-        measures=sections(measures),
+        structures=table_of(others["structures"], every),
+        public=table_of(others["public"], every),
+        public_count=len(others["public"]),
+        **validation_motors.fields(others["motors"]),
+        measures=sections(others["measures"]),
         not_yet=table(["source", "quantity", "reason"], [list(item) for item in NOT_YET]),
         referee=compare.summary_table(report),
         disagreements=compare.disagreements(report),
@@ -73,18 +73,21 @@ def main() -> int:
         print(f"validation: {compute.__name__}", flush=True)
         found += compute(program)
     print("validation: structures", flush=True)
-    structures = validation_structures.numbers(validation_structures.Program(build, folder / "structures"))
+    others = {}
+    others["structures"] = validation_structures.numbers(
+        validation_structures.Program(build, folder / "structures")
+    )
     os.environ["SEPARATRIX_PROGRAM"] = str(build / "bin" / "separatrix")
     print("validation: public problems", flush=True)
-    public = validation_public.numbers(validation_public.Program(build, folder / "public"))
+    others["public"] = validation_public.numbers(validation_public.Program(build, folder / "public"))
+    print("validation: machines with a motor", flush=True)
+    others["motors"] = validation_motors.numbers(validation_motors.Program(build, folder / "motors"))
     print("validation: measures", flush=True)
-    measures = validation_measures.rows()
+    others["measures"] = validation_measures.rows()
     report = compare.kept_report(build, folder / "referee")
-    (SOURCE / "docs" / "validation.md").write_text(
-        text_of(found, structures, public, measures, report, version)
-    )
+    (SOURCE / "docs" / "validation.md").write_text(text_of(found, others, report, version))
     print("validation: wrote docs/validation.md", flush=True)
-    bad = any(row.differs for row in [*found, *structures, *public, *measures])
+    bad = any(row.differs for rows_of in (found, *others.values()) for row in rows_of)
     return 1 if bad or compare.wrong_in(report) else 0
 
 

@@ -18,7 +18,7 @@ from validation_public_steps import COMPUTED as BY_STEPS
 
 COMPUTED = (*PRINTED, *IN_CLOSED_FORM, *BY_STEPS)
 #: The heading of the section in the page and the one after it.
-HEADING, NEXT = "## Public problems\n", "## Measures of basins\n"
+HEADING, NEXT = "## Public problems\n", "## Machines with a motor\n"
 
 
 def numbers(program: Program) -> list[Row]:

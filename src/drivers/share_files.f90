@@ -8,7 +8,7 @@ module share_files
   use kinds, only: int64, wp
   use map_file, only: create_working, map_file_t, open_working
   use map_reader, only: open_final, reader_t
-  use map_schema, only: schema_t
+  use map_schema, only: format_version, schema_t
   use point_work, only: point_work_t
   use resumption, only: builder_of, read_builder
   use session, only: session_t
@@ -79,7 +79,7 @@ contains
     type(reader_t) :: reader
     real(wp), allocatable :: catalogue(:)
     character(len=:), allocatable :: kind, made_by
-    real(wp) :: values(2)
+    real(wp) :: values(2), format
     number = 0
     count = 0
     call open_final(path, reader, error)
@@ -94,6 +94,7 @@ contains
     end if
     if (.not. allocated(error)) call reader%text_attribute('/', 'kind', kind, error)
     if (.not. allocated(error)) call reader%text_attribute('/provenance', 'version', made_by, error)
+    if (.not. allocated(error)) call reader%number_attribute('/', 'format_version', format, error)
     allocate (catalogue(0))
     if (.not. allocated(error)) then
       if (kind == 'basin') call reader%read_values(catalogue_dataset, catalogue, error)
@@ -114,6 +115,9 @@ contains
     count = nint(values(2))
     if (made_by /= version) then
       call fail(error, exit_other_case, "'"//path//"' was made by version "//made_by//', this is '//version)
+    else if (nint(format) /= format_version) then
+      call fail(error, exit_other_case, "'"//path//"' was begun in format version "//to_text(nint(format))// &
+                ', this program writes '//to_text(format_version)//': the program that began it finishes it')
     else if (kind /= shares%kind) then
       call fail(error, exit_other_case, "'"//path//"' belongs to another case: it was made by "//kind//', the first share by '// &
                 shares%kind)

@@ -404,13 +404,13 @@ def test_more_slices_than_fit_are_refused(separatrix, tmp_path):
     """The numbers of all attractors are exchanged in one piece, which counts to 2**31 - 1."""
     write_case(tmp_path)
     axes = (
-        "axis=[{name='x0', from=0, to=1, count=2}, {name='drive.ratio', from=0.8, to=1.4, count=8000},"
-        " {name='friction.kinetic_coefficient', from=0.1, to=0.3, count=8000}]"
+        "axis=[{name='x0', from=0, to=1, count=2}, {name='drive.ratio', from=0.8, to=1.4, count=9000},"
+        " {name='friction.kinetic_coefficient', from=0.1, to=0.3, count=9000}]"
     )
     ended = run(separatrix, "basin", "case.toml", "--validate", "--set", axes, folder=tmp_path)
     assert ended.code == 65
-    assert "'axis.count': found 64000000" in ended.err
-    assert "allowed at most 27889398" in ended.err
+    assert "'axis.count': found 81000000" in ended.err
+    assert "allowed at most 74051160" in ended.err
 
 
 def boundary(separatrix, folder):

@@ -84,8 +84,8 @@ def test_a_restitution_at_a_flexible_point_is_warned_of(separatrix, source_dir, 
     assert "warning: contact.stop: the upper half of the modes makes 50 %" in output
 
 
-def test_too_many_bodies_for_a_search_are_warned_of(separatrix, tmp_path):
-    """Nine bodies have 18 coordinates on the section."""
+def test_the_attractor_of_nine_bodies_is_found(separatrix, tmp_path):
+    """They have 18 coordinates on the section."""
     bodies = "".join(
         f'[body.b{i}]\nmass = 1\n[spring.s{i}]\nbetween = ["b{i}"]\nstiffness = {i}\ndamping = 0.1\n'
         for i in range(1, 10)
@@ -94,7 +94,8 @@ def test_too_many_bodies_for_a_search_are_warned_of(separatrix, tmp_path):
     drive = '[drive.force]\nlaw = "force"\nbody = "b1"\namplitude = 1\nfrequency = 1\n'
     (tmp_path / "case.toml").write_text(bodies + drive + "[run]\nduration = 20\nwindow = 7\n" + axes)
     output = succeed(separatrix, "basin", "case.toml", folder=tmp_path).out
-    assert "warning: no attractors are looked for: the section has 18 coordinates, more than 16" in output
+    assert "1 attractor in 1 slice discovered" in output
+    assert "no attractors are looked for" not in output
 
 
 RING = """

@@ -5,6 +5,7 @@
 import importlib
 import sys
 
+import numpy as np
 import pytest
 
 
@@ -52,3 +53,26 @@ def test_every_row_and_every_case_is_in_the_page(numbers, source_dir):
         assert f"| {what} | {theirs:.12g} |" in page
     for path in (source_dir / "examples" / "validation").glob("*.toml"):
         assert f"examples/validation/{path.name}" in page
+
+
+def test_machines_with_a_motor_stand_in_the_page(rows, program, source_dir):
+    """Events, the cycle with rests and the run-up computed again; the page has every machine."""
+    motors = importlib.import_module("validation_motors")
+    page = motors.between((source_dir / "docs" / "validation.md").read_text())
+    found = [row for compute in (motors.events, motors.stick, motors.run_up) for row in compute(program)]
+    assert len(found) == 11
+    assert [row for row in found if row.verdict != "agrees"] == []
+    for row in found:
+        assert f"| {row.source} | {row.what} | " in page
+    assert {line.split(" | ")[0] for line in page.splitlines() if "agrees" in line} == {
+        f"| {name}" for name in ("Y", "I", "R", "RI", "P")
+    }
+    assert "DIFFERS" not in page
+
+
+def test_a_cycle_of_a_motor_is_not_one_at_another_voltage(rows, library):
+    """The rows of the cycles can differ: half a volt more moves them by far more than the tolerance."""
+    motors = importlib.import_module("validation_motors")
+    machine, value, _, _, speed, point, *_ = motors.theirs.CYCLES[0]
+    found = motors.closed(motors.case_of(machine, value + 0.5).model, np.array(point), 2 * np.pi / speed)
+    assert abs(found.speed - speed) > 1e-3
