@@ -66,7 +66,7 @@ def test_nor_do_threads(separatrix, tmp_path, results, on_host, monkeypatch, thr
 
 def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_host):
     output = tmp_path / "gpu.h5"
-    command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    command = [*KINDS["map"], *ON_GPU, "--set", "grid.tile=[4, 5]", "-o", output]
     ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
     assert "computed by rank 0: GPU 0, 1: GPU 1, 2: GPU 0" in ended.out
     assert differences(results["map"], output) == []
@@ -75,7 +75,7 @@ def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_ho
 def test_ranks_with_one_device_are_named_together(mpi_separatrix, tmp_path, results, on_host, monkeypatch):
     monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "1")
     output = tmp_path / "gpu.h5"
-    command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    command = [*KINDS["map"], *ON_GPU, "--set", "grid.tile=[4, 5]", "-o", output]
     ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
     assert "computed by rank 0-2: GPU 0" in ended.out
     assert differences(results["map"], output) == []
@@ -84,8 +84,8 @@ def test_ranks_with_one_device_are_named_together(mpi_separatrix, tmp_path, resu
 def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, results):
     output = tmp_path / "mixed.h5"
     program = [mpi_separatrix, *KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    gpu = ["-x", "SEPARATRIX_GPU_ON_HOST=1", "-x", "SEPARATRIX_GPU_STARTS=1"]
-    mixed = ["-n", "1", *gpu, *program, ":", "-n", "1", *program]
+    gpu = ["-x", "SEPARATRIX_GPU_ON_HOST=1"]
+    mixed = ["-n", "1", *gpu, *program, *ON_GPU, ":", "-n", "1", *program, "--device", "cpu"]
     ended = subprocess.run(
         ["mpirun", *mixed], cwd=results["map"].parent, capture_output=True, text=True, check=True, timeout=60
     )
