@@ -135,7 +135,7 @@ module command_table
     option_row_t('--ranks-per-node', '', .true., 'basin sweep points', &
       '  --ranks-per-node N splits a host into nodes of N ranks (default: as the hosts are)'), &
     option_row_t('--device', '', .true., 'basin sweep points', &
-      '  --device NAME      auto (a GPU where there is one, else the processor), cpu or gpu; the results are the same bits'), &
+      '  --device NAME      auto (the faster of processor and GPU, measured), cpu or gpu; the results are the same bits'), &
     option_row_t('--tile-times', '', .true., 'basin sweep points', &
       '  --tile-times FILE  table of the tiles: rank, begin and end in seconds, questions to rank 0'), &
     option_row_t('--progress', '', .true., 'basin sweep branches boundary stability trajectory points', &

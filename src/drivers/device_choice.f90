@@ -6,9 +6,11 @@ module device_choice
   use case_setup, only: automatic_tile, grid_of, options_of, points_of_tile
   use case_type, only: case_t
   use command_line, only: command_t
+  use device_run, only: begin_trial, end_report, not_known, on_gpu, on_processor, trial
   use errors, only: error_t, fail
   use lane_slots, only: prepare_flow
   use grid, only: grid_t, slice_motion, two_axes
+  use journal, only: journal_t
   use kinds, only: int64, wp
   use lane_gpu, only: count_gpus, gpu_in_use, gpu_is_built, gpu_name, gpu_number, use_gpu
   use lane_types, only: lane_flow_t
@@ -23,12 +25,13 @@ module device_choice
   implicit none
   private
 
-  public :: choose_device, device_text
+  public :: choose_device, device_text, report_trial
 
   !> Starts that are to fly at once for `auto` to choose a GPU: it has room for a hundred times as many, and one thread of it is
   !> slow. The results are the same. For tests the environment may set another number.
   integer, parameter :: fewest_starts = 1024
-  character(len=*), parameter :: fewest_variable = 'SEPARATRIX_GPU_STARTS', threads_variable = 'SEPARATRIX_GPU_THREADS'
+  character(len=*), parameter :: fewest_variable = 'SEPARATRIX_GPU_STARTS', threads_variable = 'SEPARATRIX_GPU_THREADS', &
+    counted_variable = 'SEPARATRIX_GPU_COUNTED'
 
 contains
 
@@ -43,6 +46,7 @@ contains
     integer :: local_rank, neighbours, count
     integer(int64) :: starts
     call use_gpu(-1)
+    call begin_trial(.false.)
     asked = trim(command%device)
     ! Before any return, as ranks may be asked for different things.
     call find_local_rank(team, local_rank, neighbours)
@@ -68,7 +72,9 @@ contains
       call fail(error, exit_usage, '--device gpu: found a machine that only a processor flies (one by one, or of several '// &
                 'bodies); allowed are auto and cpu')
     end if
-    if (count > 0) call use_gpu(gpu_number(modulo(local_rank, count)), threads_of(neighbours))
+    if (count <= 0) return
+    call use_gpu(gpu_number(modulo(local_rank, count)), threads_of(neighbours))
+    if (asked == 'auto') call begin_trial(.true., asked_number(counted_variable, 0)/100.0_wp)
   end subroutine choose_device
 
   !> What `auto` asks for.
@@ -182,17 +188,71 @@ contains
     if (number >= 0) words = 'GPU '//to_text(number)
   end function device_of
 
+  !> What processors and GPUs were measured to do in the ranks, and how many took which; nothing where nothing new was. Collective.
+  subroutine report_trial(team, journal)
+    class(team_t), intent(in) :: team
+    type(journal_t), intent(inout) :: journal
+    real(wp), allocatable :: facts(:)
+    real(wp) :: rates(2)
+    integer :: takers(0:2), device
+    logical :: any_new
+    call team%allgather([merge(1.0_wp, 0.0_wp, trial%unreported), real(trial%taken, wp), trial%rate(on_processor), &
+                         trial%rate(on_gpu)], facts)
+    any_new = any(facts(1::4) > 0.5_wp)
+    call end_report()
+    if (.not. any_new) return
+    associate (measured => facts(3::4) > 0, taken => nint(facts(2::4)))
+      takers = [(count(measured .and. taken == device), device=not_known, on_gpu)]
+      do device = on_processor, on_gpu
+        rates(device) = mean_of(facts(2 + device::4))
+      end do
+      call journal%line('trial', trial_text(rates, takers, count(measured)), '"processor_starts_per_second": '// &
+                        to_text(rates(on_processor), 6)//', "gpu_starts_per_second": '//to_text(rates(on_gpu), 6)// &
+                        ', "processor_ranks": '//to_text(takers(on_processor))//', "gpu_ranks": '//to_text(takers(on_gpu)))
+    end associate
+  end subroutine report_trial
+
+  !> The mean of the values above 0, 0 where there is none.
+  pure real(wp) function mean_of(values)
+    real(wp), intent(in) :: values(:)
+    mean_of = sum(values, values > 0)/max(1, count(values > 0))
+  end function mean_of
+
+  !> `rates` [1/s] of the devices of a rank, and how many of `ranks` took which.
+  pure function trial_text(rates, takers, ranks) result(words)
+    real(wp), intent(in) :: rates(2)
+    integer, intent(in) :: takers(0:2), ranks
+    character(len=:), allocatable :: words
+    words = 'measured'
+    if (ranks > 1) words = words//' (means of '//to_text(ranks)//' ranks)'
+    words = words//': processor '//to_text(nint(rates(on_processor), int64))//' starts/s, '
+    if (rates(on_gpu) > 0) then
+      words = words//'GPU '//to_text(nint(rates(on_gpu), int64))//' starts/s; '
+    else
+      words = words//'GPU not tried; '
+    end if
+    if (ranks == 1) then
+      if (takers(not_known) == 1) words = words//'too few starts to choose'
+      if (takers(on_processor) == 1) words = words//'the processor was taken'
+      if (takers(on_gpu) == 1) words = words//'the GPU was taken'
+    else
+      words = words//'the GPU was taken by '//to_text(takers(on_gpu))//', the processor by '//to_text(takers(on_processor))
+      if (takers(not_known) > 0) words = words//', too few starts to choose in '//to_text(takers(not_known))
+    end if
+  end function trial_text
+
   !> What was chosen, in words, and by how many ranks a GPU; on rank 0 of all ranks. Collective.
   subroutine device_text(team, the_case, words, gpus)
     class(team_t), intent(in) :: team
     type(case_t), intent(in) :: the_case
     character(len=:), allocatable, intent(out) :: words
     integer, intent(out) :: gpus
-    real(wp), allocatable :: chosen(:)
+    real(wp), allocatable :: chosen(:), facts(:)
     character(len=40), allocatable :: of_ranks(:)
     type(options_t) :: options
     integer :: first, last, group
-    call team%allgather([real(gpu_in_use, wp)], chosen)
+    call team%allgather([real(gpu_in_use, wp), merge(1.0_wp, 0.0_wp, trial%taken == not_known)], facts)
+    chosen = facts(1::2)
     gpus = count(chosen > -0.5_wp)
     if (gpus == 0) then
       options = options_of(the_case)
@@ -218,6 +278,7 @@ contains
       end do
       words = 'rank '//join(of_ranks(:group), ', ')
     end if
+    if (any(facts(2::2) > 0.5_wp)) words = words//', or the processor where that is faster'
   end subroutine device_text
 
 end module device_choice

@@ -9,6 +9,7 @@ module list_work
   use case_type, only: case_t
   use checksum, only: crc32
   use endings, only: assess_reasons, report_reasons
+  use device_run, only: run_on_device
   use errors, only: error_t, fail
   use file_layout, only: add_reason, add_regime, axis_dimension
   use grid, only: grid_t, machine_with, make_grid, point_start, sample_axis, slice_motion
@@ -24,7 +25,7 @@ module list_work
   use text, only: to_text
   use text_table, only: table_t
   use tiled_run, only: finish_tiles, point_work_t
-  use trajectories, only: describe_regime, ensemble_t, run_on_device
+  use trajectories, only: describe_regime, ensemble_t
   use work_watch, only: watch_t
   implicit none
   private

@@ -5,6 +5,7 @@
 module tiled_run
   use balance, only: report_balance
   use command_line, only: command_t
+  use device_choice, only: report_trial
   use errors, only: error_t
   use files, only: file_exists
   use journal, only: duration_text, size_text
@@ -167,6 +168,7 @@ contains
     call write_tile_times(session, scheduler, unfinished)
     call report_balance(session%team, session%journal, busy, seconds_waited() - waited, monotonic_seconds() - begun, &
                         session%gpus)
+    call report_trial(session%team, session%journal)
     call session%team%sum(computed)
     complete = computed(1) == size(unfinished)
   end subroutine run_tiles

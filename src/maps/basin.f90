@@ -5,6 +5,7 @@
 module basin
   use attractors, only: attractor_t
   use discover, only: discover_attractors
+  use device_run, only: run_on_device
   use errors, only: error_t, fail
   use lane_slots, only: prepare_flow
   use grid, only: grid_t, point_slice, point_start, slice_motion, slice_neighbours, slice_starts
@@ -16,7 +17,7 @@ module basin
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
-  use trajectories, only: block_size, describe_all, ensemble_t, run_on_device
+  use trajectories, only: block_size, describe_all, ensemble_t
   use work_watch, only: watch_t
   use single_trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   implicit none

@@ -22,7 +22,7 @@ module trajectories
   implicit none
   private
 
-  public :: run_trajectories, run_on_device, block_size
+  public :: run_trajectories, run_on_gpu, batches_for, block_size
 
   !> What is needed of the statistics window of a motion that has not converged.
   integer, parameter, public :: describe_regime = 1, describe_all = 2
@@ -35,6 +35,9 @@ module trajectories
     !> With `describe_regime` the extremes, which take a search in every flight, are not asked for.
     integer :: describe = describe_all
   end type ensemble_t
+
+  !> Starts that are worth giving to lanes at a time: enough to keep them full.
+  integer, parameter, public :: processor_block = 4*lane_count
 
   !> Starts that a GPU is given at a time, where a tile has so many: its pool is refilled many times.
   integer, parameter :: gpu_block = 2**22
@@ -63,24 +66,6 @@ module trajectories
 
 contains
 
-  !> `run_trajectories` on the GPU of the ensemble, if it has one; the watch is looked at on the way. Code 75 if that fails; then,
-  !> and where `whole` is false because the watch requested a stop, there are no outcomes.
-  subroutine run_on_device(ensemble, catalogue, starts, outcomes, whole, error, watch)
-    type(ensemble_t), intent(in) :: ensemble
-    type(attractor_t), intent(in) :: catalogue(:)
-    real(wp), intent(in) :: starts(:, :)
-    type(outcome_t), intent(out) :: outcomes(:)
-    logical, intent(out) :: whole
-    type(error_t), allocatable, intent(out) :: error
-    class(watch_t), intent(inout), optional :: watch
-    whole = .true.
-    if (ensemble%flow%available .and. ensemble%flow%gpu >= 0) then
-      call run_on_gpu(ensemble, catalogue, starts, outcomes, whole, error, watch)
-    else
-      call run_trajectories(ensemble, catalogue, starts, outcomes)
-    end if
-  end subroutine run_on_device
-
   !> Outcomes of `starts` (rows x0 [m], v0 [m/s], crank angle [rad], and what `start` of `machine_t` takes; one column each), by
   !> this processor.
   pure subroutine run_trajectories(ensemble, catalogue, starts, outcomes)
@@ -108,7 +93,8 @@ contains
   end subroutine run_trajectories
 
   !> A GPU's lanes: while one half of them flies, the threads serve the other. The watch is looked at whenever a
-  !> half has come back and every few of its batches, until all outcomes are known.
+  !> half has come back and every few of its batches, until all outcomes are known. Code 75 if the GPU fails; then, and where
+  !> `whole` is false because the watch requested a stop, there are no outcomes.
   subroutine run_on_gpu(ensemble, catalogue, starts, outcomes, whole, error, watch)
     type(ensemble_t), intent(in) :: ensemble
     type(attractor_t), intent(in) :: catalogue(:)
@@ -124,7 +110,7 @@ contains
     integer :: half, batches
     logical :: away(2), stop_now
     stop_now = .false.
-    call open_gpu(ensemble%flow%gpu, max(1, (size(starts, 2) + 2*lane_count - 1)/(2*lane_count)), halves, error)
+    call open_gpu(ensemble%flow%gpu, batches_for(size(starts, 2)), halves, error)
     if (allocated(error)) return
     call open_lanes(ensemble%moving, lanes)
     call set_regions(ensemble%moving, catalogue, lanes)
@@ -154,6 +140,12 @@ contains
     end do
     whole = .not. stop_now
   end subroutine run_on_gpu
+
+  !> Batches of each half of a pool that so many starts fill.
+  pure integer function batches_for(starts)
+    integer, intent(in) :: starts
+    batches_for = max(1, (starts + 2*lane_count - 1)/(2*lane_count))
+  end function batches_for
 
   !> A part of the batches and of the starts for each thread.
   pure subroutine share_out(batches, starts, parts)
@@ -266,7 +258,7 @@ contains
   !> Trajectories worth asking for at a time: enough to keep the lanes full, or one by one.
   pure integer function block_size(ensemble)
     type(ensemble_t), intent(in) :: ensemble
-    block_size = merge(4*lane_count, 1, ensemble%flow%available)
+    block_size = merge(processor_block, 1, ensemble%flow%available)
     if (ensemble%flow%available .and. ensemble%flow%gpu >= 0) block_size = gpu_block
   end function block_size
 

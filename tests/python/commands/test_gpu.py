@@ -66,7 +66,7 @@ def test_nor_do_threads(separatrix, tmp_path, results, on_host, monkeypatch, thr
 
 def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_host):
     output = tmp_path / "gpu.h5"
-    command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    command = [*KINDS["map"], *ON_GPU, "--set", "grid.tile=[4, 5]", "-o", output]
     ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
     assert "computed by rank 0: GPU 0, 1: GPU 1, 2: GPU 0" in ended.out
     assert differences(results["map"], output) == []
@@ -75,7 +75,7 @@ def test_ranks_take_the_devices_in_turn(mpi_separatrix, tmp_path, results, on_ho
 def test_ranks_with_one_device_are_named_together(mpi_separatrix, tmp_path, results, on_host, monkeypatch):
     monkeypatch.setenv("SEPARATRIX_GPU_ON_HOST", "1")
     output = tmp_path / "gpu.h5"
-    command = [*KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
+    command = [*KINDS["map"], *ON_GPU, "--set", "grid.tile=[4, 5]", "-o", output]
     ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=3)
     assert "computed by rank 0-2: GPU 0" in ended.out
     assert differences(results["map"], output) == []
@@ -84,8 +84,8 @@ def test_ranks_with_one_device_are_named_together(mpi_separatrix, tmp_path, resu
 def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, results):
     output = tmp_path / "mixed.h5"
     program = [mpi_separatrix, *KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    gpu = ["-x", "SEPARATRIX_GPU_ON_HOST=1", "-x", "SEPARATRIX_GPU_STARTS=1"]
-    mixed = ["-n", "1", *gpu, *program, ":", "-n", "1", *program]
+    gpu = ["-x", "SEPARATRIX_GPU_ON_HOST=1"]
+    mixed = ["-n", "1", *gpu, *program, *ON_GPU, ":", "-n", "1", *program, "--device", "cpu"]
     ended = subprocess.run(
         ["mpirun", *mixed], cwd=results["map"].parent, capture_output=True, text=True, check=True, timeout=60
     )
@@ -153,6 +153,88 @@ def test_auto_takes_a_gpu_for_many_starts_only(
     succeed(separatrix, *KINDS[kind], *more, "-o", tmp_path / "auto.h5", folder=results["map"].parent)
     with h5py.File(tmp_path / "auto.h5") as file:
         assert file["provenance"].attrs["device"].startswith(device)
+
+
+MANY = ["--set", "axis[1].count=90", "--set", "axis[2].count=100"]
+TAKEN = {"20": "200 starts/s; the processor was taken", "200": "2000 starts/s; the GPU was taken"}
+
+
+@pytest.fixture(scope="module")
+def many(separatrix, results, tmp_path_factory):
+    """A map of so many starts that both devices are measured, by the processor."""
+    output = tmp_path_factory.mktemp("many") / "cpu.h5"
+    succeed(separatrix, *KINDS["map"], *MANY, "--device", "cpu", "-o", output, folder=results["map"].parent)
+    return output
+
+
+@pytest.mark.parametrize("percent", TAKEN)
+def test_auto_takes_what_is_faster(separatrix, tmp_path, results, on_host, monkeypatch, many, percent):
+    """By a clock that counts: the processor does 1000 starts per second, the GPU so many percent of that."""
+    monkeypatch.setenv("SEPARATRIX_GPU_COUNTED", percent)
+    ended = succeed(
+        separatrix, *KINDS["map"], *MANY, "-o", tmp_path / "auto.h5", folder=results["map"].parent
+    )
+    assert f"measured: processor 1000 starts/s, GPU {TAKEN[percent]}" in ended.out
+    assert "(stand-in on the host, for tests), or the processor where that is faster" in ended.out
+    assert differences(tmp_path / "auto.h5", many) == []
+
+
+@pytest.mark.parametrize("percent", TAKEN)
+def test_every_rank_takes_what_is_faster(
+    mpi_separatrix, tmp_path, results, on_host, monkeypatch, many, percent
+):
+    monkeypatch.setenv("SEPARATRIX_GPU_COUNTED", percent)
+    command = [*KINDS["map"], *MANY, "-o", tmp_path / "auto.h5"]
+    ended = succeed(mpi_separatrix, *command, folder=results["map"].parent, ranks=2)
+    assert "measured (means of 2 ranks): processor 1000 starts/s" in ended.out
+    assert differences(tmp_path / "auto.h5", many) == []
+
+
+@pytest.mark.parametrize("device", ["cpu", "gpu"])
+def test_only_auto_measures(separatrix, tmp_path, results, on_host, monkeypatch, device):
+    monkeypatch.setenv("SEPARATRIX_GPU_COUNTED", "20" if device == "gpu" else "500")
+    command = [*KINDS["map"], *MANY, "--device", device, "-o", tmp_path / "map.h5"]
+    ended = succeed(separatrix, *command, folder=results["map"].parent)
+    assert "measured" not in ended.out
+    assert "where that is faster" not in ended.out
+    with h5py.File(tmp_path / "map.h5") as file:
+        wanted = "GPU 0" if device == "gpu" else "processor"
+        assert file["provenance"].attrs["device"].startswith(wanted)
+
+
+@pytest.mark.parametrize("kind", ["map", "refined", "points", "sweep"])
+def test_a_small_run_stays_on_the_processor(separatrix, tmp_path, results, on_host, monkeypatch, kind):
+    """By the clock that counts it ends before the processor has been measured for a second."""
+    monkeypatch.setenv("SEPARATRIX_GPU_COUNTED", "1")
+    ended = succeed(separatrix, *KINDS[kind], "-o", tmp_path / "auto.h5", folder=results["map"].parent)
+    assert "measured: processor 1000 starts/s, GPU not tried; too few starts to choose" in ended.out
+    assert differences(tmp_path / "auto.h5", results[kind]) == []
+
+
+def test_a_run_goes_on_whatever_was_taken(separatrix, tmp_path, results, on_host, monkeypatch, many):
+    """The GPU fails while it is measured; then the processor is taken, in the tiles that are left."""
+    command = [*KINDS["map"], *MANY, "--set", "grid.tile=[30, 50]", "-o", tmp_path / "auto.h5"]
+    with monkeypatch.context() as fault:
+        fault.setenv("SEPARATRIX_GPU_COUNTED", "100")
+        fault.setenv("SEPARATRIX_GPU_FAULT", "40")
+        ended = run(separatrix, *command, folder=results["map"].parent)
+    assert ended.code == 75
+    assert "with --device cpu without a GPU" in ended.err
+    monkeypatch.setenv("SEPARATRIX_GPU_COUNTED", "20")
+    ended = succeed(separatrix, *command, "--resume", folder=results["map"].parent)
+    assert "the processor was taken" in ended.out
+    assert differences(tmp_path / "auto.h5", many) == []
+
+
+def test_shares_take_what_is_faster_each(separatrix, tmp_path, results, on_host, monkeypatch, many):
+    command = [*KINDS["map"], *MANY, "-o", tmp_path / "auto.h5"]
+    for share, percent in enumerate(TAKEN, 1):
+        monkeypatch.setenv("SEPARATRIX_GPU_COUNTED", percent)
+        ended = succeed(separatrix, *command, "--shard", f"{share}/2", folder=results["map"].parent)
+        assert TAKEN[percent] in ended.out
+    parts = sorted(tmp_path.glob("auto.h5.shard-*.part"))
+    succeed(separatrix, "merge", tmp_path / "auto.h5", *parts, folder=results["map"].parent)
+    assert differences(tmp_path / "auto.h5", many) == []
 
 
 def test_other_devices_are_refused(separatrix, results):

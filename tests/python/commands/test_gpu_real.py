@@ -104,8 +104,7 @@ def test_ranks_that_share_a_gpu(mpi_separatrix, tmp_path, results, ranks):
 def test_ranks_with_and_without_a_gpu_share_a_map(mpi_separatrix, tmp_path, results):
     output = tmp_path / "mixed.h5"
     program = [mpi_separatrix, *KINDS["map"], "--set", "grid.tile=[4, 5]", "-o", output]
-    seen = ["-x", "SEPARATRIX_GPU_STARTS=1"]
-    mixed = ["-n", "1", *seen, *program, ":", "-n", "1", "-x", "CUDA_VISIBLE_DEVICES=", *program]
+    mixed = ["-n", "1", *program, "--device", "gpu", ":", "-n", "1", *program, "--device", "cpu"]
     ended = subprocess.run(
         ["mpirun", *mixed], cwd=results["map"].parent, capture_output=True, text=True, check=True, timeout=60
     )
