@@ -6,6 +6,7 @@ module motor_choices
   use constants, only: two_pi
   use curve_law, only: continued_at, curve_of, curve_t, knots_problem, steepest, value_at
   use errors, only: error_t, fail
+  use friction_law, only: friction_of, friction_t
   use kinds, only: real64, wp
   use law_table, only: effect_family, law_choice_t, list_of, motor_family, own_law, path_of, value_of
   use law_texts, only: is_own
@@ -14,7 +15,7 @@ module motor_choices
   implicit none
   private
 
-  !> Largest decay of a difference of speeds over a turn, as an exponent.
+  !> Largest decay over a turn at the no-load speed, as an exponent: of differences of speeds, velocities or currents.
   real(wp), parameter :: most_decay = 1e4_wp
   !> By how much a rod is longer than its crank at least, as a share: at the dead point the speed of the foot is infinite.
   real(wp), parameter :: dead_point = 1e-9_wp
@@ -171,6 +172,8 @@ contains
       call refuse_control(motor, error)
     end if
     if (allocated(error)) return
+    call refuse_rates(choices, motor, error)
+    if (allocated(error)) return
     if (drive%name == 'slider_crank') then
       if (.not. value_of(drive, 'rod') > (1 + dead_point)*value_of(drive, 'crank')) then
         call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully, '// &
@@ -178,6 +181,47 @@ contains
       end if
     end if
   end subroutine refuse_laws
+
+  !> Currents, integrals and velocities that settle, or oscillate, so fast that every turn takes thousands of steps.
+  pure subroutine refuse_rates(choices, motor, error)
+    type(law_choice_t), intent(in) :: choices(:), motor
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: fastest, inductance
+    type(friction_t) :: friction
+    fastest = most_decay*abs(speed_of(motor))/two_pi
+    associate (inertia => value_of(motor, 'inertia'))
+      if (motor%name == 'dc') then
+        inductance = value_of(motor, 'inductance')
+        if (inductance > 0 .and. value_of(motor, 'resistance') > fastest*inductance) then
+          call fail(error, exit_bad_case, 'motor.inductance: found '//shown(inductance)//' H, allowed at least '// &
+                    shown(value_of(motor, 'resistance')/fastest)//' H, or 0: the current follows the speed at once')
+          return
+        end if
+      else if (motor%name == 'pi') then
+        call refuse_above('motor.integral', value_of(motor, 'integral'), fastest**2*inertia, 'N m', error)
+      end if
+      if (allocated(error)) return
+      call refuse_above('motor.bearing_damping', value_of(motor, 'bearing_damping'), fastest*inertia, 'N m s', error)
+    end associate
+    if (allocated(error)) return
+    friction = friction_of(choices(number_of_family(choices, 'friction')), 0.0_wp)
+    call refuse_above('friction.damping', friction%damping, &
+                      fastest*value_of(choices(number_of_family(choices, 'body')), 'mass'), 'N s/m', error)
+  end subroutine refuse_rates
+
+  pure subroutine refuse_above(key, found, most, unit, error)
+    character(len=*), intent(in) :: key, unit
+    real(wp), intent(in) :: found, most
+    type(error_t), allocatable, intent(inout) :: error
+    if (found > most) call fail(error, exit_bad_case, key//': found '//shown(found)//' '//unit//', allowed at most '// &
+      shown(most)//' '//unit//': what it drives settles within 1e-4 of a turn at the no-load speed')
+  end subroutine refuse_above
+
+  pure function shown(value) result(text)
+    real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
+    text = to_text(real(value, real64))
+  end function shown
 
   !> What is wrong with a table of the torque; its own slopes bound those of the speed.
   pure subroutine refuse_table(motor, error)
@@ -203,7 +247,7 @@ contains
     if (motor%name == 'table') return
     if (value_of(motor, 'ramp_time') > 0 .and. any(motor%name == ['linear', 'kloss '])) then
       if (.not. value_of(motor, 'ramp_from') > 0) then
-        call fail(error, exit_bad_case, 'motor.ramp_from: found '//to_text(real(value_of(motor, 'ramp_from'), real64))// &
+        call fail(error, exit_bad_case, 'motor.ramp_from: found '//shown(value_of(motor, 'ramp_from'))// &
                   ' rad/s, allowed above 0: the torque is divided by this speed')
       end if
     else if (abs(value_of(motor, 'ramp_from')) > 0 .and. .not. value_of(motor, 'ramp_time') > 0) then
@@ -212,7 +256,7 @@ contains
     if (motor%name /= 'pi' .or. allocated(error)) return
     associate (limit => value_of(motor, 'torque_limit'), own => abs(value_of(motor, 'start_integral')*value_of(motor, 'integral')))
       if (limit > 0 .and. own > limit) then
-        call fail(error, exit_bad_case, 'motor.start_integral: multiplied by motor.integral it is '//to_text(real(own, real64))// &
+        call fail(error, exit_bad_case, 'motor.start_integral: multiplied by motor.integral it is '//shown(own)// &
                   ' N m, allowed at most motor.torque_limit')
       end if
     end associate
