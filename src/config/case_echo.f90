@@ -6,6 +6,7 @@
 module case_echo
   use axis, only: axis_t, linear_values
   use case_type, only: case_t, sample_t, sweep_t
+  use derived_quantities, only: derived_t, is_power
   use grid, only: sample_axis
   use kinds, only: wp
   use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, rows_of, part_family, &
@@ -80,9 +81,26 @@ contains
       text = text//newline//'[[axis]]'//newline//line('name', quoted(trim(the_case%axes(i)%name)))// &
              values_text(the_case%axes(i)%values)
     end do
+    if (allocated(the_case%derived)) text = text//derived_text(the_case%derived)
     if (the_case%refine%active) text = text//refine_text(the_case%refine)
     if (the_case%sweep%present .and. (kind == '' .or. kind == 'sweep')) text = text//sweep_text(the_case%sweep)
   end function deciding_text
+
+  !> The tables [derived.NAME].
+  pure function derived_text(derived) result(text)
+    type(derived_t), intent(in) :: derived(:)
+    character(len=:), allocatable :: text
+    integer :: i
+    text = ''
+    do i = 1, size(derived)
+      text = text//newline//'[derived.'//trim(derived(i)%name)//']'//newline//line('quantity', quoted(trim(derived(i)%quantity)))
+      if (is_power(derived(i))) then
+        text = text//line('of', quoted(derived(i)%expression))
+      else
+        text = text//line('expression', quoted(derived(i)%expression))//line('unit', quoted(derived(i)%unit))
+      end if
+    end do
+  end function derived_text
 
   !> The tables [[sample]]. Their number and seed stand in [grid], and here for the identity of the case.
   pure function samples_text(sample) result(text)

@@ -14,6 +14,7 @@ module case_reader
   use case_source, only: assume, case_source_t, enter_table, open_source, origin_of, problems_of, report_unknown
   use case_type, only: case_t
   use case_values, only: any_number, at_least, between, more_than, take_choice, take_integer, take_real, take_text
+  use derived_reader, only: check_derived, read_derived
   use errors, only: error_t
   use kinds, only: wp
   use law_reader, only: read_laws
@@ -75,8 +76,10 @@ contains
     call read_sweep(source, the_case)
     call read_trajectory(source, the_case)
     call read_record(source, the_case)
+    call read_derived(source, the_case)
     call report_unknown(source)
     call check_case(source, the_case)
+    if (size(source%problems) == 0) call check_derived(source, the_case)
     call problems_of(source, error)
     if (allocated(error)) return
     the_case%resolved_text = echo_case(the_case)

@@ -80,6 +80,7 @@ contains
         grid = make_grid(axes, the_case%laws, start, options_of(the_case))
       end if
     end associate
+    if (allocated(the_case%derived)) grid%derived = the_case%derived
   end function grid_of
 
   !> Where the output of a command goes: as asked, or the name of the case without its folder, with .COMMAND.h5.

@@ -4,6 +4,7 @@
 !> The case: everything that a run needs, in SI units.
 module case_type
   use axis, only: axis_t, name_length
+  use derived_quantities, only: derived_t
   use kinds, only: wp
   use law_table, only: law_choice_t
   use refinement, only: refine_t
@@ -122,6 +123,8 @@ module case_type
     type(sweep_t) :: sweep
     type(trajectory_t) :: trajectory
     type(record_t) :: record
+    !> Quantities derived from motions.
+    type(derived_t), allocatable :: derived(:)
   end type case_t
 
 end module case_type

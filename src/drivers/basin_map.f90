@@ -8,6 +8,7 @@ module basin_map
   use case_setup, only: automatic_tile, grid_of, points_of_tile, span_of, tile_of_blocks
   use case_type, only: case_t
   use crank_catalogue, only: add_crank_catalogue
+  use derived_report, only: add_derived_catalogue
   use endings, only: assess_reasons, report_reasons
   use errors, only: error_t
   use file_layout, only: add_axes, add_catalogue, add_map_variables, add_refined_variables
@@ -80,6 +81,7 @@ contains
     extra%positions_are_angles = position_is_angle(session%the_case%laws)
     call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
     call add_crank_catalogue(session%team, work%grid, work%catalogues, extra)
+    call add_derived_catalogue(session%team, work%grid, work%catalogues, work%span, extra)
     if (allocated(work%grid%drawn)) call add_sample_shares(extra, work%captured, points_of_slice(work%grid))
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
     call finish_tiles(session, file, complete, extra)

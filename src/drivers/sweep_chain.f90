@@ -15,7 +15,7 @@ module sweep_chain
   use status, only: reason_time_over
   use stop_check, only: check_stop
   use settling, only: marks_of_outcome, same_mark, settled_t
-  use sweep, only: hold_parameter, hold_t
+  use sweep, only: derive_held, hold_parameter, hold_t
   use sweep_limits, only: branch_end, limit_bracketed, limit_not_known, observe_limit
   use team, only: team_t
   use single_trajectory, only: span_t
@@ -29,7 +29,8 @@ module sweep_chain
   !> impact speed, amplitude, x_max, x_min, v_max, rotation, cycle time, and those of a crank; the first five are codes, 0 where
   !> a direction was not run, the rest is not a number there.
   integer, parameter :: hold_numbers = 13 + crank_numbers, hold_codes = 5
-  integer, parameter, public :: hold_reason = 2, hold_outcome = 5, hold_impacts = 6, hold_cycle_time = 13, hold_crank = 14
+  integer, parameter, public :: hold_reason = 2, hold_outcome = 5, hold_impacts = 6, hold_cycle_time = 13, hold_crank = 14, &
+    hold_derived = 14 + crank_numbers
   !> Numbers kept of each limit.
   integer, parameter :: limit_numbers = 11
 
@@ -75,7 +76,7 @@ contains
     real(wp), allocatable :: mine(:), all_values(:), packed(:)
     logical :: here(2)
     integer :: direction, done
-    chains = new_chains(size(values), samples)
+    chains = new_chains(size(values), samples, size(grid%derived))
     chains%ran = ran
     allocate (mine(0))
     here = ran .and. modulo([0, 1], team%size()) == team%rank()
@@ -96,11 +97,11 @@ contains
     call unpack_chains(all_values, samples, size(values), chains)
   end subroutine run_chains
 
-  !> Chains over so many values, with so many samples of each, that were not run.
-  pure function new_chains(values, samples) result(chains)
-    integer, intent(in) :: values, samples
+  !> Chains over so many values, with so many samples and derived quantities of each, that were not run.
+  pure function new_chains(values, samples, derived) result(chains)
+    integer, intent(in) :: values, samples, derived
     type(chains_t) :: chains
-    allocate (chains%holds(hold_numbers, values, 2), chains%samples(2, samples, values, 2), &
+    allocate (chains%holds(hold_numbers + derived, values, 2), chains%samples(2, samples, values, 2), &
               source=ieee_value(1.0_wp, ieee_quiet_nan))
     chains%holds(:hold_codes, :, :) = 0
     allocate (chains%limits(0))
@@ -120,7 +121,7 @@ contains
     integer, intent(in) :: samples, longest
     real(wp), allocatable, intent(out) :: packed(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: holds(hold_numbers, size(values)), points(2, samples, size(values)), speed
+    real(wp) :: holds(hold_numbers + size(grid%derived), size(values)), points(2, samples, size(values)), speed
     real(wp) :: limits(limit_numbers, size(values)), visited(size(values))
     type(hold_t) :: held
     type(settled_t) :: settled(size(values))
@@ -138,7 +139,8 @@ contains
         error)
       if (allocated(error)) return
       settled(i) = held%settled
-      holds(:, k) = numbers_of(held)
+      holds(:hold_numbers, k) = numbers_of(held)
+      call derive_held(grid, span, path, visited(i), held, holds(hold_numbers + 1:, k))
       points(:, :, k) = held%samples
       ! A hold that had to be given up leaves the body where the last good one ended.
       if (held%reason == reason_time_over) then
@@ -222,14 +224,15 @@ contains
     real(wp), intent(in) :: all_values(:)
     integer, intent(in) :: samples, values
     type(chains_t), intent(inout) :: chains
-    integer :: position, direction, i, count
+    integer :: position, direction, i, count, numbers_of_hold
+    numbers_of_hold = size(chains%holds, 1)
     position = 1
     do while (position <= size(all_values))
       direction = nint(all_values(position))
       position = position + 1
-      chains%holds(:, :, direction) = reshape(all_values(position:position + hold_numbers*values - 1), &
-                                              [hold_numbers, values])
-      position = position + hold_numbers*values
+      chains%holds(:, :, direction) = reshape(all_values(position:position + numbers_of_hold*values - 1), &
+                                              [numbers_of_hold, values])
+      position = position + numbers_of_hold*values
       chains%samples(:, :, :, direction) = reshape(all_values(position:position + 2*samples*values - 1), &
                                                    [2, samples, values])
       position = position + 2*samples*values

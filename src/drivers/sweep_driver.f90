@@ -136,7 +136,7 @@ contains
     associate (sweep => session%the_case%sweep, values => session%the_case%sweep%swept%values)
       seconds = hold_seconds(session, error)
       call session%stop_if(error)
-      chains = new_chains(size(values), sweep%samples)
+      chains = new_chains(size(values), sweep%samples, size(session%the_case%derived))
       call describe_chains(session, chains, schema)
       holds = size(values)*merge(2, 1, sweep%directions == 'both')
       plan = to_text(size(values))//' values of '//trim(sweep%swept%name)//', '//directions_text(session%the_case)//': '// &

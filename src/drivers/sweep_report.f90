@@ -6,6 +6,7 @@ module sweep_report
   use attractors, only: regime_impact, regime_names
   use case_type, only: contact_position => contact_law
   use constants, only: unreachable
+  use derived_report, only: derived_meaning
   use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
   use crank_summary, only: crank_numbers, crank_outcomes, crank_table, last_crank_outcome
   use file_layout, only: add_axes, add_reason, add_regime
@@ -20,7 +21,7 @@ module sweep_report
   use session, only: session_t
   use settling, only: marks_of_outcome
   use status, only: reason_names, reason_time_over
-  use sweep_chain, only: chains_t, hold_crank, hold_cycle_time, hold_impacts, hold_outcome, hold_reason, limit_t
+  use sweep_chain, only: chains_t, hold_crank, hold_cycle_time, hold_derived, hold_impacts, hold_outcome, hold_reason, limit_t
   use sweep_limits, only: limit_beyond_range, limit_bracketed, limit_outcomes
   use text, only: interval_text, join, replace_all, to_text
   implicit none
@@ -57,6 +58,7 @@ contains
       call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 12)
     end if
     if (has_motor(session%the_case%laws)) call add_crank()
+    call add_derived()
     call add_sections(chains, [dimensions, [character(len=name_length) :: 'sample']], schema)
     if (size(chains%limits) > 0) call add_limits(session, schema, chains%limits)
     call add_barriers(session, schema)
@@ -81,6 +83,17 @@ contains
                  hold_crank + i - 1)
       end do
     end subroutine add_crank
+
+    subroutine add_derived()
+      integer :: i
+      do i = 1, size(session%the_case%derived)
+        associate (one => session%the_case%derived(i))
+          call schema%add_variable('derived_'//trim(one%name), type_float64, dimensions, units=one%unit, own_units=.true., &
+                                   long_name=derived_meaning(one)//' over the cycle or window')
+          call fill(hold_derived + i - 1)
+        end associate
+      end do
+    end subroutine add_derived
 
     subroutine fill(row)
       integer, intent(in) :: row

@@ -11,6 +11,7 @@ module trajectory_driver
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
   use crank_report, only: describe_crank
+  use derived_report, only: derive_motion, describe_derived, report_derived
   use endings, only: assess_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
@@ -33,6 +34,7 @@ module trajectory_driver
   use trajectory_report, only: counted_over, ended_after, explained, report
   use single_trajectory, only: begin_trajectory, begin_record, conclude, trajectory_state_t, end_record, fit_window, go_on, &
     is_recorded, outcome_t, span_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
@@ -57,6 +59,7 @@ contains
     type(schema_t) :: schema
     type(error_t), allocatable :: error
     type(attractor_t) :: cycle
+    real(wp), allocatable :: derived(:)
     character(len=:), allocatable :: path
     call open_session(command, session)
     call require_start(session%the_case, error)
@@ -76,8 +79,11 @@ contains
     call fly(session, moving, span, grid%start, outcome, log)
     call describe_cycle(moving, span_of(session%the_case), span, session%the_case%attractors%max_period, grid%start, outcome, &
                         cycle)
+    call derive_motion(moving, grid, span, cycle, derived)
+    if (outcome%reason /= reason_time_over) derived = ieee_value(1.0_wp, ieee_quiet_nan)
     call describe_file(session, 'trajectory', schema)
     call describe_motion(moving, span, outcome, cycle, log, schema)
+    call describe_derived(grid%derived, derived, schema)
     call describe_crank(session%the_case%laws, span%window, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
@@ -97,6 +103,7 @@ contains
     call session%stop_if(error)
     call check_written(session, path)
     call report(session, moving, span, outcome, cycle, log)
+    if (outcome%reason == reason_time_over) call report_derived(session%journal, grid%derived, derived)
     call report_files(session, command, path)
     call assess_motion(outcome%reason, explained(outcome%reason)//' after '// &
                       to_text(ended_after(moving, outcome%reason, log), 6)//' s of '//to_text(span%duration, 6)//' s; '// &

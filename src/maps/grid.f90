@@ -8,6 +8,7 @@ module grid
   use axis, only: axis_t, name_length
   use build_multibody, only: is_multibody, multibody_of
   use build_motion, only: machine_of, period_of
+  use derived_quantities, only: derived_t
   use errors, only: error_t
   use machine_type, only: machine_t
   use multibody, only: multibody_t
@@ -49,6 +50,8 @@ module grid
     !> The machine where no axis changes it.
     type(law_choice_t), allocatable :: laws(:)
     type(options_t) :: options
+    !> Quantities derived from attractors.
+    type(derived_t), allocatable :: derived(:)
   end type grid_t
 
 contains
@@ -68,7 +71,7 @@ contains
     grid%laws = laws
     grid%start = start
     grid%options = options
-    allocate (grid%shape(size(axes)), grid%parameter_axes(0))
+    allocate (grid%shape(size(axes)), grid%parameter_axes(0), grid%derived(0))
     grid%start_names = own_starts
     grid%start_axis = [0, 0, 0]
     grid%drawn_row = [0, 0, 0]

@@ -8,9 +8,11 @@ module sweep
   use attractors, only: features_t, regime_at_rest
   use crank_summary, only: crank_summary_t, no_summary
   use crank_turns, only: summarize_held, summarize_turns
+  use derived_values, only: derive_over
   use errors, only: error_t
   use grid, only: grid_t, machine_with
   use kinds, only: wp
+  use law_table, only: change_parameter, law_choice_t
   use machine_type, only: machine_t, section_state_t
   use motion_features, only: features_over
   use motion_state, only: tally_t
@@ -22,7 +24,7 @@ module sweep
   implicit none
   private
 
-  public :: hold_parameter
+  public :: hold_parameter, derive_held
 
   !> What is seen at the end of one hold.
   type, public :: hold_t
@@ -100,6 +102,35 @@ contains
       seen%rotation = cycle%rotation
     end associate
   end subroutine hold_parameter
+
+  !> Derived quantities of the motion at the end of a hold: over the cycle on which it settles, else over a window after it.
+  subroutine derive_held(grid, span, path, value, held, values)
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: value
+    type(hold_t), intent(in) :: held
+    real(wp), intent(out) :: values(:)
+    class(machine_t), allocatable :: moving
+    type(law_choice_t), allocatable :: laws(:)
+    type(error_t), allocatable :: error
+    integer :: periods
+    logical :: known
+    values = ieee_value(1.0_wp, ieee_quiet_nan)
+    if (size(values) == 0 .or. held%reason /= reason_time_over) return
+    call machine_with(grid, path, value, moving, error)
+    if (allocated(error)) return
+    laws = grid%laws
+    call change_parameter(laws, path, value, known)
+    periods = held%settled%period
+    if (periods > 0) then
+      call derive_over(moving, laws, grid%derived, held%settled%state, &
+                       merge(held%settled%duration, periods*moving%period, held%settled%duration > 0), real(periods, wp), values)
+    else
+      periods = max(1, ceiling(span%window/moving%period))
+      call derive_over(moving, laws, grid%derived, held%state, periods*moving%period, real(periods, wp), values)
+    end if
+  end subroutine derive_held
 
   !> Features of a hold in which the bearing comes to hold the crank for good.
   pure subroutine describe_held(moving, held)

@@ -1,0 +1,158 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Derived quantities in files and in the log: of the attractors of a map, of one motion.
+module derived_report
+  use attractors, only: attractor_t
+  use basin, only: catalogue_t
+  use derived_quantities, only: derived_t
+  use derived_values, only: derive_attractor, derive_over
+  use errors, only: error_t
+  use grid, only: grid_t, slice_laws, slice_motion
+  use journal, only: json_number, journal_t
+  use kinds, only: int64, wp
+  use machine_type, only: machine_t, section_state_t
+  use map_schema, only: schema_t, type_float64
+  use motion_state, only: tally_t
+  use single_trajectory, only: span_t
+  use team, only: team_t
+  use text, only: to_text
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  public :: add_derived_catalogue, derive_motion, describe_derived, report_derived, derived_meaning
+
+contains
+
+  !> Adds a column of the catalogue for each quantity. The ranks share the slices.
+  subroutine add_derived_catalogue(team, grid, catalogues, span, schema)
+    class(team_t), intent(in) :: team
+    type(grid_t), intent(in) :: grid
+    type(catalogue_t), intent(in) :: catalogues(:)
+    type(span_t), intent(in) :: span
+    type(schema_t), intent(inout) :: schema
+    real(wp), allocatable :: values(:, :)
+    integer :: i
+    if (size(grid%derived) == 0) return
+    call derive_entries(team, grid, catalogues, span, values)
+    if (size(values, 2) == 0) return
+    do i = 1, size(grid%derived)
+      call schema%add_variable('derived_'//trim(grid%derived(i)%name), type_float64, ['entry'], units=grid%derived(i)%unit, &
+                               own_units=.true., long_name=derived_meaning(grid%derived(i))//' over the cycle or window', &
+                               data=values(i, :), group='catalogue')
+    end do
+  end subroutine add_derived_catalogue
+
+  !> Quantities (rows) of every entry (columns), slice after slice.
+  subroutine derive_entries(team, grid, catalogues, span, values)
+    class(team_t), intent(in) :: team
+    type(grid_t), intent(in) :: grid
+    type(catalogue_t), intent(in) :: catalogues(:)
+    type(span_t), intent(in) :: span
+    real(wp), allocatable, intent(out) :: values(:, :)
+    real(wp) :: found(size(grid%derived))
+    real(wp), allocatable :: mine(:), gathered(:)
+    class(machine_t), allocatable :: machine
+    type(error_t), allocatable :: error
+    integer :: i, k, entry
+    allocate (mine(0))
+    entry = 0
+    do i = 1, size(catalogues)
+      if (modulo(i, team%size()) == team%rank()) call slice_motion(grid, int(i - 1, int64), machine, error)
+      do k = 1, size(catalogues(i)%attractors)
+        entry = entry + 1
+        if (modulo(i, team%size()) /= team%rank() .or. allocated(error)) cycle
+        call derive_attractor(machine, slice_laws(grid, int(i - 1, int64)), grid%derived, catalogues(i)%attractors, k, span, found)
+        mine = [mine, real(entry, wp), found]
+      end do
+    end do
+    call team%allgather(mine, gathered)
+    allocate (values(size(grid%derived), entry), source=ieee_value(1.0_wp, ieee_quiet_nan))
+    do i = 1, size(gathered), 1 + size(found)
+      values(:, nint(gathered(i))) = gathered(i + 1:i + size(found))
+    end do
+  end subroutine derive_entries
+
+  !> Quantities of one motion from the start of a grid: over the `cycle` on which it has settled, else over the window at its end.
+  pure subroutine derive_motion(moving, grid, span, cycle, values)
+    class(machine_t), intent(in) :: moving
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    type(attractor_t), intent(in) :: cycle
+    real(wp), allocatable, intent(out) :: values(:)
+    type(section_state_t) :: section
+    type(tally_t) :: tally
+    real(wp) :: origin, until
+    integer :: reason
+    allocate (values(size(grid%derived)), source=ieee_value(1.0_wp, ieee_quiet_nan))
+    if (size(values) == 0) return
+    if (cycle%period > 0) then
+      call derive_attractor(moving, grid%laws, grid%derived, [cycle], 1, span, values)
+      return
+    end if
+    section = moving%start(grid%start)
+    call moving%begin_tally(section, tally)
+    origin = -section%state%time
+    until = span%duration - span%window
+    reason = 0
+    do while (reason == 0 .and. until - origin > section%state%time)
+      if (moving%timed .and. until - origin >= moving%period) then
+        call moving%advance_to_section(section, tally, reason)
+        origin = origin + moving%period
+      else
+        call moving%advance(section, until - origin, tally, reason)
+        if (moving%timed .or. .not. section%passed) exit
+        origin = origin + section%lasted
+      end if
+      tally%events = 0
+      tally%steps = 0
+    end do
+    if (reason /= 0) return
+    call derive_over(moving, grid%laws, grid%derived, section, span%window, span%window/moving%period, values)
+  end subroutine derive_motion
+
+  !> As attributes.
+  subroutine describe_derived(derived, values, schema)
+    type(derived_t), intent(in) :: derived(:)
+    real(wp), intent(in) :: values(:)
+    type(schema_t), intent(inout) :: schema
+    integer :: i
+    do i = 1, size(derived)
+      call schema%add_attribute('', 'derived_'//trim(derived(i)%name), values(i))
+      call schema%add_attribute('', 'derived_'//trim(derived(i)%name)//'_units', derived(i)%unit)
+    end do
+  end subroutine describe_derived
+
+  !> A line each.
+  subroutine report_derived(journal, derived, values)
+    type(journal_t), intent(inout) :: journal
+    type(derived_t), intent(in) :: derived(:)
+    real(wp), intent(in) :: values(:)
+    character(len=:), allocatable :: value
+    integer :: i
+    do i = 1, size(derived)
+      value = to_text(values(i), 8)//' '//derived(i)%unit
+      if (derived(i)%unit == '1') value = to_text(values(i), 8)
+      if (ieee_is_nan(values(i))) value = 'not known'
+      call journal%line('derived', '  '//trim(derived(i)%name)//': '//value//' ('//derived_meaning(derived(i))//')', &
+                        '"name": "'//trim(derived(i)%name)//'", "value": '//json_number(values(i)))
+    end do
+  end subroutine report_derived
+
+  !> What a quantity is.
+  pure function derived_meaning(one) result(text)
+    type(derived_t), intent(in) :: one
+    character(len=:), allocatable :: text
+    select case (one%quantity)
+    case ('power')
+      text = 'mean power lost to '//one%expression
+      if (one%expression == 'drive') text = 'mean power put in by the drive'
+    case ('drift')
+      text = 'change per period of '//one%expression
+    case default
+      text = trim(one%quantity)//' of '//one%expression
+    end select
+  end function derived_meaning
+
+end module derived_report
