@@ -95,7 +95,7 @@ contains
     type(log_t), intent(inout) :: log
     type(multibody_state_t) :: state
     real(wp) :: before, next
-    if (allocated(machine%driver)) call note_peaks(machine, flow, path, start, duration, log)
+    if (allocated(machine%driver) .and. log%balance%kept) call note_peaks(machine, flow, path, start, duration, log)
     state = start
     before = 0
     do while (log%sample_interval > 0)
@@ -180,7 +180,7 @@ contains
     type(multibody_t), intent(in) :: machine
     type(multibody_state_t), intent(in) :: state
     type(log_t), intent(inout) :: log
-    log%balance%at_end = energy_of_multibody(machine, state)
+    if (log%balance%kept) log%balance%at_end = energy_of_multibody(machine, state)
     if (allocated(machine%driver)) then
       call record_sample(log, watched_state(machine, state), driver_now(machine, state), log%balance)
     else
@@ -200,6 +200,7 @@ contains
     real(wp) :: length, friction, damping, contact, work, from, until, t
     type(multibody_state_t) :: state
     integer :: panels, i, k
+    if (.not. log%balance%kept) return
     state = start
     from = first
     do while (from < last)
@@ -327,6 +328,7 @@ contains
     type(multibody_state_t), intent(in) :: before, after
     type(log_t), intent(inout) :: log
     real(wp) :: lost, work
+    if (.not. log%balance%kept) return
     lost = energy_of_multibody(machine, before) - energy_of_multibody(machine, after)
     if (any(machine%joints%kind == joint_elastic .and. before%phase(:size(machine%joints)) /= after%phase(:size(machine%joints)))) &
       then
