@@ -137,8 +137,7 @@ inline interval bounds_of_node(const tape_machine &m, const tape_node &n, const 
   }
 }
 
-// Bounds of the coefficients of all nodes, those of the rates and switching functions in the last order in
-// `now`. Steady nodes have the values `t`. Returns where all is defined over the box `z`.
+// Bounds of the coefficients of all nodes, of the last order too. Steady nodes have the values `t`. Returns where all is defined over the box `z`.
 [[gnu::noinline]] inline mask bound_series(const tape_machine &m, bool fresh, const interval *z,
                                            const tape_values &t, tape_box &box) {
   tape_values &b = box.series;
@@ -155,18 +154,14 @@ inline interval bounds_of_node(const tape_machine &m, const tape_node &n, const 
     box.of[i] = y;
     vec size = most_of(y);
     b.first[i] = size;
-    b.now[i] = i < m.varying ? vec(0.0) : size;
-    if (n.series >= 0) {
+    if (n.series >= 0)
       b.of[n.series][0] = size;
-      for (int k = 1; i < m.varying && k < orders; k++)
-        b.of[n.series][k] = 0;
-    }
     if (n.slopes >= 0)
       b.of[n.slopes][0] = 0;
+    if (i < m.varying)
+      set_steady(n, i, b);
   }
-  for (int i = 0; i < m.variables; i++)
-    b.of[i][1] = b.first[m.rate[i]] * m.unit;
-  raise_orders<1, true>(m, b);
+  raise_all<true>(m, fresh, b);
   return sound;
 }
 

@@ -30,6 +30,28 @@ module tape_lane_types
     integer(c_int) :: node = 0, factor = 0
   end type lane_term_t
 
+  !> Mirrors `tape_operand` of tape_types.hpp.
+  type, bind(c), public :: lane_operand_t
+    integer(c_int) :: place = -1, moves = 0
+  end type lane_operand_t
+
+  !> Mirrors `tape_operation` of tape_types.hpp.
+  type, bind(c), public :: lane_operation_t
+    integer(c_int) :: operation = 0, node = 0, steady = 0, first = -1, second = -1, own = -1, slopes = -1, count = 0
+    type(lane_operand_t) :: a, b, to
+  end type lane_operation_t
+
+  !> Mirrors `tape_even` of tape_types.hpp.
+  type, bind(c), public :: lane_even_t
+    integer(c_int) :: operation = 0, node = 0, series = -1, slopes = -1, other = 0, unused = 0
+  end type lane_even_t
+
+  !> Mirrors `tape_change` of tape_types.hpp.
+  type, bind(c), public :: lane_change_t
+    type(lane_operand_t) :: from
+    integer(c_int) :: factor = -1, slopes = -1
+  end type lane_change_t
+
   !> Mirrors `tape_check` of tape_types.hpp.
   type, bind(c), public :: lane_check_t
     integer(c_int) :: node = 0, argument = -1, own = -1, unused = 0
@@ -49,6 +71,11 @@ module tape_lane_types
     type(lane_check_t) :: check(most_tape_checks)
     type(lane_term_t) :: term(most_tape_terms)
     type(lane_node_t) :: node(most_tape_nodes)
+    integer(c_int) :: operations = 0, evens = 0
+    type(lane_operation_t) :: operation(most_tape_nodes)
+    type(lane_operand_t) :: part(most_tape_terms)
+    type(lane_even_t) :: even(most_tape_nodes)
+    type(lane_change_t) :: change(most_tape_variables)
     real(c_double) :: unit = 1, tolerance = 0, sizes(most_tape_variables) = 1
     real(c_double) :: box(most_tape_variables) = 1, speed(tape_speeds) = 0, level_size(tape_levels) = 0, &
       longest(tape_boxes) = 0, remainder(most_tape_variables, tape_boxes) = 0

@@ -39,7 +39,10 @@ contains
       if (body%tape%nodes(i)%operation == op_variable) series(i) = body%tape%nodes(i)%first - 1
     end do
     do i = 1, body%tape%count
-      if (is_used(i)) call keep_series(body%tape, i, series, slopes, kept)
+      if (.not. is_used(i)) cycle
+      call keep_series(body%tape, i, series, slopes, kept)
+      if (all(body%tape%nodes(i)%operation /= [op_sin, op_cos])) cycle
+      if (grows_evenly(body, body%tape%nodes(i)%first)) call keep(series(body%tape%nodes(i)%first), kept)
     end do
     call number_switches(body, is_used, switches)
     fits = maxval(switches) <= most_tape_switches

@@ -14,6 +14,7 @@ module tape_preparation
   use tape_lane_types, only: lane_tape_order, most_tape_nodes, most_tape_variables, tape_levels, tape_machine_t, tape_speeds
   use tape_nodes, only: set_nodes
   use tape_parts, only: needed
+  use tape_program, only: set_program
   use tape_series, only: prepare_series, series_t
   use tape_sums, only: find_sums, tape_sum_t
   implicit none
@@ -49,6 +50,7 @@ contains
     allocate (flow%tape)
     call set_constants(body, flow%tape)
     call set_nodes(summed, is_used, sums, sum_of, flow%tape, flow%available)
+    if (flow%available) call set_program(flow%tape)
     if (flow%available) call set_boxes(body, flow%tape)
     if (flow%available) flow%resumes = .true.
     if (.not. flow%available) deallocate (flow%tape)

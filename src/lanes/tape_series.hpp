@@ -9,6 +9,8 @@
 #include "tape_functions.hpp"
 #include "tape_types.hpp"
 
+#include <cstddef>
+
 namespace {
 
 enum { orders = tape_order + 1 };
@@ -27,41 +29,68 @@ struct inverses {
 
 constexpr inverses inverse_of;
 
-// Values of the nodes in the present order; series of those that later orders need; whether the switching
-// functions are on their upper side.
+// Coefficients of the present order of the nodes without series; values of all at the state; series of those
+// that later orders need; whether the switching functions are on their upper side. `tape_program.f90` knows
+// the order of the members.
 struct tape_values {
   vec now[most_tape_nodes], first[most_tape_nodes], inverse[most_tape_nodes], slip;
   series of[most_tape_series];
   mask above[most_tape_switches];
 };
 
-// Sum of a(i) b(k - i), i = from ... k - until. In two parts, so that additions need not wait for each other.
+static_assert(offsetof(tape_values, of) == (3 * most_tape_nodes + 1) * sizeof(vec), "as in tape_program.f90");
+
+// Coefficient k of an operand.
+template <int k> LANE_LEAF vec coefficient_at(const tape_values &t, const tape_operand &at) {
+  return t.now[at.place + (at.moves & k)];
+}
+
+// Sum of a(i) b(k - i), i = from ... k - until. In two parts, so that additions need not wait for each other;
+// the terms with what this order has just made come last.
 template <int k, int from, int until> LANE_LEAF vec products(const vec *a, const vec *b) {
+  constexpr int begin = 1, end = k - (until > 1 ? until : 1);
   vec even = 0, odd = 0;
 #pragma GCC unroll 32
-  for (int i = from; i <= k - until; i += 2) {
+  for (int i = begin; i <= end; i += 2) {
     even += a[i] * b[k - i];
-    if (i < k - until)
+    if (i < end)
       odd += a[i + 1] * b[k - i - 1];
   }
-  return even + odd;
+  vec total = even + odd;
+  if constexpr (from == 0)
+    total += a[0] * b[k];
+  if constexpr (until == 0)
+    total += a[k] * b[0];
+  return total;
 }
 
 template <int k> LANE_LEAF vec square_term(const vec *a) {
   vec total = 0;
 #pragma GCC unroll 32
-  for (int i = 0; i < (k + 1) / 2; i++)
+  for (int i = 1; i < (k + 1) / 2; i++)
     total += a[i] * a[k - i];
   total += total;
-  return k % 2 == 0 ? total + a[k / 2] * a[k / 2] : total;
+  if constexpr (k % 2 == 0)
+    total += a[k / 2] * a[k / 2];
+  return total + (a[0] + a[0]) * a[k];
 }
 
-// Sum of the terms of a node.
-LANE_LEAF vec sum_of_terms(const tape_machine &m, const tape_node &n, const vec *factors, const vec *values) {
+// Sum of the terms of a node at the state.
+LANE_LEAF vec sum_of_terms(const tape_machine &m, const tape_node &n, const vec *values) {
   const tape_term *term = &m.term[n.first];
-  vec y = factors[term->factor] * values[term->node];
+  vec y = values[term->factor] * values[term->node];
   for (int i = 1; i < n.second; i++)
-    y += factors[term[i].factor] * values[term[i].node];
+    y += values[term[i].factor] * values[term[i].node];
+  return n.other < 0 ? y : y + values[n.other];
+}
+
+// Coefficient k > 0 of the sum of `count` parts from number `first` on.
+template <int k> LANE_LEAF vec sum_of_parts(const tape_machine &m, int first, int count, const tape_values &t) {
+  const tape_term *term = &m.term[first];
+  const tape_operand *part = &m.part[first];
+  vec y = t.first[term->factor] * coefficient_at<k>(t, *part);
+  for (int i = 1; i < count; i++)
+    y += t.first[term[i].factor] * coefficient_at<k>(t, part[i]);
   return y;
 }
 
@@ -110,8 +139,7 @@ inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &
 inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec crossed, tape_values &t) {
   const tape_node &n = m.node[i];
   if (n.operation == tape_sum)
-    return n.other < 0 ? sum_of_terms(m, n, t.first, t.first)
-                       : sum_of_terms(m, n, t.first, t.first) + t.first[n.other];
+    return sum_of_terms(m, n, t.first);
   const vec &a = t.first[n.first], &b = t.first[n.second];
   switch (n.operation) {
   case tape_variable:
@@ -145,6 +173,13 @@ inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec cr
   }
 }
 
+// Nothing follows the value of a node that does not vary.
+inline void set_steady(const tape_node &n, int i, tape_values &t) {
+  t.now[i] = 0;
+  for (int k = 1; n.series >= 0 && k < orders; k++)
+    t.of[n.series][k] = 0;
+}
+
 // Values at the state of the nodes from one number on.
 inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, vec crossed, tape_values &t) {
   t.slip = slip;
@@ -156,92 +191,139 @@ inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, ve
       t.of[n.series][0] = y;
     if (n.slopes >= 0)
       t.of[n.slopes][0] = 0;
-    if (i < m.varying) {
-      t.now[i] = 0;
-      for (int k = 1; n.series >= 0 && k < orders; k++)
-        t.of[n.series][k] = 0;
-    } else {
-      t.now[i] = y;
+    if (i < m.varying)
+      set_steady(n, i, t);
+  }
+}
+
+// Series of sine and cosine of an argument that changes by `rate`; of bounds both are positive.
+template <bool bounds> LANE_LEAF void raise_circular(vec rate, vec *sine, vec *cosine) {
+#pragma GCC unroll 32
+  for (int k = 1; k < tape_order + bounds; k++) {
+    vec part = rate * inverse_of[k];
+    sine[k] = part * cosine[k - 1];
+    cosine[k] = (bounds ? part : -part) * sine[k - 1];
+  }
+}
+
+// Series of what grows evenly, and of sines and cosines of that. `fresh`: none of them is set.
+template <bool bounds> inline void raise_even(const tape_machine &m, bool fresh, tape_values &t) {
+  for (int i = 0; i < m.evens; i++) {
+    const tape_even &e = m.even[i];
+    if (e.operation == tape_sin_even) {
+      raise_circular<bounds>(t.of[e.slopes][1], t.of[e.series], t.of[e.other]);
+      continue;
+    }
+    vec y = e.operation == tape_variable
+                ? t.first[e.other] * m.unit
+                : sum_of_parts<1>(m, m.node[e.node].first, m.node[e.node].second, t);
+    t.of[e.series][1] = y;
+    if (e.slopes >= 0)
+      t.of[e.slopes][1] = y;
+    for (int k = 2; fresh && k < orders; k++) {
+      t.of[e.series][k] = 0;
+      if (e.slopes >= 0)
+        t.of[e.slopes][k] = 0;
     }
   }
 }
 
 // Coefficient k > 0 of a node from lower ones and those of its arguments; with `bounds` a bound of its
 // magnitude from theirs.
-template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_machine &m, int i, tape_values &t) {
-  const tape_node &n = m.node[i];
-  if (n.operation == tape_sum)
-    return sum_of_terms(m, n, t.first, t.now);
-  const vec &a = t.now[n.first], &b = t.now[n.second];
+template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_machine &m, const tape_operation &n,
+                                                        tape_values &t) {
   const series *of = t.of;
+  const vec &inverse = t.inverse[n.node];
+  auto a = [&] { return coefficient_at<k>(t, n.a); };
   auto less = [](vec x, vec y) { return bounds ? x + y : x - y; };
   switch (n.operation) {
+  case tape_sum:
+    return sum_of_parts<k>(m, n.first, n.count, t);
   case tape_add:
-    return a + b;
+    return a() + coefficient_at<k>(t, n.b);
   case tape_subtract:
-    return less(a, b);
+    return less(a(), coefficient_at<k>(t, n.b));
   case tape_multiply:
-    return products<k, 0, 0>(of[n.first_series], of[n.second_series]);
+    return products<k, 0, 0>(of[n.first], of[n.second]);
   case tape_scale:
-    return t.first[n.first] * b;
+    return t.first[n.steady] * coefficient_at<k>(t, n.b);
   case tape_divide:
-    return less(a, products<k, 0, 1>(of[n.series], of[n.second_series])) * t.inverse[i];
+    return less(a(), products<k, 0, 1>(of[n.own], of[n.second])) * inverse;
   case tape_divide_steady:
-    return a * t.inverse[i];
+    return a() * inverse;
   case tape_negative:
-    return bounds ? a : -a;
+    return bounds ? a() : -a();
   case tape_square:
-    return square_term<k>(of[n.first_series]);
+    return square_term<k>(of[n.first]);
   case tape_sqrt:
-    return less(a, products<k, 1, 1>(of[n.series], of[n.series])) * t.inverse[i];
+    return less(a(), products<k, 1, 1>(of[n.own], of[n.own])) * inverse;
   case tape_power:
-    return less(t.first[n.second] * products<k, 1, 0>(of[n.first_series], of[n.series]),
-                products<k, 1, 1>(of[n.second_series], of[n.slopes])) *
-           inverse_of[k] * t.inverse[i];
+    return less(t.first[n.steady] * products<k, 1, 0>(of[n.first], of[n.own]),
+                products<k, 1, 1>(of[n.second], of[n.slopes])) *
+           inverse_of[k] * inverse;
   case tape_exp:
   case tape_sin:
   case tape_tan:
   case tape_sinh:
   case tape_cosh:
   case tape_tanh:
-    return products<k, 1, 0>(of[n.first_series], of[n.second_series]) * inverse_of[k];
+    return products<k, 1, 0>(of[n.first], of[n.second]) * inverse_of[k];
   case tape_cos:
-    return products<k, 1, 0>(of[n.first_series], of[n.second_series]) *
-           (bounds ? inverse_of[k] : -inverse_of[k]);
+    return products<k, 1, 0>(of[n.first], of[n.second]) * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_sin_even:
-    return of[n.first_series][1] * of[n.second_series][k - 1] * inverse_of[k];
+    return of[n.first][1] * of[n.second][k - 1] * inverse_of[k];
   case tape_cos_even:
-    return of[n.first_series][1] * of[n.second_series][k - 1] * (bounds ? inverse_of[k] : -inverse_of[k]);
+    return of[n.first][1] * of[n.second][k - 1] * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_log:
   case tape_atan:
-    return less(a, products<k, 1, 1>(of[n.slopes], of[n.second_series]) * inverse_of[k]) * t.inverse[i];
+    return less(a(), products<k, 1, 1>(of[n.slopes], of[n.second]) * inverse_of[k]) * inverse;
   case tape_select:
-    return bounds ? larger(a, b) : pick(t.above[int(n.value)], a, b);
+    return bounds ? larger(a(), coefficient_at<k>(t, n.b)) : pick(t.above[n.steady], a(), coefficient_at<k>(t, n.b));
   case tape_select_slip:
-    return pick(t.slip > 0.0, a, b);
+    return pick(t.slip > 0.0, a(), coefficient_at<k>(t, n.b));
   default:
     return 0;
   }
+}
+
+// Coefficient k > 0 of the rate of a variable that varies.
+template <int k> LANE_LEAF vec rate_at(const tape_change &c, const tape_values &t) {
+  vec y = coefficient_at<k>(t, c.from);
+  return c.factor < 0 ? y : t.first[c.factor] * y;
+}
+
+LANE_LEAF void set_coefficient(const tape_change &c, vec *of, series *all, int k, vec y) {
+  of[k] = y;
+  if (c.slopes >= 0)
+    all[c.slopes][k] = y * double(k);
 }
 
 // Coefficients of the orders from k on; bounds go one order further. Loops whose length the compiler knows
 // need no guesses of the processor.
 template <int k, bool bounds> inline void raise_orders(const tape_machine &m, tape_values &t) {
   if constexpr (k < tape_order + bounds) {
-    for (int i = m.varying; i < m.nodes; i++) {
-      const tape_node &n = m.node[i];
-      vec y = n.operation == tape_variable ? t.of[n.first][k] : coefficient<k, bounds>(m, i, t);
-      t.now[i] = y;
-      if (n.series >= 0)
-        t.of[n.series][k] = y;
-      if (n.slopes >= 0)
-        t.of[n.slopes][k] = y * double(k);
+    for (const tape_operation *n = m.operation; n != m.operation + m.operations; n++) {
+      vec y = coefficient<k, bounds>(m, *n, t);
+      t.now[n->to.place + (n->to.moves & k)] = y;
+      if (n->slopes >= 0)
+        t.of[n->slopes][k] = y * double(k);
     }
     if constexpr (k < tape_order)
       for (int i = 0; i < m.variables; i++)
-        t.of[i][k + 1] = t.now[m.rate[i]] * (m.unit * inverse_of[k + 1]);
+        if (m.change[i].from.place >= 0)
+          set_coefficient(m.change[i], t.of[i], t.of, k + 1,
+                          rate_at<k>(m.change[i], t) * (m.unit * inverse_of[k + 1]));
     raise_orders<k + 1, bounds>(m, t);
   }
+}
+
+// The same of all orders above the first from the values at the state. `fresh`: nothing is known yet.
+template <bool bounds> LANE_LEAF void raise_all(const tape_machine &m, bool fresh, tape_values &t) {
+  for (int i = 0; i < m.variables; i++)
+    if (m.change[i].from.place >= 0)
+      set_coefficient(m.change[i], t.of[i], t.of, 1, t.first[m.rate[i]] * m.unit);
+  raise_even<bounds>(m, fresh, t);
+  raise_orders<1, bounds>(m, t);
 }
 
 // Series of the variables, and of all nodes whose series are kept, the last but one order included. `fresh`:
@@ -251,9 +333,7 @@ template <int k, bool bounds> inline void raise_orders(const tape_machine &m, ta
   evaluate(m, fresh ? 0 : m.by_slip, z, slip, crossed, t);
   for (int s = 0; s < m.switches; s++)
     t.of[m.decider_series[s]][tape_order] = 0;
-  for (int i = 0; i < m.variables; i++)
-    t.of[i][1] = t.first[m.rate[i]] * m.unit;
-  raise_orders<1, false>(m, t);
+  raise_all<false>(m, fresh, t);
 }
 
 } // namespace

@@ -152,7 +152,9 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
   for (int k = 0; k < orders; k++)
     power *= length;
   for (int i = 0; i < m.variables; i++) {
-    proof.rest[i] = g.box.series.now[m.rate[i]] * (power * (m.unit / orders));
+    proof.rest[i] = 0;
+    if (m.change[i].from.place >= 0)
+      proof.rest[i] = rate_at<tape_order>(m.change[i], g.box.series) * (power * (m.unit / orders));
     excess = larger(excess, proof.rest[i] / margin[i]);
   }
   sound = sound & (excess < 1e150);
@@ -170,7 +172,7 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
   for (int k = 1; k < tape_order; k++)
     power *= proof.length;
   for (int i = 0; i < m.switches; i++)
-    g.decider_error[i] = g.box.series.now[m.decider[i]] * power;
+    g.decider_error[i] = g.box.series.of[m.decider_series[i]][tape_order] * power;
 }
 
 // A variable at a fraction of the step.

@@ -76,6 +76,33 @@ struct tape_term {
   int node, factor;
 };
 
+// Where coefficient k of a node is in `tape_values`, in vectors: at `place`, or k further where `moves` is -1
+// (0: it stays).
+struct tape_operand {
+  int place, moves;
+};
+
+// What is done with a node in every order: as `tape_node`, with the node that does not vary (of a branch the
+// number of the switching function), or with `count` parts from number `first` on. `first`, `second` and
+// `own` are numbers of series.
+struct tape_operation {
+  int operation, node, steady, first, second, own, slopes, count;
+  tape_operand a, b, to;
+};
+
+// A node whose series follows from the state at once: a variable with the node `other` of its rate, a sum, or
+// a sine and the series `other` of its cosine, of an argument with `slopes`.
+struct tape_even {
+  int operation, node, series, slopes, other, unused;
+};
+
+// How the coefficients of a variable follow: from a node times one that does not vary (-1: none); `place` is
+// -1 where its rate does not vary.
+struct tape_change {
+  tape_operand from;
+  int factor, slopes;
+};
+
 // A node that may change more than its series shows, with the series of its argument, of a quotient that of
 // the divisor; its own series where it may be nearly constant (-1: its argument must not come near zero).
 struct tape_check {
@@ -106,6 +133,11 @@ struct tape_machine {
   tape_check check[most_tape_checks];
   tape_term term[most_tape_terms];
   tape_node node[most_tape_nodes];
+  int operations, evens;
+  tape_operation operation[most_tape_nodes];
+  tape_operand part[most_tape_terms];
+  tape_even even[most_tape_nodes];
+  tape_change change[most_tape_variables];
   // The time is counted in this unit [s]. Sizes of the variables for the length of a step.
   double unit, tolerance, sizes[most_tape_variables];
   // Boxes of variables (the phase takes any value), of every speed of the phase at every level of the others:
