@@ -8,7 +8,8 @@ module aperiodic
   use attractors, only: attractor_t, features_t, kind_chaotic, kind_family, kind_not_known, make_points, most_coordinates
   use capture, only: attractor_reached
   use circle, only: nearest_turn, point_near
-  use cycle, only: derivative, map_point, unattractive
+  use cycle, only: unattractive
+  use section_map, only: derivative, map_point
   use elementary, only: exponential, logarithm
   use exact_return, only: returns_t, watch_anew, watch_returns
   use kinds, only: int64, wp

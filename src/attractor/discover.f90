@@ -9,7 +9,8 @@ module discover
     make_points, most_coordinates, regime_at_rest, regime_non_impact
   use capture, only: attractor_reached, attractor_reached_at
   use circle, only: point_near
-  use cycle, only: map_point, refine_cycle
+  use cycle, only: refine_cycle
+  use section_map, only: map_point
   use exact_return, only: exact_cycle, returns_t, watch_returns
   use kinds, only: int64, wp
   use machine_type, only: machine_t, section_state_t

@@ -7,7 +7,9 @@
 module exact_return
   use attractors, only: attractor_t, longest_exact_period, make_points, most_coordinates
   use circle, only: point_near
-  use cycle, only: derivative, direction, directions, rings, scale_of, unattractive
+  use contraction, only: direction, directions, rings
+  use cycle, only: unattractive
+  use section_map, only: derivative, scale_of
   use kinds, only: int64, wp
   use machine_type, only: machine_t, section_state_t
   use matrices, only: eigenvalues

@@ -1,17 +1,17 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Capture neighbourhoods of cycles that are weakly damped, and of equilibria. The metric of `cycle` promises next to nothing in
-!> directions that the linear part turns before it shortens them, so that the slightest curvature of the map breaks the promise.
-!> Here the metric is one in which the linear part shortens all directions alike.
+!> Capture neighbourhoods of cycles that are weakly damped, and of equilibria. The metric that `cycle` takes promises next to
+!> nothing in directions that the linear part turns before it shortens them, so that the slightest curvature of the map breaks the
+!> promise. Here the metric is one in which the linear part shortens all directions alike.
 module wide_capture
-  use attractors, only: attractor_t, kind_rest, squared_distance
-  use cycle, only: back_substituted, contracting_metric, derivative, direction, directions, eigenvalue_bounds, &
-    least_eigenvalue, map_point, matrix_of, rests_at, rings, same_events
+  use attractors, only: attractor_t, kind_rest
+  use capture_metric, only: contracting_metric, eigenvalue_bounds, least_eigenvalue
+  use contraction, only: contracts, rests_at
   use kinds, only: wp
   use machine_type, only: machine_t
-  use matrices, only: cholesky
   use motion_state, only: tally_t
+  use section_map, only: derivative, map_point
   implicit none
   private
 
@@ -51,7 +51,8 @@ contains
     type(attractor_t), intent(inout) :: attractor
     type(tally_t) :: reference(attractor%period)
     type(attractor_t) :: wider
-    real(wp) :: image(attractor%coordinates), jacobian(attractor%coordinates, attractor%coordinates), radius
+    real(wp) :: image(attractor%coordinates), jacobian(attractor%coordinates, attractor%coordinates), radius, &
+      promised(attractor%period)
     integer :: i
     logical :: ok
     wider = attractor
@@ -67,11 +68,12 @@ contains
       ! A neighbour of an equilibrium never comes to rest.
       if (moving%undriven .and. reference(i)%slips == 0) reference(i)%sticks = 0
     end do
+    promised = 1 - asked*(1 - attractor%multiplier)
     radius = first_radius
     wider%capture_radius = 0
     do i = 1, most_steps
       if (attractor%kind /= kind_rest .and. radius > farthest*sqrt(least_eigenvalue(wider))) exit
-      if (.not. contracts(moving, wider, reference, radius)) exit
+      if (.not. contracts(moving, wider, reference, radius, promised, settles=.false.)) exit
       wider%capture_radius = radius
       radius = growth*radius
     end do
@@ -89,34 +91,5 @@ contains
       reach = min(reach, attractor%capture_radius/sqrt(bounds(2)))
     end do
   end function reach_of
-
-  !> Whether every start on the rings within `radius` is nearer after one period of the cycle.
-  pure logical function contracts(moving, attractor, reference, radius)
-    class(machine_t), intent(in) :: moving
-    type(attractor_t), intent(in) :: attractor
-    type(tally_t), intent(in) :: reference(:)
-    real(wp), intent(in) :: radius
-    real(wp) :: lower(attractor%coordinates, attractor%coordinates)
-    real(wp), dimension(attractor%coordinates) :: point, image
-    type(tally_t) :: tally
-    integer :: i, ring, k, n
-    logical :: ok
-    contracts = .false.
-    n = attractor%coordinates
-    do i = 1, attractor%period
-      lower = cholesky(matrix_of(attractor%metric(:, i), n))
-      do ring = 1, size(rings)
-        do k = 1, merge(2, max(directions, 4*n), n == 1)
-          point = attractor%points(:n, i) + attractor%scale(:n)*back_substituted(lower, rings(ring)*radius*direction(k, n))
-          if (point(1) > moving%upper .or. point(1) < moving%lower) cycle
-          call map_point(moving, point, attractor%period, image, tally, ok)
-          if (.not. ok .or. .not. same_events(tally, reference(i))) return
-          if (sqrt(squared_distance(attractor, i, image)) > (1 - asked*(1 - attractor%multiplier))*rings(ring)*radius &
-              + 1e-12_wp) return
-        end do
-      end do
-    end do
-    contracts = .true.
-  end function contracts
 
 end module wide_capture

@@ -5,6 +5,7 @@
 module law_check
   use angle_units, only: unit_of
   use build_multibody, only: is_multibody, multibody_of
+  use build_pair, only: is_pair, pair_of
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
@@ -21,7 +22,6 @@ module law_check
   use oscillator, only: refuse_pair
   use own_equations, only: build_own_equations
   use own_names, only: has_own
-  use pair, only: build_pair, is_pair, pair_t
   use restoring_law, only: position_is_angle
   use text, only: to_text
   implicit none
@@ -128,7 +128,6 @@ contains
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: laws(:)
     character(len=*), intent(in) :: at
-    type(pair_t) :: pair
     type(multibody_t) :: multibody
     type(error_t), allocatable :: error
     type(motor_system_t) :: system
@@ -140,7 +139,7 @@ contains
       if (.not. is_good(source, ['spring   ', 'structure'])) return
       call multibody_of(laws, multibody, error)
     else if (is_pair(laws)) then
-      call build_pair(laws, pair, error)
+      call pair_of(laws, multibody, error)
     else
       call refuse_pair(laws, error)
       if (.not. allocated(error)) call refuse_effects(laws, error)

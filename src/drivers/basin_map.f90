@@ -17,7 +17,7 @@ module basin_map
   use kinds, only: int64, wp
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
-  use pair, only: is_pair
+  use build_pair, only: is_pair
   use point_columns, only: marks_of_attractor, point_values
   use refined_tile, only: layers_of
   use refinement, only: automatic_block

@@ -16,7 +16,7 @@ module sweep_report
   use limit_kind, only: kind_not_known, last_limit_kind, limit_kinds
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int8
   use motor_choices, only: has_motor
-  use pair, only: is_pair
+  use build_pair, only: is_pair
   use restoring_law, only: position_is_angle
   use session, only: session_t
   use settling, only: marks_of_outcome

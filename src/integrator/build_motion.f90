@@ -5,6 +5,7 @@
 module build_motion
   use body_machine, only: body_machine_t, prepare_body
   use build_multibody, only: is_multibody, multibody_of
+  use build_pair, only: is_pair, pair_of
   use errors, only: error_t
   use multibody, only: multibody_t
   use multibody_machine, only: multibody_machine_t, set_structure
@@ -17,8 +18,6 @@ module build_motion
   use own_machine, only: own_machine_t, prepare_own_machine
   use own_names, only: has_own
   use oscillator, only: build_oscillator, oscillator_t
-  use pair, only: build_pair, is_pair, pair_t
-  use pair_as_structure, only: structure_of_pair
   implicit none
   private
 
@@ -85,20 +84,10 @@ contains
     if (is_multibody(laws)) then
       call multibody_of(laws, structure, error)
     else
-      call structure_of_two(laws, structure, error)
+      call pair_of(laws, structure, error)
     end if
     if (.not. allocated(error)) call set_structure(structure, options, machine)
   end subroutine bodies_of
-
-  !> The structure of two bodies that friction couples.
-  pure subroutine structure_of_two(laws, machine, error)
-    type(law_choice_t), intent(in) :: laws(:)
-    type(multibody_t), intent(out) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    type(pair_t) :: pair
-    call build_pair(laws, pair, error)
-    if (.not. allocated(error)) call structure_of_pair(pair, machine, error)
-  end subroutine structure_of_two
 
   !> Period of the section of the machine that `laws` describe [s].
   subroutine period_of(laws, period, error)

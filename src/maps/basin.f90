@@ -12,7 +12,7 @@ module basin
   use kinds, only: int64, wp
   use machine_type, only: machine_t
   use match, only: carry_labels, number_new, remember
-  use pair, only: is_pair
+  use build_pair, only: is_pair
   use point_columns, only: outcome_values
   use span_check, only: check_periods
   use status, only: exit_bad_case
