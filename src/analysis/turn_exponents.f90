@@ -17,6 +17,9 @@ module turn_exponents
 
   public :: exponents_of_turns
 
+  !> A direction that shrinks to less than this share of the longest in a turn is rounding.
+  real(wp), parameter :: digits_of_directions = 1e-13_wp
+
 contains
 
   !> Exponents of the motion from `start` (see `machine_t`), after `transient` turns, over `turns` (at least 32). `series` has the
@@ -44,10 +47,11 @@ contains
       if (spectrum%reason == reason_not_smooth .and. i < 1) then
         ! What a transient meets does not matter: the directions begin anew.
         call begin_frame(frame)
-        left = size(point) - 1
         call pass_turn(machines, point, spectrum%reason)
       end if
       if (spectrum%reason /= 0) return
+      ! Nor what it loses.
+      if (i < 1) left = size(point) - 1
       if (i < 1) cycle
       duration = duration + events(size(events))%time
       part = 1 + int((int(i - 1, int64)*batches)/turns)
@@ -117,6 +121,8 @@ contains
       end do
       frame = matmul(by_start, frame)
       call orthogonalise(frame, growth)
+      ! An integral that was held, or a current that follows at once, leaves nothing of a direction but rounding.
+      left = min(left, count(growth > digits_of_directions*maxval(growth)))
       point = image
     end associate
   end subroutine advance_frame

@@ -99,7 +99,8 @@ contains
       associate (value => spectrum%exponents(i), error => spectrum%errors(i))
         if (value < -huge(1.0_wp)/2) then
           call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': -inf (a direction is lost: sticking, '// &
-                                    'completed chatter, or impacts without rebound)', '"number": '//to_text(i)//', "value": null')
+                                    'completed chatter, impacts without rebound, or, of a motor, a held integral or a fast '// &
+                                    'current)', '"number": '//to_text(i)//', "value": null')
         else
           call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': '//to_text(value, 6)//' 1/s, standard '// &
             'error '//to_text(error, 2), '"number": '//to_text(i)//', "value": '//json_number(value)//', "error": '// &

@@ -259,7 +259,7 @@ contains
     else if (spectrum%reason == reason_left_domain) then
       why = 'the motion leaves the domain (run.domain)'
     else
-      why = 'the motion met an event tangentially, rests where nothing holds it, or is at the limit of a torque'
+      why = 'the motion met an event tangentially, or rests where nothing holds it'
     end if
   end function why_not_known
 

@@ -8,7 +8,7 @@ module motor_now
   use motion_state, only: mode_slip_minus, state_t
   use motor_state, only: motor_state_t
   use motor_system, only: motor_system_t, y_at
-  use motor_torque, only: set_piece
+  use motor_torque, only: set_limits, set_piece
   use tape_value, only: evaluate
   implicit none
   private
@@ -44,11 +44,7 @@ contains
     parameters(system%turning) = crank%turning
     associate (control => system%control)
       if (control%supply > 0 .and. .not. crank%ramps) parameters(control%ramp_rate) = 0
-      if (control%torque_limit > 0) then
-        parameters(control%follows) = merge(1, 0, crank%limited == 0)
-        parameters(control%limited) = crank%limited
-        parameters(control%integrates) = merge(1, 0, crank%held == 0)
-      end if
+      if (control%torque_limit > 0) call set_limits(control, crank%limited, crank%held, parameters)
       if (control%curve%count > 0) call set_piece(control, crank%piece, parameters)
     end associate
   end function parameters_now

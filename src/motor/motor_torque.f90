@@ -11,7 +11,7 @@ module motor_torque
   implicit none
   private
 
-  public :: add_motor, set_piece
+  public :: add_motor, set_limits, set_piece
 
   !> Guards of a motor, by name.
   character(len=*), parameter, public :: control_guards(8) = [character(len=13) :: 'ramp_end', 'limit_up', 'limit_down', &
@@ -25,8 +25,8 @@ module motor_torque
     real(wp) :: from = 0, to = 0, rate = 0
     !> Largest torque of a speed control [N m], and the integral that gives it alone [rad]; 0: none.
     real(wp) :: torque_limit = 0, largest_integral = 0
-    !> Node of the torque that a limited control asks for.
-    integer :: command = 0
+    !> Nodes of a limited control: the torque that it asks for, and the reference less the speed.
+    integer :: command = 0, miss = 0
     !> Table of the torque, and its polynomials.
     type(curve_t) :: curve
     real(wp) :: pieces(0:3, 0:most_knots) = 0
@@ -137,6 +137,7 @@ contains
     call define(sheet, 'integral_down', 'integral*y + torque_limit')
     call define(sheet, 'resume', 'w - reference')
     control%command = node_of(sheet, 'command')
+    control%miss = node_of(sheet, 'miss')
     control%follows = parameter_number(sheet, 'follows')
     control%limited = parameter_number(sheet, 'limited')
     control%integrates = parameter_number(sheet, 'integrates')
@@ -164,6 +165,16 @@ contains
     call define(sheet, 'piece_down', 'w - piece_low')
     call set_piece(control, piece_at(control%curve, 0.0_wp), sheet%parameters)
   end subroutine add_table
+
+  !> The parameters of a torque and of an integral at a limit (1, -1) or not (0).
+  pure subroutine set_limits(control, limited, held, parameters)
+    type(motor_control_t), intent(in) :: control
+    integer, intent(in) :: limited, held
+    real(wp), intent(inout) :: parameters(:)
+    parameters(control%follows) = merge(1, 0, limited == 0)
+    parameters(control%limited) = limited
+    parameters(control%integrates) = merge(1, 0, held == 0)
+  end subroutine set_limits
 
   !> The parameters of a piece of the table.
   pure subroutine set_piece(control, piece, parameters)

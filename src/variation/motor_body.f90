@@ -4,7 +4,6 @@
 !> A body with a motor as a hybrid machine without a clock. Its state is x [m], crank angle [rad], v [m/s], crank speed [rad/s], and
 !> current [A] or integral [rad]. The section, the passage of the crank through a turn, is the last event of every cycle.
 module motor_body
-  use curve_law, only: piece_at
   use guards, only: turns_round
   use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
   use constants, only: two_pi
@@ -13,7 +12,7 @@ module motor_body
   use machine_type, only: section_state_t
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, mode_lower_barrier, mode_stick, mode_upper_barrier, state_t, tally_t
-  use motor_flow, only: add_slopes, fly_on, motor_flow_t, new_flow, rates_at
+  use motor_flow, only: add_slopes, fly_on, motor_flow_t, new_flow, rates_at, with_piece
   use motor_machine, only: motor_machine_t
   use motor_system, only: body_held, both_move
   use motor_now, only: parameters_now
@@ -149,12 +148,11 @@ pure function motor_body_of(machine, sizes) result(body)
   end associate
 end function motor_body_of
 
- !> The crank of a state.
+ !> The crank of a state; the flights know the piece of its motor.
 pure type(motor_state_t) function crank_in(self, y) result(crank)
   class(motor_body_t), intent(in) :: self
   real(wp), intent(in) :: y(:)
-  crank = motor_state_t(phi=y(angle_of), w=y(speed_of), turning=merge(-1, 1, y(speed_of) < 0), &
-                        piece=piece_at(self%machine%motor%system%control%curve, y(speed_of)))
+  crank = motor_state_t(phi=y(angle_of), w=y(speed_of), turning=merge(-1, 1, y(speed_of) < 0))
   if (self%n == own_of) crank%own(1) = y(own_of)
 end function crank_in
 
@@ -264,7 +262,7 @@ pure subroutine release_margin(self, side, y, margin, by_state)
   z = 0
   z(self%order) = y
   associate (system => self%machine%motor%system)
-    call evaluate(self%flows(2)%tape, z, parameters_in(self, mode_stick, y), value, fault)
+    call evaluate(self%flows(2)%tape, z, with_piece(self%flows(2), z, parameters_in(self, mode_stick, y)), value, fault)
     margin = system%body_level - side*value(system%body_hold(body_held))
     slopes = value(self%hold_slopes)
     by_state = -side*slopes(self%order)

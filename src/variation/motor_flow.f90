@@ -4,10 +4,10 @@
 !> Flights of a machine with a motor between events, forwards or back, with their derivatives by the start: Taylor series of the
 !> equations and of their variational equations on one tape.
 module motor_flow
-  use curve_law, only: piece_at
   use kinds, only: wp
-  use motor_system, only: motor_system_t, w_at
-  use motor_torque, only: motor_control_t, set_piece
+  use motor_pieces, only: motor_piece_t, piece_of, set_parameters, stop_at_piece, value_of
+  use motor_system, only: motor_system_t, w_at, y_at
+  use motor_torque, only: motor_control_t
   use operations, only: op_add, op_multiply
   use series_flight, only: series_order
   use tape, only: constant, tape_t, variable
@@ -21,10 +21,8 @@ module motor_flow
 
   !> Steps after which a flight is given up: a turn takes some twenty.
   integer, parameter :: most_steps = 20000
-  !> Parts of a step at whose ends the speed is compared with the knots of a table.
-  integer, parameter :: parts = 16
 
-  public :: add_slopes, fly_on, new_flow, rates_at
+  public :: add_slopes, fly_on, new_flow, rates_at, with_piece
 
   !> A system z' = f(z) on its own tape, and that of z and of its derivatives by the start, one column after the other.
   type, public :: motor_flow_t
@@ -34,7 +32,7 @@ module motor_flow
     integer :: n = 0
     !> Nodes of variables and of their rates.
     integer, allocatable :: states(:), rates(:)
-    !> A table of the torque: its polynomial changes from piece to piece, continuously and with its slope.
+    !> Its equations change from piece to piece.
     type(motor_control_t) :: control
   end type motor_flow_t
 
@@ -83,13 +81,25 @@ contains
     end do
   end subroutine add_slopes
 
+  !> The parameters in the piece of the motor in which a state is.
+  pure function with_piece(flow, z, parameters) result(now)
+    type(motor_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: now(size(parameters)), value(flow%plain%count)
+    integer :: fault(flow%plain%count)
+    now = parameters
+    if (flow%control%curve%count == 0 .and. flow%control%command == 0) return
+    call evaluate(flow%plain, z, parameters, value, fault)
+    call set_parameters(flow%control, piece_of(flow%control, z, value), now)
+  end function with_piece
+
   !> Rates of the variables.
   pure function rates_at(flow, z, parameters) result(rates)
     type(motor_flow_t), intent(in) :: flow
     real(wp), intent(in) :: z(:), parameters(:)
     real(wp) :: rates(flow%n), value(flow%plain%count)
     integer :: fault(flow%plain%count)
-    call evaluate(flow%plain, z, parameters, value, fault)
+    call evaluate(flow%plain, z, with_piece(flow, z, parameters), value, fault)
     rates = value(flow%rates(:flow%n))
   end function rates_at
 
@@ -127,88 +137,47 @@ contains
     real(wp), intent(in) :: parameters(:), scales(:), duration
     real(wp), intent(inout) :: z(:)
     type(series_t) :: series
-    real(wp) :: left, step, now(size(parameters))
-    integer :: fault, i, k, piece
-    associate (states => flow%states(:count), control => flow%control)
+    type(motor_piece_t) :: piece, next
+    real(wp) :: left, step, now(size(parameters)), value(flow%plain%count)
+    integer :: node_faults(flow%plain%count), fault, i, k
+    associate (states => flow%states(:count))
       call prepare_series(tape, series_order, flow%rates(:count), [integer ::], [integer ::], series)
       left = duration
       now = parameters
-      if (control%curve%count > 0) piece = piece_at(control%curve, z(w_at))
+      call evaluate(flow%plain, z(:flow%n), now, value, node_faults)
+      piece = piece_of(flow%control, z, value)
+      if (piece%held /= 0) call hold_integral(flow, piece%held, z)
       do i = 1, most_steps
         if (.not. abs(left) > 0) return
-        if (control%curve%count > 0) call set_piece(control, piece, now)
+        call set_parameters(flow%control, piece, now)
         call expand(tape, z, now, series, fault)
         if (fault /= 0) exit
         step = step_of(series%c(:, states), max(scales, abs(z)))
         if (step >= abs(left)) step = abs(left)
         step = sign(step, left)
-        if (control%command > 0) then
-          if (passes_limit(control, series%c(:, control%command), step)) exit
-        end if
-        if (control%curve%count > 0) call stop_at_knot(control, series%c(:, states(w_at)), step, piece)
+        call stop_at_piece(flow%control, series%c, [states(w_at), states(min(y_at, count))], step, piece, next)
         do k = 1, count
           z(k) = value_of(series%c(:, states(k)), step)
         end do
+        if (next%held /= piece%held .and. next%held /= 0) call hold_integral(flow, next%held, z)
+        piece = next
         left = left - step
       end do
     end associate
     if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
   end subroutine take_steps
 
-  !> Whether the torque of a control, with the coefficients `c`, is beyond its limit within a step: variations there are not known.
-  pure logical function passes_limit(control, c, step) result(passes)
-    type(motor_control_t), intent(in) :: control
-    real(wp), intent(in) :: c(0:), step
-    integer :: i
-    passes = .false.
-    do i = 0, parts
-      passes = passes .or. abs(value_of(c, step*i/parts)) > control%torque_limit
+  !> The integral where it is held: nothing of what it was before is left in it.
+  pure subroutine hold_integral(flow, side, z)
+    type(motor_flow_t), intent(in) :: flow
+    integer, intent(in) :: side
+    real(wp), intent(inout) :: z(:)
+    integer :: k
+    z(y_at) = side*flow%control%largest_integral
+    do k = flow%n + y_at, size(z), flow%n
+      z(k) = 0
     end do
-  end function passes_limit
-
-  !> Shortens a step to where the speed, with the coefficients `c`, leaves the piece of a table, which is then the next one.
-  pure subroutine stop_at_knot(control, c, step, piece)
-    type(motor_control_t), intent(in) :: control
-    real(wp), intent(in) :: c(0:)
-    real(wp), intent(inout) :: step
-    integer, intent(inout) :: piece
-    real(wp) :: inside, beyond, middle
-    integer :: i, way
-    do i = 1, parts
-      way = side_of(control, piece, value_of(c, step*i/parts))
-      if (way == 0) cycle
-      inside = step*(i - 1)/parts
-      beyond = step*i/parts
-      do
-        middle = (inside + beyond)/2
-        if (.not. (abs(middle - inside) > 0 .and. abs(middle - beyond) > 0)) exit
-        if (side_of(control, piece, value_of(c, middle)) == 0) then
-          inside = middle
-        else
-          beyond = middle
-        end if
-      end do
-      step = beyond
-      piece = piece + way
-      return
-    end do
-  end subroutine stop_at_knot
-
-  !> Whether a speed is below (-1) or above (1) a piece of the table.
-  pure integer function side_of(control, piece, w) result(side)
-    type(motor_control_t), intent(in) :: control
-    integer, intent(in) :: piece
-    real(wp), intent(in) :: w
-    side = 0
-    associate (curve => control%curve)
-      if (piece > 0) then
-        if (w < curve%at(piece)) side = -1
-      end if
-      if (piece < curve%count) then
-        if (w > curve%at(piece + 1)) side = 1
-      end if
-    end associate
-  end function side_of
+  end subroutine hold_integral
 
   !> The step whose last two terms are rounding (Jorba & Zou 2005).
   pure real(wp) function step_of(c, scales) result(step)
@@ -221,14 +190,5 @@ contains
       if (share > 0) step = min(step, (epsilon(1.0_wp)/4/share)**(1.0_wp/k))
     end do
   end function step_of
-
-  pure real(wp) function value_of(c, t) result(value)
-    real(wp), intent(in) :: c(0:), t
-    integer :: k
-    value = 0
-    do k = ubound(c, 1), 0, -1
-      value = value*t + c(k)
-    end do
-  end function value_of
 
 end module motor_flow
