@@ -188,24 +188,24 @@ contains
     type(series_t) :: series
     real(wp), dimension(load%tape%count) :: value, sizes
     real(wp) :: size_of
-    integer :: faults(load%tape%count), i, k, fault
+    integer :: faults(load%tape%count), nodes(size(branches)), i, k, fault
     call evaluate(load%tape, variables, load%parameters, value, faults)
-    associate (nodes => load%tape%switches%argument)
-      branches = merge(1, -1, value(nodes) >= 0)
-      sizes = sizes_of_nodes(load%tape, value)
-      do i = 1, size(branches)
-        associate (node => load%tape%nodes(nodes(i)))
-          size_of = max(sizes(nodes(i)), maxval(abs(value([nodes(i), max(node%first, 1), max(node%second, 1)]))))
-        end associate
-        ! Events are found to 64 units of rounding of the sizes at the start of a flight.
-        if (abs(value(nodes(i))) > 256*epsilon(1.0_wp)*size_of) cycle
-        call prepare_series(load%tape, 3, load%rates, nodes, branches, series)
-        call expand(load%tape, variables, load%parameters, series, fault)
-        if (fault /= 0) return
-        k = findloc(abs(series%c(1:, nodes(i))) > 0, .true., 1)
-        if (k > 0) branches(i) = merge(1, -1, series%c(k, nodes(i)) > 0)
-      end do
-    end associate
+    ! Copied: GNU Fortran 12 takes an associated component of an array for contiguous where that is a subscript.
+    nodes = load%tape%switches%argument
+    branches = merge(1, -1, value(nodes) >= 0)
+    sizes = sizes_of_nodes(load%tape, value)
+    do i = 1, size(branches)
+      associate (node => load%tape%nodes(nodes(i)))
+        size_of = max(sizes(nodes(i)), maxval(abs(value([nodes(i), max(node%first, 1), max(node%second, 1)]))))
+      end associate
+      ! Events are found to 64 units of rounding of the sizes at the start of a flight.
+      if (abs(value(nodes(i))) > 256*epsilon(1.0_wp)*size_of) cycle
+      call prepare_series(load%tape, 3, load%rates, nodes, branches, series)
+      call expand(load%tape, variables, load%parameters, series, fault)
+      if (fault /= 0) return
+      k = findloc(abs(series%c(1:, nodes(i))) > 0, .true., 1)
+      if (k > 0) branches(i) = merge(1, -1, series%c(k, nodes(i)) > 0)
+    end do
   end subroutine load_branches
 
   !> All forces on the coordinates but those of constraints [N]; with `rate` their rates of change for the accelerations

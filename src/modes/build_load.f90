@@ -10,6 +10,7 @@ module build_load
   use expression_names, only: has_name
   use expression_text, only: read_expression
   use kinds, only: wp
+  use law_row, only: none_above
   use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_kind, part_law, path_of, rows_of, text_of, &
     value_of
   use multibody, only: joint_t, load_t, multibody_t, source_t
@@ -135,7 +136,7 @@ contains
       rows = rows_of(choices(k))
       do r = 1, size(rows)
         if (rows(r)%list .or. is_hidden(rows(r))) cycle
-        if (.not. abs(choices(k)%parameters(r)%values(1)) < huge(1.0)) cycle
+        if (abs(choices(k)%parameters(r)%values(1)) >= none_above) cycle
         load%parameters = [load%parameters, choices(k)%parameters(r)%values(1)]
         call parameter_node(load%tape, size(load%parameters), node)
         call add_name(names, path_of(choices(k))//'.'//trim(rows(r)%name), node)
@@ -224,7 +225,10 @@ contains
     real(wp) :: numbers(4)
     do i = 1, size(choices)
       if (.not. any(choices(i)%name == [character(len=label_length) :: 'spring:linear', 'spring:polynomial'])) cycle
-      if (.not. has_name(text, path_of(choices(i)))) cycle
+      if (.not. has_name(text, path_of(choices(i)))) then
+        call add_name(names, path_of(choices(i)), 1)
+        cycle
+      end if
       source%row = row_of(rows, choices(i))
       source%offset%mean = -value_of(choices(i), 'free_length')
       call add_source(source, ['m  ', 'm/s'], load, names, at(:2))
@@ -253,7 +257,10 @@ contains
     integer :: i, nodes(2)
     do i = 1, size(choices)
       if (index(choices(i)%name, 'contact:') /= 1) cycle
-      if (.not. has_name(text, path_of(choices(i)))) cycle
+      if (.not. has_name(text, path_of(choices(i)))) then
+        if (index(part_law(choices(i)%name), 'newton') /= 1) call add_name(names, path_of(choices(i)), 1)
+        cycle
+      end if
       if (index(part_law(choices(i)%name), 'newton') == 1) then
         call fail(error, exit_bad_case, 'found '//path_of(choices(i))//', which is rigid; allowed soft contacts, whose force '// &
                   'follows from the penetration')

@@ -19,13 +19,14 @@ module motor_motion
   use motor_log, only: add_sample, motor_energy, record_motor_event
   use motor_modes, only: begin_mode, keep_angle
   use motor_now, only: restitution_of
+  use motor_reason, only: reason_of_flight
   use motor_rest, only: chatter_dies_out, choose_body, choose_crank, enters_stop, hold_without_room, slips, turns_at_section
   use motor_state, only: motor_state_t
   use motor_system, only: guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
     guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t, y_at
   use own_equations, only: build_own_equations
-  use series_flight, only: advance_flight, change_branches, flight_crossed, flight_left_domain, flight_no_progress, &
-    flight_reached, flight_step_budget, flight_t, flight_wrong_branch
+  use series_flight, only: advance_flight, change_branches, flight_crossed, flight_left_domain, flight_reached, &
+    flight_step_budget, flight_t, flight_wrong_branch
   use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
     reason_step_failed
   use stored_jumps, only: add_jump, keep_stored
@@ -161,9 +162,10 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp) :: until, at_switch
+    real(wp) :: until, at_switch, began(moving%system%variables)
     integer :: status, fault, idle
     call begin_mode(moving%system, state, crank, tally%needs_v_max, merge(1, 0, present(log)), flight, fault)
+    began = flight%state(:size(began))
     status = merge(flight_left_domain, flight_reached, fault > 0)
     if (fault < 0) status = flight_wrong_branch
     if (fault == 0) call add_jump(moving%system, flight, state, crank, log)
@@ -194,9 +196,7 @@ contains
     end do
     tally%steps = tally%steps + flight%steps
     tally%v_max = max(tally%v_max, state%v)
-    if (status == flight_step_budget) reason = reason_step_budget
-    if (status == flight_left_domain .or. status == flight_no_progress) reason = reason_step_failed
-    if (status == flight_wrong_branch) reason = reason_mode_cycle
+    reason = reason_of_flight(status, flight, began)
   end subroutine fly
 
   !> Goes on with the other branches of forces where their switching functions crossed zero; no branch fits where that happens

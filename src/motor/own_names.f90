@@ -8,9 +8,9 @@ module own_names
   use errors, only: error_t, fail
   use expression_text, only: read_expression
   use kinds, only: wp
+  use law_row, only: none_above
   use law_table, only: law_choice_t, parameter_row_t, part_family, path_of, rows_of, text_of
   use law_texts, only: is_own
-  use motor_system, only: far
   use operations, only: op_select, op_variable, operation_table
   use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
   use status, only: exit_bad_case
@@ -75,7 +75,7 @@ contains
       rows = rows_of(choices(i))
       do k = 1, size(rows)
         if (rows(k)%list) cycle
-        if (abs(choices(i)%parameters(k)%values(1)) >= far) cycle
+        if (abs(choices(i)%parameters(k)%values(1)) >= none_above) cycle
         sheet%parameters = [sheet%parameters, choices(i)%parameters(k)%values(1)]
         call parameter_node(sheet%tape, size(sheet%parameters), node)
         call add_known(names, path_of(choices(i))//'.'//trim(rows(k)%name), node)
