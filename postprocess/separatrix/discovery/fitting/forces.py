@@ -10,7 +10,8 @@ state follows from Dahl's equation, which has a closed form between turning poin
 import numpy as np
 
 from separatrix.discovery.measured.driven import Driven
-from separatrix.discovery.measured.preflight import even_interval
+from separatrix.discovery.measured.preflight import Prepared, even_interval
+from separatrix.discovery.measured.thinned_force import thinned
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
@@ -98,13 +99,24 @@ def _value(model, values: dict[str, float], path: str) -> float:
     return float(model.parameters[path].value) if path in model.parameters else 0.0
 
 
-def force_argument(record, first: np.ndarray):
+def force_argument(prepared: Prepared, first: np.ndarray, mass: float):
     """Force of a record for segments that begin at the offsets `first`, in samples.
 
     Time is counted in samples, so that offsets in the force are right after a gap too. One more sample leaves
-    room for the last times, which need not be quite even.
+    room for the last times, which need not be quite even. A force that changes little between samples is
+    thinned, as far as a body of the `mass` [kg] moves within a share of the noise as under all samples.
     """
+    record = prepared.record
     if record.force is None:
         return None
     interval = even_interval(record)
-    return first * interval, interval, np.append(record.force, record.force[-1])
+    series = np.append(record.force, record.force[-1])
+    if len(record.pieces) > 1:
+        # across a gap nothing is known of the force
+        return first * interval, interval, series
+    spread = float(np.min(prepared.samples.spread(prepared.memory)))
+    position = FIT.tolerance_share * prepared.sigma * spread
+    speed = np.inf if record.v is None else FIT.tolerance_share * prepared.velocity_sigma * spread
+    if prepared.thinned is None or prepared.thinned[0] != (position, speed, mass):
+        prepared.thinned = ((position, speed, mass), thinned(series, interval, mass, position, speed))
+    return first * interval, *prepared.thinned[1]

@@ -148,10 +148,12 @@ class BodyInMotion(OneBody):
         prepared, part = self.prepared[number], super()._part(number)
         fitted = prepared.samples
         first = self.segments.first[part["rows"]]
+        parameters = self.model.parameters
+        mass = parameters["body.mass"].value if "body.mass" in parameters else 1.0
         return part | {
             "x": fitted.x[part["samples"]],
             "v": None if fitted.v is None else fitted.v[part["samples"]],
-            "force": force_argument(prepared.record, fitted.offset[first]),
+            "force": force_argument(prepared, fitted.offset[first], mass),
             "tolerance": flight_tolerance(prepared),
         }
 

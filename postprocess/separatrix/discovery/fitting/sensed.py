@@ -230,6 +230,9 @@ def gather_sensed(
             if sensor.kind in "xv"
         }
         bodies.append(seen)
+        for name, moved in seen.items():
+            if name[0] == "x":
+                one.leave_out(moved.impacts)
         calm.append(_calm(structure, record.t, seen))
         unseen = sum(name[0] == "x" for name in seen) < structure.n
         share = max(periods, FIT.unseen_periods) if unseen else periods

@@ -50,6 +50,8 @@ class Prepared:
     samples: Samples | None = None
     # the known motion, where the force is compared
     driven: Driven | None = None
+    # the measured force on fewer knots (interval, samples), and what that was allowed to change
+    thinned: tuple[tuple[float, float, float], tuple[float, np.ndarray]] | None = None
 
     # key of the header that states the noise; whether the mass is nearly that of the case
     noise_key: ClassVar[str] = "sensor_noise_sigma_m"

@@ -12,10 +12,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from separatrix.discovery.measured.bodies import Structure, structure_of
+from separatrix.discovery.measured.condense import whole
 from separatrix.discovery.measured.preflight import Prepared, check_periods, from_measured_angle
 from separatrix.discovery.measured.records import Record
 from separatrix.discovery.measured.signals import resolution_of, white_noise
 from separatrix.discovery.measured.smoother import Smoothed, smooth
+from separatrix.discovery.measured.thinned_record import (
+    block_length,
+    means_of,
+    smooth_rows,
+    thinned_record,
+)
 from separatrix.discovery.policy import RECORDS
 from separatrix.errors import SeparatrixError
 from separatrix.library import Model
@@ -45,6 +52,8 @@ class SensedPrepared(Prepared):
     """A record of several sensors; `sigma` is the noise of the first."""
 
     sensors: list[Sensor] = field(default_factory=list)
+    # samples of which a row is the mean
+    block: int = 1
 
     @property
     def observed(self) -> str:
@@ -76,6 +85,14 @@ class SensedPrepared(Prepared):
     def smoothed(self, sensor: Sensor, period: float) -> Smoothed:
         """Smooth what a sensor of position or speed shows."""
         return smooth(self.record.t, sensor.values, sensor.sigma, period)
+
+    def leave_out(self, impacts: np.ndarray) -> None:
+        """Do not compare the rows of a thinned record between which, or in which, an impact lies."""
+        if self.block == 1 or not impacts.size:
+            return
+        beside = (impacts[:, None] + np.arange(-1, 3)).clip(0, self.record.t.size - 1)
+        for one in self.sensors:
+            one.known[beside] = False
 
     def sensor(self, name: str) -> Sensor | None:
         """The sensor of a column, if this record has it."""
@@ -118,7 +135,36 @@ def prepare_sensors(record: Record, model: Model, rest: Record | None = None) ->
     )
     prepared.drive_scale = record.header.get("drive_scale", 1.0)
     _find_drive(prepared, model)
+    _thin(prepared)
     return prepared
+
+
+def _thin(prepared: SensedPrepared) -> None:
+    """Replace a record that is sampled far faster than it moves by one with fewer rows."""
+    record, sensors = prepared.record, prepared.sensors
+    sigmas = {one.name: one.sigma for one in sensors}
+    # means of values on a grid that is coarser than the noise are no finer
+    if any(resolution_of(one.values) > one.sigma for one in sensors):
+        return
+    columns = {one.name: one.values for one in sensors}
+    size = block_length(record, columns, sigmas)
+    if size == 1:
+        return
+    means = {one.name: means_of(record, one.values, size) for one in sensors}
+    known = np.all([smooth_rows(means[one.name], one.sigma / np.sqrt(size)) for one in sensors], axis=0)
+    thin = prepared.record = thinned_record(record, size)
+    watched = {"x": thin.x, "v": thin.v}
+    for one in sensors:
+        one.values = thin.sensors.get(one.name, watched.get(one.kind))
+        # noise with memory is not as much smaller
+        one.sigma = max(one.sigma / np.sqrt(size), white_noise(one.values))
+        one.known = known.copy()
+    prepared.block, prepared.samples, prepared.sigma = size, whole(thin), sensors[0].sigma
+    prepared.resolution /= np.sqrt(size)
+    prepared.notes.append(
+        f"{record.t.size} samples, fitted as {thin.t.size} values, each of {size}: in "
+        f"{np.count_nonzero(~known)} of them the motion jumps, and they are not compared"
+    )
 
 
 def _check_impacts(record: Record, structure: Structure) -> None:

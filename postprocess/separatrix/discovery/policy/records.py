@@ -113,6 +113,10 @@ class Records:
     chunk: int = row(1_000_000, "byte", "effort", "bytes that are looked at together")
     # measured/tdms.py
     beside_burst: float = row(0.5, "interval", "rig", "distance of a burst from the end of the last one")
+    # measured/thinned_record.py
+    thinned_rows: int = row(4000, "1", "effort", "rows to which a record of several bodies is thinned")
+    rough: float = row(5.0, "1", "test", "fourth difference of means over its noise that is rough")
+    most_rough: float = row(0.1, "1", "test", "share of rows that may be rough")
     # workflow.py
     held_out_end: float = row(0.3, "1", "campaign", "share of an only record that is held out")
     held_out_periods: float = row(2.05, "period", "campaign", "drive periods that it has at least")
