@@ -45,7 +45,7 @@ contains
     type(law_choice_t), intent(in) :: laws(:)
     type(point_list_t), intent(out) :: list
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: text, line
+    character(len=:), allocatable :: text, line, unit
     real(wp), allocatable :: row(:)
     integer, allocatable :: columns(:)
     integer :: number, width
@@ -66,6 +66,7 @@ contains
                 ': found a byte that is no text, allowed UTF-8')
       return
     end if
+    unit = ' '//unit_of('m', position_is_angle(laws))
     number = 0
     from = 1
     if (starts_with(text, byte_order_mark)) from = 1 + len(byte_order_mark)
@@ -80,8 +81,7 @@ contains
         call read_header(path, number, line, laws, columns, list%names, width, error)
         if (.not. allocated(error)) list%further = reshape([real(wp) ::], [size(list%names), 0])
       else
-        call read_row(path, number, line, columns, list%names, width, default_ratio, contact, ' '//unit_of('m', &
-          position_is_angle(laws)), row, error)
+        call read_row(path, number, line, columns, list%names, width, default_ratio, contact, unit, row, error)
         if (.not. allocated(error)) call append(list, row)
       end if
       if (allocated(error)) exit
@@ -169,14 +169,12 @@ contains
     character(len=*), intent(in) :: unit
     real(wp), allocatable, intent(out) :: row(:)
     type(error_t), allocatable, intent(out) :: error
-    character(len=name_length) :: names(size(columns))
-    character(len=:), allocatable :: where_found, word
+    character(len=:), allocatable :: word
     integer :: k, status
-    where_found = path//':'//to_text(number)//': '
-    names = [character(len=name_length) :: 'x0', 'v0', 'ratio', further]
-    row = [0.0_wp, 0.0_wp, default_ratio, spread(0.0_wp, 1, size(further))]
+    allocate (row(size(columns)), source=0.0_wp)
+    row(3) = default_ratio
     if (count_fields(line) /= width) then
-      call fail(error, exit_bad_case, where_found//'found '//to_text(count_fields(line))//' values, the header has '// &
+      call fail(error, exit_bad_case, where_found()//'found '//to_text(count_fields(line))//' values, the header has '// &
                 to_text(width)//' columns')
       return
     end if
@@ -185,18 +183,35 @@ contains
       word = field(line, columns(k))
       call parse_number(word, row(k), status)
       if (status /= 0) then
-        call fail(error, exit_bad_case, where_found//trim(names(k))//": found '"//word//"', allowed a finite number")
+        call fail(error, exit_bad_case, where_found()//name_of(k)//": found '"//word//"', allowed a finite number")
         return
       end if
     end do
     if (beyond_barrier(contact, row(1))) then
-      call fail(error, exit_bad_case, where_found//'x0: found '//to_text(row(1))//unit// &
+      call fail(error, exit_bad_case, where_found()//'x0: found '//to_text(row(1))//unit// &
                 ', allowed '//between_barriers(contact, unit))
     else if (columns(3) > 0 .and. .not. row(3) > 0) then
-      call fail(error, exit_bad_case, where_found//'ratio: found '//to_text(row(3))//', allowed a number above 0')
+      call fail(error, exit_bad_case, where_found()//'ratio: found '//to_text(row(3))//', allowed a number above 0')
     else if (columns(3) > 0 .and. .not. default_ratio > 0) then
-      call fail(error, exit_bad_case, where_found//'ratio: the drive of the case has no ratio')
+      call fail(error, exit_bad_case, where_found()//'ratio: the drive of the case has no ratio')
     end if
+
+  contains
+
+    !> Texts cost more than the numbers of a row: they are made where one is to be shown.
+    function where_found()
+      character(len=:), allocatable :: where_found
+      where_found = path//':'//to_text(number)//': '
+    end function where_found
+
+    function name_of(column)
+      integer, intent(in) :: column
+      character(len=:), allocatable :: name_of
+      character(len=name_length) :: names(size(columns))
+      names = [character(len=name_length) :: 'x0', 'v0', 'ratio', further]
+      name_of = trim(names(column))
+    end function name_of
+
   end subroutine read_row
 
   pure function between_barriers(contact, unit) result(words)

@@ -13,6 +13,10 @@ module step_length
 
   public :: natural_step, is_plain
 
+  integer :: i
+  !> Products cost less than quotients.
+  real(wp), parameter :: inverse(64) = [(1.0_wp/i, i=1, 64)]
+
 contains
 
   !> Length of a step whose last term is epsilon times one of the first terms, in every variable and in the nodes `others`.
@@ -21,14 +25,15 @@ contains
     real(wp), intent(in) :: state(:)
     integer, intent(in) :: others(:)
     real(wp) :: terms(0:series%order), reach
-    integer :: i, k
+    integer :: i, k, rate
     ! Its powers must not overflow.
     real(wp), parameter :: most = 30
     reach = most
     do i = 1, size(state)
       terms(0) = state(i)
+      rate = series%rates(i)
       do k = 1, series%order
-        terms(k) = series%unit*series%c(k - 1, series%rates(i))/k
+        terms(k) = series%unit*series%c(k - 1, rate)*inverse(k)
       end do
       reach = min(reach, reach_of(terms))
     end do
@@ -42,21 +47,21 @@ contains
   !> shrank evenly.
   pure real(wp) function reach_of(terms) result(reach)
     real(wp), intent(in) :: terms(0:)
-    real(wp) :: size_of(0:ubound(terms, 1)), longest, of_rounding
+    real(wp) :: size_of(0:ubound(terms, 1)), share(0:ubound(terms, 1)/2), longest
     integer :: k, j, order
     real(wp), parameter :: none = -huge(1.0_wp)
     order = ubound(terms, 1)
-    of_rounding = rough_logarithm(epsilon(1.0_wp))
     size_of = none
     do k = 0, order
       if ((k <= order/2 .or. k >= order - 4) .and. abs(terms(k)) > 0) size_of(k) = rough_logarithm(abs(terms(k)))
     end do
+    share = rough_logarithm(epsilon(1.0_wp))*inverse(order:order - order/2:-1)
     reach = huge(1.0_wp)
     do k = order - 4, order
       if (size_of(k) <= none) cycle
       longest = none
       do j = 0, order/2
-        if (size_of(j) > none) longest = max(longest, of_rounding/(order - j) + (size_of(j) - size_of(k))/(k - j))
+        if (size_of(j) > none) longest = max(longest, share(j) + (size_of(j) - size_of(k))*inverse(k - j))
       end do
       if (longest > none) reach = min(reach, longest)
     end do

@@ -137,7 +137,8 @@ inline interval bounds_of_node(const tape_machine &m, const tape_node &n, const 
   }
 }
 
-// Bounds of the coefficients of all nodes, of the last order too. Steady nodes have the values `t`. Returns where all is defined over the box `z`.
+// Bounds of the coefficients of all nodes, of the last order too. Steady nodes have the values `t`. Returns
+// where all is defined over the box `z`.
 [[gnu::noinline]] inline mask bound_series(const tape_machine &m, bool fresh, const interval *z,
                                            const tape_values &t, tape_box &box) {
   tape_values &b = box.series;

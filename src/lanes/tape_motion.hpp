@@ -38,12 +38,24 @@ struct tape_fall {
   mask falls, stays;
 };
 
-[[gnu::noinline]] inline void find_fall(const vec *p, vec sign, mask from_zero, vec bound, tape_fall &f) {
+[[gnu::noinline]] inline void find_fall(const vec *p, vec sign, mask from_zero, vec bound, mask flying,
+                                        tape_fall &f) {
   const double n = tape_order;
   for (int k = 0; k < orders; k++)
     f.q[k] = sign * pick(from_zero, k < tape_order ? p[k + 1] : vec(0.0), p[k]);
-  tape_range r = range_of(f.q);
   vec slope_bound = (n + 2) * bound, curve_bound = (n + 2) * (n + 1) * bound;
+  // Where the first terms outweigh all others, these need no range.
+  vec last = f.q[0] + f.q[1], rest = 0, rest_slope = 0;
+  for (int k = 2; k < orders; k++) {
+    last += f.q[k];
+    rest += magnitude(f.q[k]);
+    rest_slope += magnitude(f.q[k]) * double(k);
+  }
+  f.falls = (f.q[1] + rest_slope + slope_bound < 0.0) & (f.q[0] > bound) & (last < -bound);
+  f.stays = f.q[0] - magnitude(f.q[1]) - rest > bound;
+  if (!any(~(f.falls | f.stays) & flying))
+    return;
+  tape_range r = range_of(f.q);
   f.falls = ((r.most_slope + slope_bound < 0.0) | (r.most_curvature + curve_bound < 0.0)) & (f.q[0] > bound) &
             (r.last < -bound);
   f.stays = r.least > bound;
@@ -64,7 +76,7 @@ struct tape_fall {
     vec bound = m.proves ? g.decider_error[s] + (orders * 2.3e-16) * total : estimate * m.tolerance * total;
     vec sign = pick(g.t.above[s], 1.0, -1.0);
     tape_fall f;
-    find_fall(p, sign, magnitude(g.s.crossed) == s + 1.0, bound, f);
+    find_fall(p, sign, magnitude(g.s.crossed) == s + 1.0, bound, flying, f);
     e.unclear = e.unclear | ~(f.falls | f.stays);
     mask crosses = f.falls & flying & ~e.unclear;
     if (!any(crosses))
@@ -97,7 +109,7 @@ struct tape_fall {
     return e;
   }
   // Velocity in the direction of slip.
-  find_fall(g.p[tape_v], g.s.slip, g.s.z[tape_v] == 0.0, g.error[tape_v], f);
+  find_fall(g.p[tape_v], g.s.slip, g.s.z[tape_v] == 0.0, g.error[tape_v], flying, f);
   e.unclear = e.unclear | ~(f.falls | f.stays);
   mask sure = ~e.unclear & flying;
   e.turns = f.falls & sure;

@@ -87,7 +87,7 @@ contains
     type(lane_term_t), intent(inout) :: term(:)
     type(lane_node_t), intent(inout) :: made
     logical, intent(inout) :: fits
-    integer :: i
+    integer :: keys(size(sum%nodes)), i, at
     fits = fits .and. terms + size(sum%nodes) <= size(term)
     if (.not. fits) return
     made%operation = op_sum
@@ -95,8 +95,12 @@ contains
     made%second = size(sum%nodes)
     made%other = -1
     if (sum%steady > 0) made%other = number(sum%steady)
+    ! What an order makes last is added last, so that nothing waits for it before.
+    keys = number(sum%nodes)
     do i = 1, size(sum%nodes)
-      term(terms + i) = lane_term_t(number(sum%nodes(i)), number(sum%factors(i)))
+      at = minloc(keys, 1)
+      term(terms + i) = lane_term_t(number(sum%nodes(at)), number(sum%factors(at)))
+      keys(at) = huge(keys)
     end do
     terms = terms + size(sum%nodes)
   end subroutine set_sum

@@ -32,6 +32,9 @@ contains
       if (machine%node(i + 1)%operation == op_variable) skips(i) = .true.
     end do
     call set_rates(machine, is_read, skips)
+    do i = machine%varying + 1, machine%nodes
+      if (machine%node(i)%operation == op_sum) call set_parts(machine, machine%node(i)%first, machine%node(i)%second)
+    end do
     machine%evens = 0
     machine%operations = 0
     do i = machine%varying, machine%nodes - 1
@@ -121,6 +124,16 @@ contains
     if (series >= 0) operand = lane_operand_t(series_at + orders*series, -1)
   end function operand
 
+  !> Where the coefficients of the terms of a sum are.
+  pure subroutine set_parts(machine, first, count)
+    type(tape_machine_t), intent(inout) :: machine
+    integer(c_int), intent(in) :: first, count
+    integer :: k
+    do k = first + 1, first + count
+      machine%part(k) = operand(machine, machine%term(k)%node)
+    end do
+  end subroutine set_parts
+
   pure subroutine add_even(machine, i)
     type(tape_machine_t), intent(inout) :: machine
     integer, intent(in) :: i
@@ -140,7 +153,6 @@ contains
   pure subroutine add_operation(machine, i)
     type(tape_machine_t), intent(inout) :: machine
     integer, intent(in) :: i
-    integer :: k
     machine%operations = machine%operations + 1
     associate (node => machine%node(i + 1), made => machine%operation(machine%operations))
       made%operation = node%operation
@@ -150,9 +162,6 @@ contains
       if (node%operation == op_sum) then
         made%first = node%first
         made%count = node%second
-        do k = node%first + 1, node%first + node%second
-          machine%part(k) = operand(machine, machine%term(k)%node)
-        end do
         return
       end if
       made%a = operand(machine, node%first)

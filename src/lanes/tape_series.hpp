@@ -41,21 +41,23 @@ struct tape_values {
 static_assert(offsetof(tape_values, of) == (3 * most_tape_nodes + 1) * sizeof(vec), "as in tape_program.f90");
 
 // Coefficient k of an operand.
-template <int k> LANE_LEAF vec coefficient_at(const tape_values &t, const tape_operand &at) {
+LANE_LEAF vec coefficient_at(int k, const tape_values &t, const tape_operand &at) {
   return t.now[at.place + (at.moves & k)];
 }
 
 // Sum of a(i) b(k - i), i = from ... k - until. In two parts, so that additions need not wait for each other;
 // the terms with what this order has just made come last.
-template <int k, int from, int until> LANE_LEAF vec products(const vec *a, const vec *b) {
-  constexpr int begin = 1, end = k - (until > 1 ? until : 1);
+template <int from, int until> LANE_LEAF vec products(int k, const vec *a, const vec *b) {
+  const int end = k - (until > 1 ? until : 1);
   vec even = 0, odd = 0;
-#pragma GCC unroll 32
-  for (int i = begin; i <= end; i += 2) {
-    even += a[i] * b[k - i];
-    if (i < end)
-      odd += a[i + 1] * b[k - i - 1];
+  const vec *c = b + k;
+  int i = 1;
+  for (; i < end; i += 2) {
+    even += a[i] * c[-i];
+    odd += a[i + 1] * c[-i - 1];
   }
+  if (i == end)
+    even += a[i] * c[-i];
   vec total = even + odd;
   if constexpr (from == 0)
     total += a[0] * b[k];
@@ -64,13 +66,12 @@ template <int k, int from, int until> LANE_LEAF vec products(const vec *a, const
   return total;
 }
 
-template <int k> LANE_LEAF vec square_term(const vec *a) {
+LANE_LEAF vec square_term(int k, const vec *a) {
   vec total = 0;
-#pragma GCC unroll 32
   for (int i = 1; i < (k + 1) / 2; i++)
     total += a[i] * a[k - i];
   total += total;
-  if constexpr (k % 2 == 0)
+  if (k % 2 == 0)
     total += a[k / 2] * a[k / 2];
   return total + (a[0] + a[0]) * a[k];
 }
@@ -85,12 +86,12 @@ LANE_LEAF vec sum_of_terms(const tape_machine &m, const tape_node &n, const vec 
 }
 
 // Coefficient k > 0 of the sum of `count` parts from number `first` on.
-template <int k> LANE_LEAF vec sum_of_parts(const tape_machine &m, int first, int count, const tape_values &t) {
+LANE_LEAF vec sum_of_parts(int k, const tape_machine &m, int first, int count, const tape_values &t) {
   const tape_term *term = &m.term[first];
   const tape_operand *part = &m.part[first];
-  vec y = t.first[term->factor] * coefficient_at<k>(t, *part);
+  vec y = t.first[term->factor] * coefficient_at(k, t, *part);
   for (int i = 1; i < count; i++)
-    y += t.first[term[i].factor] * coefficient_at<k>(t, part[i]);
+    y += t.first[term[i].factor] * coefficient_at(k, t, part[i]);
   return y;
 }
 
@@ -214,9 +215,8 @@ template <bool bounds> inline void raise_even(const tape_machine &m, bool fresh,
       raise_circular<bounds>(t.of[e.slopes][1], t.of[e.series], t.of[e.other]);
       continue;
     }
-    vec y = e.operation == tape_variable
-                ? t.first[e.other] * m.unit
-                : sum_of_parts<1>(m, m.node[e.node].first, m.node[e.node].second, t);
+    vec y = e.operation == tape_variable ? t.first[e.other] * m.unit
+                                         : sum_of_parts(1, m, m.node[e.node].first, m.node[e.node].second, t);
     t.of[e.series][1] = y;
     if (e.slopes >= 0)
       t.of[e.slopes][1] = y;
@@ -230,36 +230,36 @@ template <bool bounds> inline void raise_even(const tape_machine &m, bool fresh,
 
 // Coefficient k > 0 of a node from lower ones and those of its arguments; with `bounds` a bound of its
 // magnitude from theirs.
-template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_machine &m, const tape_operation &n,
-                                                        tape_values &t) {
+template <bool bounds>
+LANE_LEAF vec coefficient(int k, const tape_machine &m, const tape_operation &n, tape_values &t) {
   const series *of = t.of;
   const vec &inverse = t.inverse[n.node];
-  auto a = [&] { return coefficient_at<k>(t, n.a); };
+  auto a = [&] { return coefficient_at(k, t, n.a); };
   auto less = [](vec x, vec y) { return bounds ? x + y : x - y; };
   switch (n.operation) {
   case tape_sum:
-    return sum_of_parts<k>(m, n.first, n.count, t);
+    return sum_of_parts(k, m, n.first, n.count, t);
   case tape_add:
-    return a() + coefficient_at<k>(t, n.b);
+    return a() + coefficient_at(k, t, n.b);
   case tape_subtract:
-    return less(a(), coefficient_at<k>(t, n.b));
+    return less(a(), coefficient_at(k, t, n.b));
   case tape_multiply:
-    return products<k, 0, 0>(of[n.first], of[n.second]);
+    return products<0, 0>(k, of[n.first], of[n.second]);
   case tape_scale:
-    return t.first[n.steady] * coefficient_at<k>(t, n.b);
+    return t.first[n.steady] * coefficient_at(k, t, n.b);
   case tape_divide:
-    return less(a(), products<k, 0, 1>(of[n.own], of[n.second])) * inverse;
+    return less(a(), products<0, 1>(k, of[n.own], of[n.second])) * inverse;
   case tape_divide_steady:
     return a() * inverse;
   case tape_negative:
     return bounds ? a() : -a();
   case tape_square:
-    return square_term<k>(of[n.first]);
+    return square_term(k, of[n.first]);
   case tape_sqrt:
-    return less(a(), products<k, 1, 1>(of[n.own], of[n.own])) * inverse;
+    return less(a(), products<1, 1>(k, of[n.own], of[n.own])) * inverse;
   case tape_power:
-    return less(t.first[n.steady] * products<k, 1, 0>(of[n.first], of[n.own]),
-                products<k, 1, 1>(of[n.second], of[n.slopes])) *
+    return less(t.first[n.steady] * products<1, 0>(k, of[n.first], of[n.own]),
+                products<1, 1>(k, of[n.second], of[n.slopes])) *
            inverse_of[k] * inverse;
   case tape_exp:
   case tape_sin:
@@ -267,28 +267,29 @@ template <int k, bool bounds> LANE_LEAF vec coefficient(const tape_machine &m, c
   case tape_sinh:
   case tape_cosh:
   case tape_tanh:
-    return products<k, 1, 0>(of[n.first], of[n.second]) * inverse_of[k];
+    return products<1, 0>(k, of[n.first], of[n.second]) * inverse_of[k];
   case tape_cos:
-    return products<k, 1, 0>(of[n.first], of[n.second]) * (bounds ? inverse_of[k] : -inverse_of[k]);
+    return products<1, 0>(k, of[n.first], of[n.second]) * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_sin_even:
     return of[n.first][1] * of[n.second][k - 1] * inverse_of[k];
   case tape_cos_even:
     return of[n.first][1] * of[n.second][k - 1] * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_log:
   case tape_atan:
-    return less(a(), products<k, 1, 1>(of[n.slopes], of[n.second]) * inverse_of[k]) * inverse;
+    return less(a(), products<1, 1>(k, of[n.slopes], of[n.second]) * inverse_of[k]) * inverse;
   case tape_select:
-    return bounds ? larger(a(), coefficient_at<k>(t, n.b)) : pick(t.above[n.steady], a(), coefficient_at<k>(t, n.b));
+    return bounds ? larger(a(), coefficient_at(k, t, n.b))
+                  : pick(t.above[n.steady], a(), coefficient_at(k, t, n.b));
   case tape_select_slip:
-    return pick(t.slip > 0.0, a(), coefficient_at<k>(t, n.b));
+    return pick(t.slip > 0.0, a(), coefficient_at(k, t, n.b));
   default:
     return 0;
   }
 }
 
 // Coefficient k > 0 of the rate of a variable that varies.
-template <int k> LANE_LEAF vec rate_at(const tape_change &c, const tape_values &t) {
-  vec y = coefficient_at<k>(t, c.from);
+LANE_LEAF vec rate_at(int k, const tape_change &c, const tape_values &t) {
+  vec y = coefficient_at(k, t, c.from);
   return c.factor < 0 ? y : t.first[c.factor] * y;
 }
 
@@ -300,20 +301,18 @@ LANE_LEAF void set_coefficient(const tape_change &c, vec *of, series *all, int k
 
 // Coefficients of the orders from k on; bounds go one order further. Loops whose length the compiler knows
 // need no guesses of the processor.
-template <int k, bool bounds> inline void raise_orders(const tape_machine &m, tape_values &t) {
-  if constexpr (k < tape_order + bounds) {
+template <bool bounds> LANE_LEAF void raise_orders(const tape_machine &m, tape_values &t) {
+  for (int k = 1; k < tape_order + bounds; k++) {
     for (const tape_operation *n = m.operation; n != m.operation + m.operations; n++) {
-      vec y = coefficient<k, bounds>(m, *n, t);
+      vec y = coefficient<bounds>(k, m, *n, t);
       t.now[n->to.place + (n->to.moves & k)] = y;
       if (n->slopes >= 0)
         t.of[n->slopes][k] = y * double(k);
     }
-    if constexpr (k < tape_order)
-      for (int i = 0; i < m.variables; i++)
-        if (m.change[i].from.place >= 0)
-          set_coefficient(m.change[i], t.of[i], t.of, k + 1,
-                          rate_at<k>(m.change[i], t) * (m.unit * inverse_of[k + 1]));
-    raise_orders<k + 1, bounds>(m, t);
+    for (int i = 0; i < m.variables && k < tape_order; i++)
+      if (m.change[i].from.place >= 0)
+        set_coefficient(m.change[i], t.of[i], t.of, k + 1,
+                        rate_at(k, m.change[i], t) * (m.unit * inverse_of[k + 1]));
   }
 }
 
@@ -323,7 +322,7 @@ template <bool bounds> LANE_LEAF void raise_all(const tape_machine &m, bool fres
     if (m.change[i].from.place >= 0)
       set_coefficient(m.change[i], t.of[i], t.of, 1, t.first[m.rate[i]] * m.unit);
   raise_even<bounds>(m, fresh, t);
-  raise_orders<1, bounds>(m, t);
+  raise_orders<bounds>(m, t);
 }
 
 // Series of the variables, and of all nodes whose series are kept, the last but one order included. `fresh`:
