@@ -39,7 +39,7 @@ module last_wait
 
 contains
 
-  !> Before the tiles: `tiles` of the working file `part` are of this run, `done` of them finished. Where the file counts others,
+  !> Before any rank begins a tile: `tiles` of the working file `part` are of this run, `done` of them finished. Where the file counts others,
   !> as those that are computed again, only a stop bounds the wait.
   subroutine begin(self, part, tiles, done, team)
     class(last_wait_t), intent(out) :: self

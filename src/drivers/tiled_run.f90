@@ -136,11 +136,12 @@ contains
     watch%unfinished = size(unfinished)
     if (session%command%resume .and. .not. work%again) call session%journal%line('resumed', &
       to_text(size(mine) - size(unfinished))//' of '//to_text(size(mine))//' tiles were done before')
+    ! Before a rank can write a tile.
+    call last_wait%begin(working_path(file%path), size(mine), size(mine) - size(unfinished), session%team)
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
     call session%stop_if(error)
-    call last_wait%begin(working_path(file%path), size(mine), size(mine) - size(unfinished), session%team)
     watch%scheduler => scheduler
     watch%session => session
     watch%file => file

@@ -4,11 +4,11 @@
 /* Loaded with LD_PRELOAD: counts the calls that change a file whose path contains $FAULT_NAME, and at the
    call number $FAULT_AT does $FAULT_DO: `kill` ends the process before the call, `tear` after half of a
    write, and a number is the errno that this and all later writes give. $FAULT_RANK: only on this rank of an
-   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds. `slow`: each
-   such call takes $FAULT_AT milliseconds. `unlockable`: no such file can be locked, as on file systems
-   without locks. `arrive`: the first barrier of MPI without
-   waiting takes $FAULT_AT seconds, once there is such a file. The number of calls is added as a line to the
-   file $FAULT_COUNT when the process ends. */
+   MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds; `read`: each opening
+   for reading. `slow`: each such call takes $FAULT_AT milliseconds. `unlockable`: no such file can be locked,
+   as on file systems without locks. `arrive`: the first barrier of MPI without waiting takes $FAULT_AT
+   seconds, once there is such a file. The number of calls is added as a line to the file $FAULT_COUNT when
+   the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -62,7 +62,7 @@ static int fault(const char *path, int writes) {
     return 0;
   }
   if (at == 0 || call < at || strcmp(action, "late") == 0 || strcmp(action, "unlockable") == 0 ||
-      strcmp(action, "arrive") == 0)
+      strcmp(action, "arrive") == 0 || strcmp(action, "read") == 0)
     return 0;
   if (strcmp(action, "kill") == 0)
     die();
@@ -99,6 +99,9 @@ static int open_late(const char *path, int flags, mode_t mode) {
   static atomic_int opened;
   if (name != NULL && at > 0 && strcmp(action, "late") == 0 && (flags & O_ACCMODE) != O_RDONLY &&
       strstr(path, name) != NULL && atomic_fetch_add(&opened, 1) == 0)
+    sleep((unsigned)at);
+  if (name != NULL && at > 0 && strcmp(action, "read") == 0 && (flags & O_ACCMODE) == O_RDONLY &&
+      strstr(path, name) != NULL)
     sleep((unsigned)at);
   return REAL(open)(path, flags, mode);
 }

@@ -5,6 +5,7 @@
 A rank that is late, but within the bound, is waited for.
 """
 
+import subprocess
 import time
 
 import life
@@ -36,6 +37,21 @@ def test_the_wait_for_a_lost_rank_ends(mpi_separatrix, faulty_calls, reference, 
     assert life.tiles_of(tmp_path)[0] == life.TILES
     life.resume(mpi_separatrix, tmp_path, 1)
     assert life.content_hash(tmp_path / life.NAME) == life.content_hash(reference)
+
+
+def test_the_wait_ends_though_rank_0_began_last(mpi_separatrix, faulty_calls, tmp_path) -> None:
+    """Rank 0 looks into the working file for a second before it begins; the others do not write meanwhile."""
+    life.write_case(tmp_path)
+    shared = {"LD_PRELOAD": str(faulty_calls), "SEPARATRIX_LAST_WAIT": str(BOUND)}
+    faults = [{"FAULT_DO": "read", "FAULT_AT": "1"}, {"FAULT_DO": "arrive", "FAULT_AT": "150"}]
+    command = ["mpirun"]
+    for number, fault in enumerate(faults):
+        given = {"FAULT_NAME": f"{life.NAME}.part", "FAULT_RANK": str(number), **shared, **fault}
+        command += [":"] * number + ["-n", "1", "env", *(f"{key}={value}" for key, value in given.items())]
+        command += [str(mpi_separatrix), *life.RUN]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert run.returncode == 75, run.stderr
+    assert f"a rank has not answered for {BOUND} s" in run.stderr
 
 
 @pytest.mark.parametrize("late", [BOUND // 2, 2 * BOUND])
