@@ -2,9 +2,9 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A machine on its section: all that the layers above the event loops need. Another kind of machine is another extension of
-!> `machine_t`: it implements the deferred procedures, and its builder sets the facts (`machine_facts`). The others hold for a machine with neither
-!> stops nor a driving body, whose state is `state` alone; an extension overrides those that do not hold for it. The layers above
-!> never ask which it is.
+!> `machine_t`: it implements the deferred procedures, and its builder sets the facts (`machine_facts`). The others hold for a
+!> machine with neither stops nor a driving body, whose state is `state` alone; an extension overrides those that do not hold for
+!> it. The layers above never ask which it is.
 !> The section is that of a drive period or, with `by_event`, where the motion of a machine without a clock turns round
 !> (`turn_section`).
 module machine_type
