@@ -7,11 +7,11 @@ module branch_point
   use errors, only: error_t
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
+  use margins_along, only: margins_of_machine
   use machine_family, only: machine_neighbourhood, machine_of_family
   use multipliers, only: nearly_neutral
   use orbit_margins, only: margins_t
   use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
-  use structure_margins, only: margins_of_machine
   use variations, only: neighbourhood_t
   implicit none
   private

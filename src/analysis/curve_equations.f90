@@ -11,12 +11,12 @@ module curve_equations
   use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use law_table, only: change_parameter
+  use margins_along, only: margins_of_machine
   use machine_family, only: machine_of_family
   use matrices, only: solve
   use multipliers, only: shifted_determinant
   use orbit_margins, only: is_between, margin_t, margins_t, of_gap, of_impact, of_order, of_release, same_meaning
   use periodic_orbit, only: move_along, orbit_t, set_multipliers, shoot
-  use structure_margins, only: margins_of_machine
   use variations, only: neighbourhood_t
   implicit none
   private

@@ -18,7 +18,7 @@ module orbit_search
   implicit none
   private
 
-  public :: find_orbits, add_orbit
+  public :: find_orbits
 
   integer, parameter :: most_newton = 20, settling = 150
   !> Relative distance at which a section point counts as a return to an earlier one, and at which two orbits are one.

@@ -1,81 +1,30 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> How far a periodic orbit of a structure is from having another sequence of events: the guards of its flights that are not met,
-!> the speeds of its impacts, the reserve of what holds, the order of its events. See module `orbit_margins`.
+!> The margins of orbits of a structure: the guards of its flights that are not met, the speeds of its impacts, the reserve of what
+!> holds, the order of its events. See module `orbit_margins`.
 module structure_margins
   use guards, only: force_ends, force_returns, guards_of, joint_guard_t, leaves, lets_go, meets_lower, meets_upper, &
     room_for_guards, &
     slide_ends, slides_down, slides_up, turns_round
-  use hybrid_machine, only: event_t, hybrid_t
+  use hybrid_machine, only: event_t
   use multibody, only: most_joints
   use multibody_state, only: multibody_state_t
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
   use motion_state, only: event_release
-  use orbit_margins, only: margin_t, margins_of, margins_t, of_gap, of_hold, of_impact, of_order, of_press, of_release, &
-    of_slip, of_stick, of_turning
-  use periodic_orbit, only: closing_time, orbit_t
+  use orbit_margins, only: looks, margin_t, margins_t, most_secants, of_gap, of_hold, of_impact, of_order, of_press, of_release, &
+    of_slip, of_stick, of_turning, orbit_flight_t
+  use periodic_orbit, only: orbit_t
   use secant_bracket, only: bracket_t, narrow, next_trial
   use structure, only: mode_number, phases_in, state_in, structure_t
   use structure_flight, only: flow_of
   implicit none
   private
 
-  public :: margins_of_machine
-
-  !> Looks along a flight, per period of the section.
-  integer, parameter :: looks = 96
-  integer, parameter :: most_secants = 60
+  public :: add_structure_event, look_along_structure
 
 contains
-
-  !> The margins of an orbit whose events have their states, of any machine. `events_only`: those between the events of a structure,
-  !> which take longest, and its extremes are left out.
-  pure function margins_of_machine(machine, orbit, events_only) result(margins)
-    class(hybrid_t), intent(in) :: machine
-    type(orbit_t), intent(in) :: orbit
-    logical, intent(in), optional :: events_only
-    type(margins_t) :: margins
-    logical :: looks_too
-    looks_too = .true.
-    if (present(events_only)) looks_too = .not. events_only
-    select type (machine)
-    type is (structure_t)
-      margins = margins_of_structure(machine, orbit, looks_too)
-    class default
-      margins = margins_of(machine, orbit)
-    end select
-  end function margins_of_machine
-
-  !> The margins of an orbit whose events have their states; all in natural units. With `looks_too` those within flights and the
-  !> extremes of the watched coordinate.
-  pure function margins_of_structure(machine, orbit, looks_too) result(margins)
-    type(structure_t), intent(in) :: machine
-    type(orbit_t), intent(in) :: orbit
-    logical, intent(in) :: looks_too
-    type(margins_t) :: margins
-    real(wp) :: y(machine%n), t, until
-    integer :: k, m, mode
-    m = size(orbit%events)
-    allocate (margins%list(0))
-    y = orbit%y
-    t = 0
-    mode = orbit%mode
-    do k = 0, m
-      if (k > 0) then
-        associate (event => orbit%events(k))
-          call add_event(machine, orbit, k, margins%list)
-          y = event%departure(:machine%n)
-          t = event%time
-          mode = event%after
-        end associate
-      end if
-      until = closing_time(machine, orbit)
-      if (k < m) until = orbit%events(k + 1)%time
-      if (looks_too .and. until > t) call look_along(machine, orbit, mode, t, y, until, k, margins)
-    end do
-  end function margins_of_structure
 
   !> Size of forces [N].
   pure real(wp) function force_size(machine)
@@ -95,7 +44,7 @@ contains
   end subroutine value_and_rate
 
   !> The margins of the event `k`.
-  pure subroutine add_event(machine, orbit, k, list)
+  pure subroutine add_structure_event(machine, orbit, k, list)
     type(structure_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
     integer, intent(in) :: k
@@ -123,7 +72,7 @@ contains
       list = [list, margin_t(event=k, side=event%side, time=event%time, kind=of_order, joint=event%joint, &
                              value=(event%time - orbit%events(k - 1)%time)/machine%period)]
     end associate
-  end subroutine add_event
+  end subroutine add_structure_event
 
   !> Where a slide ends: what is left of the friction that holds, or what the forces are beyond it where the joint slides back.
   pure subroutine note_stop(machine, event, margin)
@@ -157,34 +106,34 @@ contains
   end subroutine note_stop
 
   !> The least values of the guards within a flight, those at its end that is an event excepted.
-  pure subroutine look_along(machine, orbit, mode, from, start, until, k, margins)
+  pure subroutine look_along_structure(machine, orbit, flight, margins)
     type(structure_t), intent(in) :: machine
     type(orbit_t), intent(in) :: orbit
-    integer, intent(in) :: mode, k
-    real(wp), intent(in) :: from, start(:), until
+    type(orbit_flight_t), intent(in) :: flight
     type(margins_t), intent(inout) :: margins
     type(mode_flow_t) :: spare
     type(joint_guard_t) :: list(room_for_guards(machine%frame%moving%machine))
     type(event_t) :: probe
-    real(wp) :: y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(size(list))
+    real(wp) :: start(machine%n), y(machine%n), last(machine%n), t, last_t, value, rate, last_rate(size(list))
     real(wp) :: least_t, least
     type(multibody_state_t) :: state
     integer :: i, g, at, count_guards, count_looks
-    state = state_in(machine, mode, from, start)
+    start = flight%start(:machine%n)
+    state = state_in(machine, flight%mode, flight%from, start)
     call flow_of(machine%frame%moving, state%phase, at, spare)
     if (at > 0) then
       call guards_of(machine%frame%moving%machine, machine%frame%moving%flows(at), state, list, count_guards)
     else
       call guards_of(machine%frame%moving%machine, spare, state, list, count_guards)
     end if
-    count_looks = max(6, ceiling(looks*(until - from)/machine%period))
-    last_t = from
+    count_looks = max(6, ceiling(looks*(flight%until - flight%from)/machine%period))
+    last_t = flight%from
     last = start
-    probe%before = mode
+    probe%before = flight%mode
     do i = 0, count_looks
-      t = from + (until - from)*i/count_looks
+      t = flight%from + (flight%until - flight%from)*i/count_looks
       y = start
-      if (i > 0) call machine%fly(mode, last_t, last, t, y)
+      if (i > 0) call machine%fly(flight%mode, last_t, last, t, y)
       call note_position(machine, y, margins)
       do g = 1, count_guards
         if (list(g)%meaning == turns_round) cycle
@@ -193,23 +142,23 @@ contains
         call value_and_rate(machine, probe, t, y, value, rate)
         if (i == 0) then
           ! A jump elsewhere may have turned it round.
-          if (k > 0 .and. rate >= 0) then
-            if (orbit%events(k)%joint /= probe%joint) call note(machine, probe, k, t, value, margins)
+          if (flight%event > 0 .and. rate >= 0) then
+            if (orbit%events(flight%event)%joint /= probe%joint) call note(machine, probe, flight%event, t, value, margins)
           end if
           ! A released joint gathers speed from zero, whatever the rounding of its acceleration.
-          if (k > 0 .and. probe%guard == slide_ends) then
-            if (orbit%events(k)%joint == probe%joint .and. orbit%events(k)%kind == event_release) rate = 0
+          if (flight%event > 0 .and. probe%guard == slide_ends) then
+            if (orbit%events(flight%event)%joint == probe%joint .and. orbit%events(flight%event)%kind == event_release) rate = 0
           end if
         else if (last_rate(g) < 0 .and. rate > 0) then
           call find_least(machine, probe, last, last_t, t, last_rate(g), rate, least_t, least)
-          call note(machine, probe, k, least_t, least, margins)
+          call note(machine, probe, flight%event, least_t, least, margins)
         end if
         last_rate(g) = rate
       end do
       last_t = t
       last = y
     end do
-  end subroutine look_along
+  end subroutine look_along_structure
 
   pure subroutine note_position(machine, y, margins)
     type(structure_t), intent(in) :: machine

@@ -23,8 +23,9 @@ module contraction
 
 contains
 
-  !> Whether every start on the rings within `radius` around every point of a cycle has the events of `reference` and is, one period of
-  !> the cycle later, nearer by the share `promised` of each point. `settles`: around a point at rest starts have a round to slip.
+  !> Whether every start on the rings within `radius` around every point of a cycle has the events of `reference` and is, one period
+  !> of the cycle later, nearer by the share `promised` of each point. `settles`: around a point at rest a start first slips for one
+  !> round.
   pure logical function contracts(moving, attractor, reference, radius, promised, settles)
     class(machine_t), intent(in) :: moving
     type(attractor_t), intent(in) :: attractor

@@ -16,7 +16,7 @@ module drive_record
   implicit none
   private
 
-  public :: read_record, series_of
+  public :: read_record
 
   !> Harmonics of a record for which none are given; more than this share of the record left is refused then.
   integer, parameter :: usual_harmonics = 32, most_harmonics = 256

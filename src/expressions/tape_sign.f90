@@ -11,7 +11,7 @@ module tape_sign
   implicit none
   private
 
-  public :: is_nonnegative, positive_part
+  public :: positive_part
 
 contains
 

@@ -13,7 +13,7 @@ module flight_path
   implicit none
   private
 
-  public :: begin_path, begin_change, begin_series, path_at, unknowns_of, series_step, constant_forces
+  public :: begin_path, begin_change, begin_series, path_at, series_step, constant_forces
 
   !> Terms of the exponential series over an interval no longer than 1/rate.
   integer, parameter, public :: terms = merge(20, 30, epsilon(1.0_wp) > 1e-20_wp)

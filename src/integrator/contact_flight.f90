@@ -24,7 +24,7 @@ module contact_flight
   implicit none
   private
 
-  public :: contact_side, fly_contact, raise_peak_force
+  public :: contact_side, fly_contact
 
   !> Guards: velocity zero, end of contact, change between pushing and not; after them the ends of pieces of tables.
   integer, parameter :: turning = 1, leaving = 2, cut = 3, most_guards = cut + most_ends

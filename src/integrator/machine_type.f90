@@ -2,16 +2,15 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A machine on its section: all that the layers above the event loops need. Another kind of machine is another extension of
-!> `machine_t`: it implements the deferred procedures, and its builder sets the facts. The others hold for a machine with neither
-!> stops nor a driving body, whose state is `state` alone; an extension overrides those that do not hold for it. The layers above
-!> never ask which it is.
+!> `machine_t`: it implements the deferred procedures, and its builder sets the facts (`machine_facts`). The others hold for a
+!> machine with neither stops nor a driving body, whose state is `state` alone; an extension overrides those that do not hold for
+!> it. The layers above never ask which it is.
 !> The section is that of a drive period or, with `by_event`, where the motion of a machine without a clock turns round
 !> (`turn_section`).
 module machine_type
-  use contact_law, only: contact_t
-  use effect_law, only: sensor_t
   use kinds, only: int64, wp
   use machine_columns, only: machine_column_t
+  use machine_facts, only: machine_facts_t
   use motion_state, only: log_t, options_t, reset_tally, tally_t
   use section_size, only: most_coordinates
   use section_state, only: copy_of, scales_t, section_state_t
@@ -20,51 +19,7 @@ module machine_type
 
   public :: copy_of, scales_t, section_state_t
 
-  type, abstract, public :: machine_t
-    !> Time from section to section [s], and its circular frequency [rad/s].
-    real(wp) :: period = 0, drive_frequency = 0
-    !> The section comes once in a period. Otherwise `advance` ends there, with `passed`, where it comes before the given time, and
-    !> the period is only a scale.
-    logical :: timed = .true.
-    !> The section is where the motion turns round, not at a given time.
-    logical :: by_event = .false.
-    !> An angle repeats after this [rad]; 0 of a position.
-    real(wp) :: turn = 0
-    !> Rigid stops that bound the first coordinate of the section [m].
-    real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
-    !> The stops of the watched body, where they belong to no joint; whether there is anything to hit.
-    type(contact_t) :: stops
-    logical :: has_stops = .false.
-    !> Whether a body that leans on a soft stop uses up steps.
-    logical :: presses_by_steps = .false.
-    !> Frequency ratio of the drive, and distance of the samples of a measured force [s]; 0 without.
-    real(wp) :: drive_ratio = 0, sample_interval = 0
-    integer :: force_samples = 0
-    !> Whether a drive repeats, so that its period is the time between two sections.
-    logical :: has_drive_period = .false.
-    !> Whether the motion depends on the time at all, and whether a drive gives a time: without one the section may be an event.
-    logical :: undriven = .false., has_clock = .true.
-    !> Whether the state on the section determines what follows.
-    logical :: has_section = .true.
-    !> Whether a driving body moves beside the watched one: what does not slip may then well move.
-    logical :: has_driver = .false.
-    !> Whether a period without slip is followed by none with any: a body at rest under periodic forces, or two that move as one
-    !> in a way that is given.
-    logical :: rest_lasts = .true.
-    !> Whether all positions of rest are one set: friction and stops with linear springs make it convex; two bodies rest by moving
-    !> as one.
-    logical :: one_rest_set = .false.
-    !> Whether slips of one body are flown on a closed form; whether that is so in every mode.
-    logical :: exact = .false., closed_form = .false.
-    !> Whether the motion between the stops is that of a linear, damped oscillator with a closed form: then it has one motion
-    !> without impact, which attracts.
-    logical :: linear = .false.
-    !> Number of a coordinate of the section that is a velocity.
-    integer :: speed_number = 2
-    !> Amplitude [m] of a motion below which it is rounding: a thousandth of what the forces do.
-    real(wp) :: smallest_motion = 1e-3_wp
-    type(scales_t) :: sizes
-    type(sensor_t) :: sensor
+  type, abstract, extends(machine_facts_t), public :: machine_t
   contains
     procedure(count_of_machine), deferred :: coordinates
     procedure(start_interface), deferred :: start

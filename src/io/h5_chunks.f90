@@ -15,7 +15,7 @@ module h5_chunks
   implicit none
   private
 
-  public :: h5_chunk_offset, h5_reserve_chunk, h5_read_chunk
+  public :: h5_reserve_chunk, h5_read_chunk
 
   interface
     ! HDF5's Fortran interface lacks these.

@@ -19,9 +19,7 @@ module assembly
   implicit none
   private
 
-  public :: add_body, add_link, add_joint, add_force, give_motion, move_surface, finish, set_sizes, row_between, index_of
-
-  character(len=*), parameter, public :: ground = 'ground'
+  public :: add_body, add_link, add_joint, add_force, give_motion, move_surface, finish, set_sizes, index_of
 
   !> A stop or a rebound that the forces end within this share of a period is none.
   real(wp), parameter :: briefest = 1e-11_wp
@@ -82,21 +80,6 @@ contains
     end do
     at = 0
   end function index_of
-
-  !> The row of q_second - q_first, the ground being 0; `found` is false if there is no such body.
-  pure subroutine row_between(machine, first, second, row, found)
-    type(multibody_t), intent(in) :: machine
-    character(len=*), intent(in) :: first, second
-    real(wp), allocatable, intent(out) :: row(:)
-    logical, intent(out) :: found
-    integer :: a, b
-    allocate (row(machine%n), source=0.0_wp)
-    a = index_of(machine, first)
-    b = index_of(machine, second)
-    found = (a > 0 .or. first == ground) .and. (b > 0 .or. second == ground)
-    if (a > 0) row(a) = row(a) - 1
-    if (b > 0) row(b) = row(b) + 1
-  end subroutine row_between
 
   !> A linear spring [N/m] and damper [N s/m] along a row; no force where the row is `length` [m].
   pure subroutine add_link(machine, row, stiffness, damping, length)

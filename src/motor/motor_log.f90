@@ -13,7 +13,7 @@ module motor_log
   implicit none
   private
 
-  public :: add_sample, motor_energy, motor_values, record_motor_event
+  public :: add_sample, motor_energy, record_motor_event
 
   !> Row of the position of the foot among the columns of a sample.
   integer, parameter, public :: foot_row = 6

@@ -3,7 +3,7 @@
 
 !> Multibody structures for the tests, written down part by part.
 module multibody_machines
-  use assembly, only: add_body, add_force, add_joint, add_link, finish, move_surface, row_between
+  use assembly, only: add_body, add_force, add_joint, add_link, finish, index_of, move_surface
   use contact_law, only: contact_kelvin_voigt
   use errors, only: error_t
   use multibody_machine, only: multibody_machine_t, set_structure
@@ -185,5 +185,20 @@ contains
     integer, intent(out) :: reason
     call advance_multibody(moving, state, state%time + duration, tally, reason)
   end subroutine go_on
+
+  !> The row of q_second - q_first, the ground being 0; `found` is false if there is no such body.
+  pure subroutine row_between(machine, first, second, row, found)
+    type(multibody_t), intent(in) :: machine
+    character(len=*), intent(in) :: first, second
+    real(wp), allocatable, intent(out) :: row(:)
+    logical, intent(out) :: found
+    integer :: a, b
+    allocate (row(machine%n), source=0.0_wp)
+    a = index_of(machine, first)
+    b = index_of(machine, second)
+    found = (a > 0 .or. first == 'ground') .and. (b > 0 .or. second == 'ground')
+    if (a > 0) row(a) = row(a) - 1
+    if (b > 0) row(b) = row(b) + 1
+  end subroutine row_between
 
 end module multibody_machines

@@ -29,12 +29,6 @@ class Share:
     not_known: float
 
 
-def crossed_cells(grid: np.ndarray) -> np.ndarray:
-    """Return which cells of a grid of labels have corners of more than one label."""
-    low, high = _corners(grid)
-    return low != high
-
-
 def cells_of_two_basins(grid: np.ndarray) -> np.ndarray:
     """Return which cells have corners in two basins or more; labels that are no attractor's are left out."""
     low, high = _corners(np.where(grid > 0, grid, np.iinfo(int).max))[0], _corners(grid)[1]
