@@ -282,8 +282,8 @@ def test_sweep_names_its_limits(separatrix, yoke, tmp_path, limit):
         assert (after > before) == (direction == "up")
 
 
-# machine, values, start w, x, v; kind and value of the limit: a doubling of a published benchmark, method 1, and the voltage below
-# which the body sticks at its turning points, where by SciPy the spring pulls with the static friction within 1e-7 N
+# machine, values, start w, x, v; kind and value of the limit: a doubling of a published benchmark, and the
+# voltage below which the body sticks at its turning points: the spring pulls with the static friction there
 CHANGES = [
     (
         "lever",
@@ -320,7 +320,7 @@ def test_sweep_names_changes_without_other_impacts(separatrix, tmp_path, change)
 
 
 def test_branch_passes_the_section(separatrix, tmp_path):
-    """At 2.4923 V a turning point passes the section: the branch goes on with the events of the turn in another order."""
+    """At 2.492 V a turning point passes the section: the branch goes on with its events in another order."""
     words = [
         "--set=contact.upper=10",
         "--set=start.x0=0.0274",
