@@ -4,7 +4,7 @@
 !> The section points of a periodic orbit, and how it is begun anew where an instant passes the section.
 module orbit_sections
   use guards, only: turns_round
-  use hybrid_machine, only: event_t, hybrid_t
+  use hybrid_machine, only: event_t, hybrid_t, most_states
   use kinds, only: wp
   use periodic_orbit, only: orbit_t
   use variations, only: neighbourhood_t
@@ -61,17 +61,22 @@ contains
     type(orbit_t), intent(inout) :: orbit
     logical, intent(out) :: turned
     type(event_t) :: moved, section
-    real(wp) :: y(size(orbit%y))
+    real(wp) :: y(size(orbit%y)), turn(most_states)
     integer :: m
     turned = .false.
     m = size(orbit%events)
     if (m < 2) return
     section = orbit%events(m)
+    ! Every turn of a crank begins at the angle 0.
+    turn = 0
+    if (machine%crank_section) turn = section%arrival - section%departure
     if (orbit%events(1)%time < 0) then
       moved = orbit%events(1)
       call machine%fly(moved%after, moved%time, moved%departure(:size(y)), 0.0_wp, y)
       orbit%mode = moved%after
       moved%time = moved%time + section%time
+      moved%arrival = moved%arrival + turn
+      moved%departure = moved%departure + turn
       orbit%events = [orbit%events(2:m - 1), moved, section]
     else if (orbit%events(m - 1)%time > section%time) then
       moved = orbit%events(m - 1)
@@ -84,6 +89,9 @@ contains
       end if
       orbit%mode = moved%before
       moved%time = moved%time - section%time
+      moved%arrival = moved%arrival - turn
+      moved%departure = moved%departure - turn
+      y = y - turn(:size(y))
       orbit%events = [moved, orbit%events(:m - 2), section]
     else
       return

@@ -6,10 +6,11 @@
 module sweep_chain
   use crank_summary, only: crank_numbers, crank_values
   use errors, only: error_t
+  use event_words, only: word_text
   use grid, only: grid_t
   use journal, only: journal_t
   use kinds, only: int64, wp
-  use limit_kind, only: find_kind, kind_not_known
+  use limit_kind, only: find_kind, kind_doubling, kind_not_known, kind_stick
   use machine_type, only: section_state_t
   use motor_choices, only: has_motor, start_of_motor
   use status, only: reason_time_over
@@ -127,6 +128,7 @@ contains
     type(settled_t) :: settled(size(values))
     type(section_state_t) :: state
     integer :: i, k, found, before, mark
+    logical :: changed
     state = first_state(grid)
     found = 0
     before = 0
@@ -150,6 +152,12 @@ contains
                           limits(:, found), error)
           if (allocated(error)) return
           limits(limit_numbers - 1:, found) = [speed, held%crank%speed]
+        else if (before > 0 .and. has_motor(grid%laws)) then
+          call find_change(grid, path, visited([before, i]), settled([before, i]), mark, limits(:, found + 1), changed)
+          if (changed) then
+            found = found + 1
+            limits(limit_numbers - 1:, found) = [speed, held%crank%speed]
+          end if
         end if
         ! An outcome that is not known is none that has changed.
         if (held%mark >= marks_of_outcome .or. before == 0 .or. mark < marks_of_outcome) mark = held%mark
@@ -209,6 +217,41 @@ contains
     end if
     numbers(:limit_numbers - 2) = [real([marks(1), next], wp), observed, bracket, real([outcome, kind], wp), at]
   end subroutine find_limit
+
+  !> A limit between two values at which the motion has the same `mark`: it settles at one of them only, or its period doubled or
+  !> halved, or it began or ceased to stick. The simpler of the two cycles is followed to its bifurcation. `known`: it was found.
+  subroutine find_change(grid, path, values, settled, mark, numbers, known)
+    type(grid_t), intent(in) :: grid
+    character(len=*), intent(in) :: path
+    real(wp), intent(in) :: values(2)
+    type(settled_t), intent(in) :: settled(2)
+    integer, intent(in) :: mark
+    real(wp), intent(out) :: numbers(:)
+    logical, intent(out) :: known
+    real(wp) :: none, at
+    integer :: kind, simple
+    logical :: doubles, sticks, settles
+    known = .false.
+    numbers = 0
+    if (all(settled%period == 0)) return
+    settles = all(settled%period > 0)
+    sticks = settles .and. (has_stick(settled(1)) .neqv. has_stick(settled(2)))
+    doubles = settles .and. maxval(settled%period) == 2*minval(settled%period)
+    if (settles .and. .not. (doubles .or. sticks)) return
+    simple = minloc(settled%period, 1, mask=settled%period > 0)
+    if (sticks .and. .not. doubles) simple = merge(2, 1, has_stick(settled(1)))
+    call find_kind(grid, path, settled(simple), values(simple), [minval(values), maxval(values)], kind, at)
+    known = kind /= kind_not_known
+    if (settles) known = (doubles .and. kind == kind_doubling) .or. (sticks .and. kind == kind_stick)
+    none = ieee_value(1.0_wp, ieee_quiet_nan)
+    numbers(:limit_numbers - 2) = [real([mark, mark], wp), minval(values), maxval(values), none, none, &
+                                   real([limit_not_known, kind], wp), at]
+  end subroutine find_change
+
+  pure logical function has_stick(settled)
+    type(settled_t), intent(in) :: settled
+    has_stick = index(word_text(settled%features%word), 'S') > 0
+  end function has_stick
 
   pure function numbers_of(held) result(numbers)
     type(hold_t), intent(in) :: held

@@ -193,7 +193,8 @@ contains
 
   end subroutine add_limits
 
-  !> What happens at a limit: impacts start or stop, or one regime of two bodies gives way to another.
+  !> What happens at a limit: impacts start or stop, or one regime of two bodies or outcome of a motor gives way to another; else
+  !> the bifurcation.
   pure function limit_name(session, limit) result(name)
     type(session_t), intent(in) :: session
     type(limit_t), intent(in) :: limit
@@ -204,6 +205,8 @@ contains
       associate (from => modulo(limit%from, marks_of_outcome), to => modulo(limit%to, marks_of_outcome))
         if (from /= to) then
           name = 'impacts_'//trim(merge('start', 'stop ', to == regime_impact))
+        else if (limit%from == limit%to) then
+          name = trim(limit_kinds(limit%kind))
         else
           name = trim(crank_outcomes(limit%from/marks_of_outcome))//'_to_'//trim(crank_outcomes(limit%to/marks_of_outcome))
         end if
@@ -298,7 +301,7 @@ contains
     case (limit_beyond_range)
       text = text//'; settled, the motion goes on to the end of the range'
     case default
-      text = text//'; where the settled motion ends is not known'
+      if (limit%kind == kind_not_known) text = text//'; where the settled motion ends is not known'
     end select
   end function limit_text
 

@@ -19,8 +19,6 @@ module motor_choices
   real(wp), parameter :: most_decay = 1e4_wp
   !> By how much a rod is longer than its crank at least, as a share: at the dead point the speed of the foot is infinite.
   real(wp), parameter :: dead_point = 1e-9_wp
-  character(len=*), parameter :: too_steep = 'motor.inertia: so small that the crank speed settles within 1e-4 of a turn; '// &
-    'allowed a larger one, or a drive of given speed without [motor]'
 
   public :: cannot_start, has_motor, has_ramp, resonance_of, supply_of, number_of_family, refuse_laws, speed_of, start_of_motor
 
@@ -166,18 +164,17 @@ contains
     else if (.not. abs(speed_of(motor)) > 0) then
       call fail(error, exit_bad_case, 'motor.voltage: found 0.0 V, allowed other than 0: the unit of time is a turn at '// &
                 'the no-load speed')
-    else if (slope_of(motor)*two_pi/abs(speed_of(motor)) > most_decay*value_of(motor, 'inertia')) then
-      call fail(error, exit_bad_case, too_steep)
     else
-      call refuse_control(motor, error)
+      call refuse_steep(motor, slope_of(motor), error)
+      if (.not. allocated(error)) call refuse_control(motor, error)
     end if
     if (allocated(error)) return
     call refuse_rates(choices, motor, error)
     if (allocated(error)) return
     if (drive%name == 'slider_crank') then
       if (.not. value_of(drive, 'rod') > (1 + dead_point)*value_of(drive, 'crank')) then
-        call fail(error, exit_bad_case, 'drive.rod: allowed above drive.crank: with a shorter rod the crank cannot turn fully, '// &
-                  'and one as long has a dead point')
+        call fail(error, exit_bad_case, 'drive.rod: found '//shown(value_of(drive, 'rod'))//' m, allowed above drive.crank: '// &
+                  'with a shorter rod the crank cannot turn fully, and one as long has a dead point')
       end if
     end if
   end subroutine refuse_laws
@@ -228,17 +225,35 @@ contains
     type(law_choice_t), intent(in) :: motor
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: problem
+    type(curve_t) :: curve
     problem = knots_problem(list_of(motor, 'speed'), size(list_of(motor, 'torque')))
     if (len(problem) > 0) then
       call fail(error, exit_bad_case, 'motor.speed: '//problem//': motor.torque is given at these speeds')
     else if (.not. speed_of(motor) > 0) then
       call fail(error, exit_bad_case, 'motor.torque: allowed values that fall below 0 at a speed above 0; a turn at that '// &
                 'speed is the unit of time')
-    else if (steepest(curve_of(list_of(motor, 'speed'), list_of(motor, 'torque')))*two_pi > &
-             most_decay*value_of(motor, 'inertia')*speed_of(motor)) then
-      call fail(error, exit_bad_case, too_steep)
+    else
+      curve = curve_of(list_of(motor, 'speed'), list_of(motor, 'torque'))
+      if (curve%slope(curve%count) > 0) then
+        call fail(error, exit_bad_case, 'motor.torque: found a slope of '//shown(curve%slope(curve%count))// &
+                  ' N m s at the last speed, allowed at most 0: beyond it the torque would grow with the speed without a bound')
+      else
+        call refuse_steep(motor, steepest(curve), error)
+      end if
     end if
   end subroutine refuse_table
+
+  !> A slope of the torque [N m s] at which the speed settles too fast.
+  pure subroutine refuse_steep(motor, slope, error)
+    type(law_choice_t), intent(in) :: motor
+    real(wp), intent(in) :: slope
+    type(error_t), allocatable, intent(inout) :: error
+    real(wp) :: least
+    least = slope*two_pi/(abs(speed_of(motor))*most_decay)
+    if (least > value_of(motor, 'inertia')) call fail(error, exit_bad_case, 'motor.inertia: found '// &
+      shown(value_of(motor, 'inertia'))//' kg m^2, allowed at least '//shown(least)//' kg m^2: the crank speed settles within '// &
+      '1e-4 of a turn; a drive of given speed has no [motor]')
+  end subroutine refuse_steep
 
   !> What is wrong with a ramp or a limit of the torque.
   pure subroutine refuse_control(motor, error)

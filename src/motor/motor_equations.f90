@@ -69,7 +69,8 @@ contains
       call add_unbalance(choices(at(5)), system)
       if (.not. system%mass*value_of(choices(at(6)), 'inertia') > system%moment**2) then
         call fail(error, exit_bad_case, 'motor.inertia: found '//to_text(real(value_of(choices(at(6)), 'inertia'), kind(1d0)))// &
-                  ', allowed above drive.moment^2/body.mass: the moment of inertia of the unbalanced mass')
+                  ' kg m^2, allowed above drive.moment^2/body.mass = '//to_text(real(system%moment**2/system%mass, kind(1d0)))// &
+                  ' kg m^2: the moment of inertia of the unbalanced mass')
         return
       end if
     else

@@ -282,6 +282,60 @@ def test_sweep_names_its_limits(separatrix, yoke, tmp_path, limit):
         assert (after > before) == (direction == "up")
 
 
+# machine, values, start w, x, v; kind and value of the limit: a doubling of a published benchmark, and the
+# voltage below which the body sticks at its turning points: the spring pulls with the static friction there
+CHANGES = [
+    (
+        "lever",
+        "motor.no_load_speed",
+        (10.08, 10.11),
+        (9.725, 1.08929, -1.13155),
+        "doubling",
+        10.09385546020162,
+    ),
+    ("impact", "motor.voltage", (2.01, 2.05), (3.8, 0.034, -0.006), "stick", 2.027819251935),
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=[one[4] for one in CHANGES])
+def test_sweep_names_changes_without_other_impacts(separatrix, tmp_path, change):
+    """A motion that goes on with as many impacts, or none, but doubles its period or begins to stick."""
+    machine, parameter, (low, high), start, kind, value = change
+    text = re.sub(r"(?s)\[\[axis.*|\[sweep\].*", "", (EXAMPLES / f"motor_{machine}.toml").read_text())
+    text += f'[sweep]\nparameter = "{parameter}"\nfrom = {low}\nto = {high}\nstep = {high - low!r}\n'
+    (tmp_path / "case.toml").write_text(text + 'directions = "down"\nstarts = [0, 0]\n')
+    keys = ("motor.crank_speed", "start.x0", "start.v0")
+    sets = [f"--set={key}={one}" for key, one in zip(keys, start, strict=True)]
+    sets += ["--set=run.duration=20", "--set=run.window=4"]
+    report = succeed(
+        separatrix, "sweep", "case.toml", *sets, "-o", "sweep.h5", folder=tmp_path, timeout=600
+    ).out
+    assert re.search(f"run down: {kind} between .* in steps; {kind} at ", report)
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        limits = file["limits"]
+        names = limits["kind"].attrs["flag_meanings"].split()
+        assert [names[code] for code in limits["kind"]] == [kind]
+        assert limits["name"].attrs["flag_meanings"] == f"{kind}_down"
+        assert abs(limits["value"][0] - value) < 1e-8
+
+
+def test_branch_passes_the_section(separatrix, tmp_path):
+    """At 2.492 V a turning point passes the section: the branch goes on with its events in another order."""
+    words = [
+        "--set=contact.upper=10",
+        "--set=start.x0=0.0274",
+        "--set=motor.crank_speed=3",
+        "--searches",
+        "1",
+    ]
+    words += ["--parameter", "motor.voltage", "--from", "2.47", "--to", "2.51", "-o", "branches.h5"]
+    report = succeed(separatrix, "branches", IMPACT, *words, folder=tmp_path, timeout=600).out
+    assert re.search(r"branch 1: period 1, \d+ points, ends: end of range$", report, re.MULTILINE)
+    assert "not known" not in report
+    with h5py.File(tmp_path / "branches.h5") as file:
+        assert file["v"][()].min() < 0 < file["v"][()].max()
+
+
 def test_exponents_of_a_limited_control(separatrix, yoke, tmp_path):
     """From standstill the torque is at its limit, on the cycle it is not: exponents are those without one."""
     motor = '[motor]\nlaw = "pi"\nproportional = 0.1\nintegral = 0.2\nreference = 9\ninertia = 0.05\n'
