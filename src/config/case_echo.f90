@@ -178,7 +178,8 @@ contains
     case ('body', 'structure')
       text = ''
     case ('drive')
-      text = line('body', quoted(trim(names(nint(value_of(law, 'body'))))))
+      text = ''
+      if (law%name /= 'drive:base') text = line('body', quoted(trim(names(nint(value_of(law, 'body'))))))
     case default
       text = line('between', '['//end_text('first_end')//', '//end_text('second_end')//']')
     end select

@@ -86,6 +86,7 @@ contains
     character(len=:), allocatable :: key
     key = 'force'
     if (has_load(choice)) key = 'load'
+    if (choice%name == 'drive:base') key = 'position'
   end function force_key
 
   !> Beside keys of the catalogue a parameter that no expression names is a misspelt key.

@@ -190,7 +190,7 @@ contains
     end if
     choice = law_choice(part_family, kind//':'//law)
     choice%label = name
-    if (kind == 'drive') call read_body(source, path, bodies, choice)
+    if (kind == 'drive' .and. law /= 'base') call read_body(source, path, bodies, choice)
     from_record = .false.
     if (choice%name == 'drive:force' .or. choice%name == 'drive:motion') call read_record(source, path, choice, from_record)
     if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
@@ -203,7 +203,7 @@ contains
       call read_own_law(source, choice)
       if (value_of(choice, 'static_coefficient') < 0) call set_value(choice, 'static_coefficient', &
                                                                       [value_of(choice, 'kinetic_coefficient')])
-    else if (part_law(choice%name) == own_law) then
+    else if (part_law(choice%name) == own_law .or. choice%name == 'drive:base') then
       call read_own_law(source, choice)
     else if (kind == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.

@@ -81,7 +81,7 @@ contains
     case ('body')
       return
     case ('drive')
-      text = text//' body = "BODY",'
+      if (law /= 'drive:base') text = text//' body = "BODY",'
     case default
       text = text//' between = ["BODY", "BODY" or "ground"],'
     end select

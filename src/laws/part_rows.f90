@@ -27,8 +27,8 @@ module part_rows
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
                                                                           contact_parameters%law /= 'kelvin_voigt')
-  character(len=law_length), parameter :: drives(5) = [character(len=law_length) :: 'drive:force', 'drive:motion', &
-    'drive:controller', 'drive:impulse', 'drive:expression']
+  character(len=law_length), parameter :: drives(6) = [character(len=law_length) :: 'drive:force', 'drive:motion', &
+    'drive:controller', 'drive:impulse', 'drive:expression', 'drive:base']
   character(len=1), parameter :: drive_unit(3) = ['N', 'm', 'm']
   character(len=law_length), parameter :: structures(2) = [character(len=law_length) :: 'structure:matrices', 'structure:modes']
   character(len=law_length), parameter :: points(2) = [character(len=law_length) :: 'point:watched', 'point:row']
@@ -76,7 +76,8 @@ module part_rows
     law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
     law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
     law_row_t('part', drives(4), 'impulse on a body at a time after the start', ''), &
-    law_row_t('part', drives(5), 'any force on a body, an expression `force` [N] of t, phase, x, v, NAME.x', '')]
+    law_row_t('part', drives(5), 'any force on a body, an expression `force` [N] of t, phase, x, v, NAME.x', ''), &
+    law_row_t('part', drives(6), 'the ground moves, an expression `position` [m] of t and phase; bodies are seen from it', '')]
 
   !> The ends of a part are numbers of reference points: bodies, then points of structures, in the order of the file, 0 the ground;
   !> of a drive, one of them.
@@ -184,7 +185,7 @@ module part_rows
                      optional=.true., default=none_above), i=1, 3), &
     (parameter_row_t('part', contacts(i), 'lower', 'm', any_value, 'smallest value of second minus first', &
                      optional=.true., default=none_below), i=1, 3), &
-    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 5), &
+    (parameter_row_t('part', drives(i), 'body', '1', not_negative, 'number of the body', optional=.true.), i=1, 6), &
     (parameter_row_t('part', drives(i), 'frequency', 'rad/s', not_negative, &
                      'angular frequency; that of the first drive if absent', optional=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'mean', drive_unit(i), any_value, 'mean', optional=.true.), i=1, 3), &
@@ -202,7 +203,7 @@ module part_rows
                     'time between samples, the force being held in between; 0: continuous', optional=.true.), &
     parameter_row_t('part', drives(4), 'impulse', 'N s', any_value, 'impulse'), &
     parameter_row_t('part', drives(4), 'time', 's', not_negative, 'after the start', optional=.true.), &
-    parameter_row_t('part', drives(5), 'frequency', 'rad/s', not_negative, &
-                    'angular frequency of the phase; that of the first drive if absent', optional=.true.)]
+    (parameter_row_t('part', drives(i), 'frequency', 'rad/s', not_negative, &
+                     'angular frequency of the phase; that of the first drive if absent', optional=.true.), i=5, 6)]
 
 end module part_rows

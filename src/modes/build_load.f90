@@ -14,10 +14,13 @@ module build_load
   use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_kind, part_law, path_of, rows_of, text_of, &
     value_of
   use multibody, only: joint_t, load_t, multibody_t, source_t
+  use operations, only: op_add, op_multiply, op_negative
   use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
   use reference_points, only: is_reference_point, row_of
   use status, only: exit_bad_case
   use tape, only: constant, new_tape, parameter_node, variable
+  use tape_algebra, only: binary, unary
+  use tape_derivative, only: differentiate
   use tape_sign, only: positive_part
   use tape_value, only: evaluate
   use text, only: to_text
@@ -50,11 +53,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(names_t) :: names
     character(len=:), allocatable :: key, text
-    logical :: is_load
+    logical :: is_load, is_base
     integer :: node
     is_load = index(choices(i)%name, 'friction:') == 1
+    is_base = choices(i)%name == 'drive:base'
     text = 'force'
     if (is_load) text = 'load'
+    if (is_base) text = 'position'
     key = path_of(choices(i))//'.'//text
     text = text_of(choices(i), text)
     allocate (joint%load)
@@ -63,17 +68,18 @@ contains
       allocate (names%names(0), names%nodes(0), names%of_variables(0), names%of_parameters(0), load%sources(0), load%parameters(0))
       allocate (load%rates(0))
       call add_clock(machine, load, names)
-      if (.not. is_load) call add_own_coordinate(joint%row, load, names)
-      call add_coordinates(choices, text, rows, load, names)
+      if (.not. (is_load .or. is_base)) call add_own_coordinate(joint%row, load, names)
+      if (.not. is_base) call add_coordinates(choices, text, rows, load, names)
       call add_parameters(choices, i, load, names)
-      call add_springs(choices, text, rows, load, names)
-      call add_contacts(choices, text, rows, load, names, error)
+      if (.not. is_base) call add_springs(choices, text, rows, load, names)
+      if (.not. is_base) call add_contacts(choices, text, rows, load, names, error)
       if (allocated(error)) then
         error%message = key//': '//error%message
         return
       end if
       call read_expression(text, names%names, names%nodes, load%tape, node, error)
-      if (.not. allocated(error)) call check_unit(machine, load, names, node, error)
+      if (.not. allocated(error)) call check_unit(machine, load, names, node, merge('m', 'N', is_base), error)
+      if (is_base .and. .not. allocated(error)) call accelerate(machine, load, node, error)
       if (.not. allocated(error)) call check_values(is_load, load, node, error)
       if (allocated(error)) then
         error%message = key//': '//error%message
@@ -273,21 +279,47 @@ contains
     end do
   end subroutine add_contacts
 
-  !> The expression is in N, if its parameters have units.
-  pure subroutine check_unit(machine, load, names, node, error)
+  !> The expression is in `unit`, if its parameters have units.
+  pure subroutine check_unit(machine, load, names, node, unit, error)
     type(multibody_t), intent(in) :: machine
     type(load_t), intent(in) :: load
     type(names_t), intent(in) :: names
     integer, intent(in) :: node
+    character(len=*), intent(in) :: unit
     type(error_t), allocatable, intent(inout) :: error
     type(quantity_t) :: quantity(load%tape%count)
     integer :: fault(load%tape%count)
     character(len=:), allocatable :: problem
     if (size(machine%angles) > 0) return
     call quantities_of(load%tape, names%of_variables, names%of_parameters, quantity, fault)
-    problem = unit_problem(load%tape, node, quantity, fault, 'N')
+    problem = unit_problem(load%tape, node, quantity, fault, unit)
     if (len(problem) > 0) call fail(error, exit_bad_case, problem)
   end subroutine check_unit
+
+  !> Makes the negative acceleration of a position over time, two derivatives. A jump or a corner would be an impulse on each body.
+  pure subroutine accelerate(machine, load, node, error)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(inout) :: load
+    integer, intent(inout) :: node
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: time, phase, speed, made, round, by_time(1), by_phase(1)
+    if (.not. all(load%tape%nodes(load%tape%switches%argument)%is_steady)) then
+      call fail(error, exit_bad_case, 'found abs, sign, min, max or if of the time, allowed a smooth function: bodies on a '// &
+                'ground that jumps have no finite acceleration')
+      return
+    end if
+    call variable(load%tape, 1, time)
+    call variable(load%tape, 2, phase)
+    call constant(load%tape, machine%frequency, speed)
+    do round = 1, 2
+      call differentiate(load%tape, [node], time, by_time)
+      call differentiate(load%tape, [node], phase, by_phase)
+      call binary(load%tape, op_multiply, speed, by_phase(1), made)
+      call binary(load%tape, op_add, by_time(1), made, node)
+    end do
+    made = node
+    call unary(load%tape, op_negative, made, node)
+  end subroutine accelerate
 
   !> A constant load is not negative.
   pure subroutine check_values(is_load, load, node, error)

@@ -66,6 +66,8 @@ contains
         call add_force(machine, rows(:, reference_point_of(choices(i))), wave%mean, wave%harmonic)
       case ('drive:expression')
         call add_own_force(machine, choices, i, rows(:, reference_point_of(choices(i))), rows, error)
+      case ('drive:base')
+        call add_base(machine, choices, i, rows, error)
       case ('spring:expression')
         call add_own_force(machine, choices, i, row_of(rows, choices(i)), rows, error)
       case default
@@ -168,7 +170,7 @@ contains
   pure logical function varies(choice)
     type(law_choice_t), intent(in) :: choice
     varies = .false.
-    if (choice%name == 'drive:expression') return
+    if (any(choice%name == [character(len=16) :: 'drive:expression', 'drive:base'])) return
     varies = abs(value_of(choice, 'amplitude')) > 0 .or. size(list_of(choice, 'cosine')) + size(list_of(choice, 'sine')) > 0
   end function varies
 
@@ -227,6 +229,30 @@ contains
     call set_expression(choices, i, rows, machine, joint, error)
     if (.not. allocated(error)) call add_joint(machine, joint)
   end subroutine add_own_force
+
+  !> The motion of the ground, from which positions are seen: each body has the inertia of its acceleration.
+  pure subroutine add_base(machine, choices, i, rows, error)
+    type(multibody_t), intent(inout) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: rows(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: row(size(rows, 1))
+    integer :: k, body
+    if (any(index(choices%name, 'structure:') == 1) .or. count(choices%name == 'drive:base') > 1) then
+      call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "base" beside another one or a [structure.NAME], '// &
+                'allowed one, with bodies')
+      return
+    end if
+    row = 0
+    body = 0
+    do k = 1, size(choices)
+      if (index(choices(k)%name, 'body:') /= 1) cycle
+      body = body + 1
+      row = row + value_of(choices(k), 'mass')*rows(:, body)
+    end do
+    call add_own_force(machine, choices, i, row, rows, error)
+  end subroutine add_base
 
   !> Friction of any law: dry, with a normal force of its own, or with memory.
   pure subroutine add_any_friction(machine, choices, i, rows, error)
