@@ -19,6 +19,7 @@ from separatrix.version import __version__
 
 if TYPE_CHECKING:
     from separatrix.boundaries import boundary as boundary
+    from separatrix.cache import cached as cached
     from separatrix.cases import Case as Case
     from separatrix.cases import linspace as linspace
     from separatrix.cases import load as load
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from separatrix.maps import basin as basin
     from separatrix.maps import points as points
     from separatrix.maps import sweep as sweep
+    from separatrix.matching import attractors_of as attractors_of
     from separatrix.measuring.along import measures_along as measures_along
     from separatrix.measuring.api import measures as measures
     from separatrix.measuring.api import tipping as tipping
@@ -50,9 +52,11 @@ _HOME = {
     "Case": "separatrix.cases",
     "Discovery": "separatrix.discovery.api",
     "Stability": "separatrix.orbits",
+    "attractors_of": "separatrix.matching",
     "basin": "separatrix.maps",
     "boundary": "separatrix.boundaries",
     "branches": "separatrix.orbits",
+    "cached": "separatrix.cache",
     "decode_flags": "separatrix.open",
     "decode_word": "separatrix.open",
     "decode_words": "separatrix.open",
