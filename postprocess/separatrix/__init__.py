@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from separatrix.measuring.api import tipping as tipping
     from separatrix.measuring.survival import survival as survival
     from separatrix.motions import trajectory as trajectory
+    from separatrix.noise import first_passage as first_passage
+    from separatrix.noise import noisy as noisy
     from separatrix.open import decode_flags as decode_flags
     from separatrix.open import decode_word as decode_word
     from separatrix.open import decode_words as decode_words
@@ -63,11 +65,13 @@ _HOME = {
     "discover": "separatrix.discovery.api",
     "effects": "separatrix.library",
     "exponents_along": "separatrix.exponents",
+    "first_passage": "separatrix.noise",
     "flag_names": "separatrix.open",
     "linspace": "separatrix.cases",
     "load": "separatrix.cases",
     "measures": "separatrix.measuring.api",
     "measures_along": "separatrix.measuring.along",
+    "noisy": "separatrix.noise",
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
     "section": "separatrix.sections",

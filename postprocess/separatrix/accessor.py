@@ -211,6 +211,7 @@ class Accessor:
             erosion,
             exponents,
             motion_section,
+            noise,
             points,
             survival,
             sweep,
@@ -231,7 +232,7 @@ class Accessor:
                 modules = {
                     "sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches,
                     "measures": erosion, "survival": survival, "section": motion_section,
-                    "exponents": exponents,
+                    "exponents": exponents, "noise": noise, "first_passage": noise,
                 }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
             return made[name or next(iter(made))]

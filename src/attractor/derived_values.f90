@@ -221,8 +221,8 @@ contains
     squares = matmul(values**2, weight)/lasts
   end subroutine integrate
 
-  !> Values of `wanted` on attractor `k` of a catalogue, as far as it determines them: over its cycle; of one body in chaotic motion, or in one not known to be
-  !> periodic, over the window of `span`. Not numbers for a family of cycles.
+  !> Values of `wanted` on attractor `k` of a catalogue, as far as it determines them: over its cycle; of one body in chaotic
+  !> motion, or in one not known to be periodic, over the window of `span`. Not numbers for a family of cycles.
   pure subroutine derive_attractor(machine, laws, wanted, catalogue, k, span, values)
     class(machine_t), intent(in) :: machine
     type(law_choice_t), intent(in) :: laws(:)
