@@ -19,6 +19,7 @@ from separatrix.version import __version__
 
 if TYPE_CHECKING:
     from separatrix.boundaries import boundary as boundary
+    from separatrix.cache import cached as cached
     from separatrix.cases import Case as Case
     from separatrix.cases import linspace as linspace
     from separatrix.cases import load as load
@@ -29,11 +30,14 @@ if TYPE_CHECKING:
     from separatrix.maps import basin as basin
     from separatrix.maps import points as points
     from separatrix.maps import sweep as sweep
+    from separatrix.matching import attractors_of as attractors_of
     from separatrix.measuring.along import measures_along as measures_along
     from separatrix.measuring.api import measures as measures
     from separatrix.measuring.api import tipping as tipping
     from separatrix.measuring.survival import survival as survival
     from separatrix.motions import trajectory as trajectory
+    from separatrix.noise import first_passage as first_passage
+    from separatrix.noise import noisy as noisy
     from separatrix.open import decode_flags as decode_flags
     from separatrix.open import decode_word as decode_word
     from separatrix.open import decode_words as decode_words
@@ -50,20 +54,24 @@ _HOME = {
     "Case": "separatrix.cases",
     "Discovery": "separatrix.discovery.api",
     "Stability": "separatrix.orbits",
+    "attractors_of": "separatrix.matching",
     "basin": "separatrix.maps",
     "boundary": "separatrix.boundaries",
     "branches": "separatrix.orbits",
+    "cached": "separatrix.cache",
     "decode_flags": "separatrix.open",
     "decode_word": "separatrix.open",
     "decode_words": "separatrix.open",
     "discover": "separatrix.discovery.api",
     "effects": "separatrix.library",
     "exponents_along": "separatrix.exponents",
+    "first_passage": "separatrix.noise",
     "flag_names": "separatrix.open",
     "linspace": "separatrix.cases",
     "load": "separatrix.cases",
     "measures": "separatrix.measuring.api",
     "measures_along": "separatrix.measuring.along",
+    "noisy": "separatrix.noise",
     "open_result": "separatrix.open",
     "points": "separatrix.maps",
     "section": "separatrix.sections",

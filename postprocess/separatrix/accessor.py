@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from separatrix.cases import Case
+from separatrix.derived import at_points, derived_names
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.open import decode_flags, decode_words, flag_names, table
 from separatrix.variables import KINDS, REGIMES, is_start
@@ -113,6 +114,8 @@ class Accessor:
     def table(self, name: str | None = None) -> "pandas.DataFrame":
         """Return a table of this result: "attractors", "labelled_points", or that of a variable.
 
+        With a variable of a map it has its derived quantities too.
+
         The table of a variable has all variables over the same dimensions: of a trajectory those over time
         with "x", its events with "event_kind". Without a name it is the attractors of a map, the samples of
         a motion, else the table of `regime` or of the first variable. Codes and event words are texts;
@@ -122,7 +125,14 @@ class Accessor:
 
         if name == "attractors" or (name is None and self.kind == "basin" and self._has_catalogue()):
             return self.attractors
-        return self.labelled_points if name == "labelled_points" else frame_of(self._result, name)
+        if name == "labelled_points":
+            return self.labelled_points
+        return frame_of(self._result.assign(self.derived()) if self._has_catalogue() else self._result, name)
+
+    def derived(self) -> dict[str, xr.DataArray]:
+        """Return the derived quantities of a map at its points, by name; NaN without an attractor."""
+        self._require("basin")
+        return {name: at_points(self._result, name) for name in derived_names(self._result)}
 
     def save_table(self, path: str | Path, name: str | None = None, *, overwrite: bool = False) -> Path:
         """Write a `table` as .csv, at full precision, or with pyarrow as .parquet; return the path."""
@@ -181,7 +191,7 @@ class Accessor:
         "settle_time", ...) and "shares", of a sweep "amplitude" and "bifurcation", of a trajectory "history",
         "phase", "section", "energy", "impacts" and "contact", of points "regime", of branches "branches" and
         "curves", of boundaries "boundary", of measures along a parameter "erosion", of survival "survival",
-        of a section "section", of exponents "exponents".
+        of a section "section", of exponents "exponents", of maps and sweeps "derived_NAME".
         Notebooks show the figure; `savefig` writes it, `save` in several formats.
 
         `ax`: axes of matplotlib to draw into; a sequence of them for a figure of several panels. The figure
@@ -201,6 +211,7 @@ class Accessor:
             erosion,
             exponents,
             motion_section,
+            noise,
             points,
             survival,
             sweep,
@@ -221,7 +232,7 @@ class Accessor:
                 modules = {
                     "sweep": sweep, "trajectory": trajectory, "points": points, "branches": branches,
                     "measures": erosion, "survival": survival, "section": motion_section,
-                    "exponents": exponents,
+                    "exponents": exponents, "noise": noise, "first_passage": noise,
                 }  # fmt: skip
                 made = modules[kind].figures(self._result, heading, look)
             return made[name or next(iter(made))]
@@ -274,6 +285,36 @@ class Accessor:
         look = _look(wishes)
         heading = self._heading(title, look)
         return animate(self._result, parameter, Path(path), heading, field, look, frames_per_second, dpi)
+
+    def film(
+        self,
+        path: str | Path,
+        *,
+        begin: float | None = None,
+        end: float | None = None,
+        speed: float = 1.0,
+        frames_per_second: float = 25.0,
+        dpi: int = 100,
+        title: str | None = None,
+    ) -> Path:
+        """Write a film of a motion, as .gif or, with ffmpeg, as .mp4; return the path.
+
+        From `begin` to `end` [s], the last ten drive periods if not given. `speed`: seconds of the motion
+        in a second of the film.
+        """
+        from separatrix.figures.film import film
+
+        self._require("trajectory")
+        return film(
+            self._result,
+            Path(path),
+            self._heading(title, _look({})),
+            begin,
+            end,
+            speed,
+            frames_per_second,
+            dpi,
+        )
 
     def _heading(self, title: str | None, look: "Look") -> str:
         """Return the title of a figure: that of the result, but not above axes of the user."""

@@ -25,12 +25,12 @@ _OF_MOTOR = ("motor.crank_speed", "motor.start_current", "motor.start_integral")
 
 
 def can_label(case: Case) -> bool:
-    """Whether the library does it: one body on a line, every point of the grid, starts."""
+    """Whether the library does it: one body on a line, all points of the grid, starts, nothing derived."""
     resolved = case.resolved
     starts = any(axis["name"] in (*STARTS, *_OF_MOTOR) for axis in resolved.get("axis", []))
     # a machine of several bodies has no restoring law
     line = resolved.get("restoring", {}).get("law", "pendulum") != "pendulum"
-    more = "refine" in resolved or "driven_mass" in resolved["body"]
+    more = "refine" in resolved or "derived" in resolved or "driven_mass" in resolved["body"]
     return starts and line and not more
 
 

@@ -95,8 +95,8 @@ def trajectory(
 
 
 def _has_more(resolved: dict) -> bool:
-    """Whether a motion has more than the samples of one body: other bodies, or the crank of a motor."""
-    return several_bodies(resolved) or "motor" in resolved
+    """Whether a motion has more than the samples of one body: other bodies, a crank, derived quantities."""
+    return several_bodies(resolved) or "motor" in resolved or "derived" in resolved
 
 
 def _of_library(case: Case) -> tuple[xr.Dataset, str]:

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the program `separatrix` is, and the command of that name, which becomes it."""
 
+import hashlib
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -34,6 +36,18 @@ def program_path() -> Path:
         "build it (cmake --build build --target separatrix) or name it in SEPARATRIX_PROGRAM",
         NO_INPUT,
     )
+
+
+def version_of_program() -> str:
+    """Return what decides the results of the program: version and commit; of changed sources its file."""
+    path = program_path()
+    lines = subprocess.run(
+        [path, "--version"], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    found = [line for line in lines if line.startswith(("separatrix ", "commit "))]
+    if "-dirty" in found[-1]:
+        found.append(hashlib.sha256(path.read_bytes()).hexdigest())
+    return "\n".join(found)
 
 
 def main() -> int:

@@ -17,7 +17,7 @@ module derived_quantities
   implicit none
   private
 
-  public :: compile, values_at_samples, is_power, depends_on_position
+  public :: compile, values_at_samples, is_power, depends_on_position, is_fixed
 
   integer, parameter, public :: longest_derived = 20
   character(len=*), parameter, public :: derived_kinds(4) = [character(len=5) :: 'mean', 'rms', 'drift', 'power']
@@ -124,6 +124,24 @@ contains
       if (has_name(one%expression, trim(names(i)))) depends_on_position = .true.
     end do
   end function depends_on_position
+
+  !> Whether a cycle determines a quantity: it depends on no body that may be anywhere beside the cycle.
+  pure logical function is_fixed(machine, one)
+    class(machine_t), intent(in) :: machine
+    type(derived_t), intent(in) :: one
+    character(len=longest_path), allocatable :: names(:)
+    integer :: i
+    is_fixed = .true.
+    names = column_names(machine)
+    do i = 1, size(names)
+      if (machine%fixes(trim(names(i)))) cycle
+      if (is_power(one)) then
+        if (is_speed(trim(names(i))) .or. names(i) == 'v') is_fixed = .false.
+      else if (has_name(one%expression, trim(names(i)))) then
+        is_fixed = .false.
+      end if
+    end do
+  end function is_fixed
 
   pure logical function is_speed(name)
     character(len=*), intent(in) :: name

@@ -6,7 +6,8 @@ module derived_values
   use attractors, only: attractor_t, find_box, kind_chaotic, kind_family, kind_not_known
   use capture, only: attractor_reached
   use constants, only: two_pi
-  use derived_quantities, only: compile, compiled_t, depends_on_position, derived_t, is_power, power_names, values_at_samples
+  use derived_quantities, only: compile, compiled_t, depends_on_position, derived_t, is_fixed, is_power, power_names, &
+    values_at_samples
   use errors, only: error_t
   use kinds, only: int64, wp
   use law_table, only: law_choice_t
@@ -220,8 +221,8 @@ contains
     squares = matmul(values**2, weight)/lasts
   end subroutine integrate
 
-  !> Values of `wanted` on attractor `k` of a catalogue: over its cycle; of one body in chaotic motion, or in one not known to be
-  !> periodic, over the window of `span`. Not numbers for a family of cycles.
+  !> Values of `wanted` on attractor `k` of a catalogue, as far as it determines them: over its cycle; of one body in chaotic
+  !> motion, or in one not known to be periodic, over the window of `span`. Not numbers for a family of cycles.
   pure subroutine derive_attractor(machine, laws, wanted, catalogue, k, span, values)
     class(machine_t), intent(in) :: machine
     type(law_choice_t), intent(in) :: laws(:)
@@ -233,7 +234,7 @@ contains
     class(machine_t), allocatable :: on_section
     integer :: i
     values = ieee_value(1.0_wp, ieee_quiet_nan)
-    if (catalogue(k)%kind == kind_family) return
+    if (catalogue(k)%kind == kind_family .or. catalogue(k)%any_position) return
     if (catalogue(k)%kind == kind_chaotic .or. catalogue(k)%kind == kind_not_known) then
       call derive_over_window(machine, laws, wanted, catalogue, k, span, values)
       return
@@ -244,9 +245,9 @@ contains
                lasts => merge(catalogue(k)%duration, machine%period*max(1, catalogue(k)%period), catalogue(k)%duration > 0))
       call derive_over(machine, laws, wanted, start, lasts, real(max(1, catalogue(k)%period), wp), values)
     end associate
-    if (.not. catalogue(k)%rests) return
     do i = 1, size(wanted)
-      if (is_power(wanted(i))) cycle
+      if (.not. is_fixed(machine, wanted(i))) values(i) = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (is_power(wanted(i)) .or. .not. catalogue(k)%rests) cycle
       if (depends_on_position(machine, wanted(i))) values(i) = ieee_value(1.0_wp, ieee_quiet_nan)
     end do
   end subroutine derive_attractor

@@ -15,13 +15,14 @@ module derived_report
   use map_schema, only: schema_t, type_float64
   use motion_state, only: tally_t
   use single_trajectory, only: span_t
+  use status, only: reason_time_over
   use team, only: team_t
   use text, only: to_text
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: add_derived_catalogue, derive_motion, describe_derived, report_derived, derived_meaning
+  public :: add_derived_catalogue, describe_derived, report_derived, derived_meaning
 
 contains
 
@@ -74,7 +75,8 @@ contains
     end do
   end subroutine derive_entries
 
-  !> Quantities of one motion from the start of a grid: over the `cycle` on which it has settled, else over the window at its end.
+  !> Quantities of one motion from the start of a grid: over the `cycle` on which it has settled; what that does not determine over
+  !> the window at its end.
   pure subroutine derive_motion(moving, grid, span, cycle, values)
     class(machine_t), intent(in) :: moving
     type(grid_t), intent(in) :: grid
@@ -83,13 +85,13 @@ contains
     real(wp), allocatable, intent(out) :: values(:)
     type(section_state_t) :: section
     type(tally_t) :: tally
-    real(wp) :: origin, until
+    real(wp) :: origin, until, at_end(size(grid%derived))
     integer :: reason
     allocate (values(size(grid%derived)), source=ieee_value(1.0_wp, ieee_quiet_nan))
     if (size(values) == 0) return
     if (cycle%period > 0) then
       call derive_attractor(moving, grid%laws, grid%derived, [cycle], 1, span, values)
-      return
+      if (.not. any(ieee_is_nan(values))) return
     end if
     section = moving%start(grid%start)
     call moving%begin_tally(section, tally)
@@ -109,18 +111,25 @@ contains
       tally%steps = 0
     end do
     if (reason /= 0) return
-    call derive_over(moving, grid%laws, grid%derived, section, span%window, span%window/moving%period, values)
+    call derive_over(moving, grid%laws, grid%derived, section, span%window, span%window/moving%period, at_end)
+    where (ieee_is_nan(values)) values = at_end
   end subroutine derive_motion
 
-  !> As attributes.
-  subroutine describe_derived(derived, values, schema)
-    type(derived_t), intent(in) :: derived(:)
-    real(wp), intent(in) :: values(:)
+  !> Quantities of a motion that ended for a `reason`, as attributes; not numbers unless its time was over.
+  subroutine describe_derived(moving, grid, span, cycle, reason, values, schema)
+    class(machine_t), intent(in) :: moving
+    type(grid_t), intent(in) :: grid
+    type(span_t), intent(in) :: span
+    type(attractor_t), intent(in) :: cycle
+    integer, intent(in) :: reason
+    real(wp), allocatable, intent(out) :: values(:)
     type(schema_t), intent(inout) :: schema
     integer :: i
-    do i = 1, size(derived)
-      call schema%add_attribute('', 'derived_'//trim(derived(i)%name), values(i))
-      call schema%add_attribute('', 'derived_'//trim(derived(i)%name)//'_units', derived(i)%unit)
+    call derive_motion(moving, grid, span, cycle, values)
+    if (reason /= reason_time_over) values = ieee_value(1.0_wp, ieee_quiet_nan)
+    do i = 1, size(values)
+      call schema%add_attribute('', 'derived_'//trim(grid%derived(i)%name), values(i))
+      call schema%add_attribute('', 'derived_'//trim(grid%derived(i)%name)//'_units', grid%derived(i)%unit)
     end do
   end subroutine describe_derived
 

@@ -6,10 +6,10 @@ module info_catalogue
   use attractors, only: kind_chaotic, kind_family, kind_names, kind_not_known, last_kind, regime_names
   use errors, only: error_t
   use event_words, only: word_text
-  use journal, only: json_text
+  use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use map_reader, only: reader_t
-  use text, only: to_text
+  use text, only: starts_with, to_text
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   implicit none
   private
@@ -18,6 +18,11 @@ module info_catalogue
 
   character(len=*), parameter :: columns(8) = [character(len=18) :: 'attractor', 'slice', 'regime', &
     'period', 'event_word', 'amplitude', 'impacts_per_period', 'count']
+
+  type :: derived_column_t
+    character(len=:), allocatable :: name
+    real(wp), allocatable :: values(:)
+  end type derived_column_t
 
 contains
 
@@ -29,6 +34,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: table(:, :), kinds_of_entries(:), rotations(:)
     character(len=:), allocatable :: line
+    type(derived_column_t), allocatable :: derived(:)
     integer :: i, k
     if (.not. reader%has('/catalogue/attractor')) return
     call reader%read_columns([('/catalogue/'//columns(k), k=1, size(columns))], table, error)
@@ -36,6 +42,7 @@ contains
     if (.not. allocated(error)) call read_if_there(reader, 'kind', size(table, 1), kinds_of_entries, error)
     ! Of an angle.
     if (.not. allocated(error)) call read_if_there(reader, 'rotation_number', size(table, 1), rotations, error)
+    if (.not. allocated(error)) call read_derived(reader, size(table, 1), derived, error)
     if (allocated(error)) return
     if (json) body = body//', "catalogue": ['
     if (.not. json) body = body//new_line('a')//'  catalogue (R, L: impact at upper, lower barrier; S: stick; '// &
@@ -43,12 +50,51 @@ contains
     do i = 1, size(table, 1)
       line = marks_text(table(i, :), json)
       if (allocated(rotations)) line = line//rotation_text(rotations(i), json)
+      do k = 1, size(derived)
+        line = line//derived_text(derived(k), i, json)
+      end do
       if (allocated(kinds_of_entries)) line = line//kind_text(whole(kinds_of_entries(i)), json)
       if (json) body = body//trim(merge(', ', '  ', i > 1))//'{'//line//'}'
       if (.not. json) body = body//new_line('a')//'    '//line
     end do
     if (json) body = body//']'
   end subroutine add_catalogue
+
+  !> The derived quantities of the attractors.
+  subroutine read_derived(reader, length, derived, error)
+    type(reader_t), intent(in) :: reader
+    integer, intent(in) :: length
+    type(derived_column_t), allocatable, intent(out) :: derived(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names(:)
+    logical, allocatable :: are_groups(:)
+    type(derived_column_t) :: column
+    integer :: i
+    allocate (derived(0))
+    call reader%children('/catalogue', names, are_groups, error)
+    if (allocated(error)) return
+    do i = 1, size(names)
+      if (.not. starts_with(names(i), 'derived_')) cycle
+      column%name = trim(names(i))
+      call read_if_there(reader, column%name, length, column%values, error)
+      if (allocated(error)) return
+      if (allocated(column%values)) derived = [derived, column]
+    end do
+  end subroutine read_derived
+
+  function derived_text(column, entry, json) result(text)
+    type(derived_column_t), intent(in) :: column
+    integer, intent(in) :: entry
+    logical, intent(in) :: json
+    character(len=:), allocatable :: text
+    if (json) then
+      text = ', '//json_text(column%name)//': '//json_number(column%values(entry))
+    else if (ieee_is_nan(column%values(entry))) then
+      text = ', '//column%name//' not known'
+    else
+      text = ', '//column%name//' '//to_text(column%values(entry), 6)
+    end if
+  end function derived_text
 
   !> A column of the catalogue; not allocated where the file has none, or one of another length.
   subroutine read_if_there(reader, name, length, values, error)

@@ -58,7 +58,7 @@ contains
       call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', 12)
     end if
     if (has_motor(session%the_case%laws)) call add_crank()
-    call add_derived()
+    call add_derived(session, chains, dimensions, schema)
     call add_sections(chains, [dimensions, [character(len=name_length) :: 'sample']], schema)
     if (size(chains%limits) > 0) call add_limits(session, schema, chains%limits)
     call add_barriers(session, schema)
@@ -84,23 +84,28 @@ contains
       end do
     end subroutine add_crank
 
-    subroutine add_derived()
-      integer :: i
-      do i = 1, size(session%the_case%derived)
-        associate (one => session%the_case%derived(i))
-          call schema%add_variable('derived_'//trim(one%name), type_float64, dimensions, units=one%unit, own_units=.true., &
-                                   long_name=derived_meaning(one)//' over the cycle or window')
-          call fill(hold_derived + i - 1)
-        end associate
-      end do
-    end subroutine add_derived
-
     subroutine fill(row)
       integer, intent(in) :: row
       schema%variables(size(schema%variables))%data = reshape(chains%holds(row, :, :), [2*size(chains%holds, 2)])
     end subroutine fill
 
   end subroutine describe_chains
+
+  !> The derived quantities of the holds.
+  subroutine add_derived(session, chains, dimensions, schema)
+    type(session_t), intent(in) :: session
+    type(chains_t), intent(in) :: chains
+    character(len=name_length), intent(in) :: dimensions(:)
+    type(schema_t), intent(inout) :: schema
+    integer :: i
+    do i = 1, size(session%the_case%derived)
+      associate (one => session%the_case%derived(i))
+        call schema%add_variable('derived_'//trim(one%name), type_float64, dimensions, units=one%unit, own_units=.true., &
+                                 long_name=derived_meaning(one)//' over the cycle or window', &
+                                 data=reshape(chains%holds(hold_derived + i - 1, :, :), [2*size(chains%holds, 2)]))
+      end associate
+    end do
+  end subroutine add_derived
 
   !> The last positions and velocities on the section.
   subroutine add_sections(chains, dimensions, schema)

@@ -11,7 +11,8 @@ module trajectory_driver
   use constants, only: unreachable
   use contact_law, only: barrier_positions, contact_t
   use crank_report, only: describe_crank
-  use derived_report, only: derive_motion, describe_derived, report_derived
+  use derived_report, only: describe_derived, report_derived
+  use derived_quantities, only: derived_t
   use endings, only: assess_motion
   use errors, only: error_t, fail
   use file_layout, only: add_events
@@ -34,7 +35,6 @@ module trajectory_driver
   use trajectory_report, only: counted_over, ended_after, explained, report
   use single_trajectory, only: begin_trajectory, begin_record, conclude, trajectory_state_t, end_record, fit_window, go_on, &
     is_recorded, outcome_t, span_t
-  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
@@ -79,11 +79,9 @@ contains
     call fly(session, moving, span, grid%start, outcome, log)
     call describe_cycle(moving, span_of(session%the_case), span, session%the_case%attractors%max_period, grid%start, outcome, &
                         cycle)
-    call derive_motion(moving, grid, span, cycle, derived)
-    if (outcome%reason /= reason_time_over) derived = ieee_value(1.0_wp, ieee_quiet_nan)
     call describe_file(session, 'trajectory', schema)
     call describe_motion(moving, span, outcome, cycle, log, schema)
-    call describe_derived(grid%derived, derived, schema)
+    call describe_derived(moving, grid, span, cycle, outcome%reason, derived, schema)
     call describe_crank(session%the_case%laws, span%window, log, schema)
     call add_history(moving, grid%start(3), log, schema)
     call add_events(schema, log%event_kind(:log%events), log%event_data(:, :log%events))
@@ -103,8 +101,7 @@ contains
     call session%stop_if(error)
     call check_written(session, path)
     call report(session, moving, span, outcome, cycle, log)
-    if (outcome%reason == reason_time_over) call report_derived(session%journal, grid%derived, derived)
-    call report_files(session, command, path)
+    call report_files(session, command, path, grid%derived, derived)
     call assess_motion(outcome%reason, explained(outcome%reason)//' after '// &
                       to_text(ended_after(moving, outcome%reason, log), 6)//' s of '//to_text(span%duration, 6)//' s; '// &
                       path//' has what comes before', command%partial, error)
@@ -357,10 +354,13 @@ contains
   end subroutine write_events
 
   !> A line for each file that was written.
-  subroutine report_files(session, command, path)
+  subroutine report_files(session, command, path, wanted, derived)
     type(session_t), intent(inout) :: session
     type(command_t), intent(in) :: command
     character(len=*), intent(in) :: path
+    type(derived_t), intent(in) :: wanted(:)
+    real(wp), intent(in) :: derived(:)
+    call report_derived(session%journal, wanted, derived)
     call session%journal%line('written', 'wrote '//path)
     if (len(command%csv) > 0) call session%journal%line('written', 'wrote '//command%csv)
     if (len(command%record) > 0) call session%journal%line('written', 'wrote '//command%record)

@@ -53,6 +53,7 @@ module machine_type
     procedure :: force_at
     procedure(options_interface), deferred :: options
     procedure(set_options_interface), deferred :: set_options
+    procedure :: fixes
     procedure :: limit_budgets
     procedure :: turn_on_section
     procedure :: watched_at
@@ -317,6 +318,13 @@ contains
     character(len=:), allocatable :: names
     names = ''
   end function contacts_in_row
+
+  !> Whether a point on the section determines a column of the samples: bodies on which nothing depends may be anywhere.
+  pure logical function fixes(self, column)
+    class(machine_t), intent(in) :: self
+    character(len=*), intent(in) :: column
+    fixes = .true.
+  end function fixes
 
   !> The samples of a measured force [N].
   pure function measured_force(self) result(force)

@@ -19,7 +19,7 @@ module multibody_machine
     scales_of_multibody, start_of_multibody
   use multibody_state, only: acts_as_spring, multibody_state_t
   use section_size, only: most_coordinates
-  use text, only: to_text
+  use text, only: replace_all, to_text
   use timed_actions, only: acts_on_time
   use touching_row, only: names_in_row
   use turn_section, only: advance_multibody_to_turn, coordinates_at_turn, multibody_at_turn, multibody_turn_point, scales_at_turn
@@ -36,6 +36,7 @@ module multibody_machine
     procedure :: section_obstacle
     procedure :: start
     procedure :: allows
+    procedure :: fixes
     procedure :: resume
     procedure :: state_at
     procedure :: point_of
@@ -195,6 +196,25 @@ contains
       point = multibody_point(self%bodies, section%multibody)
     end if
   end function point_of
+
+  !> Of a body or coordinate its position, or its velocity: whether its direction is one of those of the section.
+  pure logical function fixes(self, column)
+    class(multibody_machine_t), intent(in) :: self
+    character(len=*), intent(in) :: column
+    real(wp), parameter :: rounding = 1e-9_wp
+    character(len=:), allocatable :: name
+    integer :: i
+    fixes = .true.
+    do i = 1, self%bodies%machine%n
+      name = replace_all(trim(self%bodies%machine%names(i)), '.', '_')
+      if (column == name//'_x' .or. (column == 'x' .and. i == self%bodies%machine%watched)) then
+        fixes = norm2(self%bodies%directions(i, :)) > 1 - rounding
+      else if (column == name//'_v' .or. (column == 'v' .and. i == self%bodies%machine%watched)) then
+        fixes = norm2(self%bodies%speeds(i, :)) > 1 - rounding
+      end if
+      if (.not. fixes) return
+    end do
+  end function fixes
 
   pure function turn_point(self, section) result(point)
     class(multibody_machine_t), intent(in) :: self

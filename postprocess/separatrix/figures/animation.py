@@ -7,7 +7,7 @@ import io
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -41,14 +41,7 @@ def animate(
     """
     if look.ax:
         raise SeparatrixError("ax: not served by films", USAGE)
-    if path.suffix not in FORMATS:
-        raise SeparatrixError(f"{path}: allowed are {' and '.join(FORMATS)}", USAGE)
-    if path.suffix == ".mp4" and ffmpeg() is None:
-        raise SeparatrixError(
-            f"{path}: needs ffmpeg, which was not found; `pip install imageio-ffmpeg` brings it;"
-            " .gif needs nothing",
-            USAGE,
-        )
+    check_format(path)
     if field not in CLASS_FIELDS:
         allowed = ", ".join(CLASS_FIELDS)
         raise SeparatrixError(f"animation: found the field '{field}', allowed {allowed}", USAGE)
@@ -60,7 +53,24 @@ def animate(
         raise SeparatrixError(
             f"animation over {parameter}: found the axes {found}, allowed it and two more", USAGE
         )
-    frames = [image.convert("RGB") for image in _frames(result, dim, title, field, look, dpi)]
+    return write_film(_frames(result, dim, title, field, look, dpi), path, frames_per_second)
+
+
+def check_format(path: Path) -> None:
+    """Raise a SeparatrixError for a suffix that is no film, and for .mp4 without ffmpeg."""
+    if path.suffix not in FORMATS:
+        raise SeparatrixError(f"{path}: allowed are {' and '.join(FORMATS)}", USAGE)
+    if path.suffix == ".mp4" and ffmpeg() is None:
+        raise SeparatrixError(
+            f"{path}: needs ffmpeg, which was not found; `pip install imageio-ffmpeg` brings it;"
+            " .gif needs nothing",
+            USAGE,
+        )
+
+
+def write_film(images: Iterable[Image.Image], path: Path, frames_per_second: float) -> Path:
+    """Write frames as a film in the format of the suffix; return the path."""
+    frames = [image.convert("RGB") for image in images]
     size = tuple(max(image.size[k] for image in frames) // 2 * 2 for k in (0, 1))
     frames = [_on_page(image, size) for image in frames]
     try:

@@ -23,6 +23,7 @@ from matplotlib.ticker import MaxNLocator
 
 from separatrix import style
 from separatrix.classes import CLASS_FIELDS, Class, class_counts, class_index, classes, recoloured
+from separatrix.derived import at_points, derived_names
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures import inset, marks, motor, section, shares
 from separatrix.figures.caption import caption_pieces, describe_case, start_pieces, version_text
@@ -64,12 +65,13 @@ def figures(
         return Figures({"shares": partial(shares.sampled, result, title, look)})
     if field == "shares":
         return Figures({"shares": partial(shares.diagram, result, title, look)})
+    if field and field in derived_names(result):
+        path, result = None, result.assign({field: at_points(result, field)})
     names = [field] if field else [*(["attractor"] if _labelled(result) else []), "regime"]
     for name in names:
         if name not in result or result[name].dims != result["regime"].dims:
-            known = ", ".join(
-                key for key, var in result.data_vars.items() if var.dims == result["regime"].dims
-            )
+            fields = [key for key, var in result.data_vars.items() if var.dims == result["regime"].dims]
+            known = ", ".join([*fields, *derived_names(result)])
             where = "" if path is None else f"{path}: "
             raise SeparatrixError(f"{where}no field '{name}'; known fields: {known}, shares", USAGE)
     return Figures({name: partial(basin_map, path, result, name, title, look) for name in names})

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
+from separatrix.derived import PREFIX, short_name
 from separatrix.figures import pair_sweep
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
@@ -38,6 +39,11 @@ def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
         {
             "amplitude": partial(amplitude_diagram, result, title, look),
             "bifurcation": partial(bifurcation_diagram, result, title, look),
+            **{
+                str(key): partial(derived_diagram, result, str(key), title, look)
+                for key in result.data_vars
+                if str(key).startswith(PREFIX)
+            },
         }
     )
 
@@ -60,6 +66,24 @@ def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> F
     ax.set_ylabel(rf"extreme positions $x_\mathrm{{max}}$, $x_\mathrm{{min}}$ ({unit(result['x_max'])})")
     caption = [*_caption(result, name, look), *_limits_caption(result), plain(version_text(result))]
     return page.finish(title, caption, handles, columns=5)
+
+
+def derived_diagram(result: xr.Dataset, key: str, title: str, look: Look = DEFAULT) -> Figure:
+    """Return a derived quantity against the swept parameter, both runs."""
+    name = swept_axis(result)
+    page = Page(look, (style.DOUBLE_COLUMN, 70.0))
+    (ax,) = page.axes
+    values = result[name].values
+    _draw_run_pair(ax, values, result[key].transpose("direction", name).values, result)
+    ax.set_xlim(values.min(), values.max())
+    ax.set_xlabel(axis_label(result[name]))
+    ax.set_ylabel(axis_label(result[key].assign_attrs(label=short_name(result[key]))))
+    caption = [
+        plain(str(result[key].attrs["long_name"])),
+        *_caption(result, name, look),
+        plain(version_text(result)),
+    ]
+    return page.finish(title, caption, _run_handles(result), columns=5)
 
 
 def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
