@@ -21,7 +21,7 @@ from separatrix.discovery.fitting.motor_effects import MOTOR_EFFECTS
 from separatrix.discovery.options import COMPARED, Options
 from separatrix.discovery.report.document import write_report
 from separatrix.discovery.results import FILES, replacing, require_writable, write_results
-from separatrix.discovery.wording import at_knot, of_effects, searched, with_error
+from separatrix.discovery.wording import at_knot, misfit, of_effects, searched, with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import INTERNAL, INTERRUPTED, NO_MEMORY, TERMINATED, SeparatrixError
 from separatrix.version import __version__
@@ -154,6 +154,7 @@ def summary(verdict: dict) -> list[str]:
     for use, gap in verdict["gap"].items():
         lines.append(
             f"  reduced chi^2, {use.replace('_', '-')}: {gap['before']:.3f} -> {gap['after']:.3f} (noise: 1)"
+            f"; misfit {misfit(gap, 'before')} -> {misfit(gap, 'after')}"
         )
     lines += [f"  {one['text']}" for one in verdict["remains"]]
     if verdict["outcome"] != "none":

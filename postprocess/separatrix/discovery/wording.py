@@ -99,3 +99,9 @@ def probability(value: float) -> str:
 def with_unit(value: float | None, unit: str, digits: int = 4) -> str:
     """A number of the verdict with its unit; none for pure numbers."""
     return number(value, digits) + ("" if unit == "1" or value is None else f" {unit}")
+
+
+def misfit(gap: dict, when: str) -> str:
+    """What a machine misses beyond the noise, 'before' or 'after': size and share of the signal."""
+    found = gap["misfit"]
+    return f"{with_unit(found[when], found['unit'], 3)} ({100 * found['share'][when]:.2g} %)"

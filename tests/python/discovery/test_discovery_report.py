@@ -343,3 +343,17 @@ def test_a_missing_program_is_reported(tmp_path: Path, monkeypatch: pytest.Monke
     make(tmp_path, "named")
     html, _ = write_report(tmp_path, tmp_path / "base.toml")
     assert "No maps before and after: the program separatrix was not found" in html.read_text()
+
+
+def test_the_first_page_states_what_is_missed_in_its_unit_and_what_to_measure_next() -> None:
+    lines = sections(verdict("ambiguous"))[0].body[1]
+    assert (
+        "On the records that were fitted the base machine missed 0.0025 m (5 %) beyond the noise, the "
+        "extended machine misses 0.000114 m (0.23 %) (reduced chi^2 7.25 and 1.013, 1 of noise alone); "
+        "99.8 % of the excess is removed."
+    ) in lines
+    assert "To measure next: measure the barrier." in lines
+    lines = sections(verdict("not-in-catalogue"))[0].body[1]
+    assert any(
+        "the base machine misses 0.0025 m (5 %) beyond the noise (reduced chi^2 7.25" in one for one in lines
+    )

@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Slow stick-slip, sampled fast: long rests cost few rows, and the laws of friction are distinguished."""
 
+import time
+
 import numpy as np
 import pytest
-from separatrix.discovery import discover
+from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import read_record
 from separatrix.discovery.measured.smoother import in_intervals, stick_intervals
+from separatrix.errors import STOPPED, SeparatrixError
 from separatrix.library import Model
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -74,3 +77,18 @@ def test_laws_of_friction_are_distinguished_in_slow_stick_slip(slow_case, hidden
     paths = [folder / one for one in FILES]
     verdict = discover(folder / "base.toml", paths[:2], paths[2:], rest=folder / "rest.csv")
     assert (verdict["outcome"], verdict["effects"]) == ("named", [name])
+
+
+@pytest.mark.long
+def test_a_time_limit_in_real_seconds_ends_a_long_record(slow_case):
+    """Its work is bounded in processor time, which nothing else on the machine lengthens."""
+    folder = slow_case("stribeck", 19)
+    paths = [folder / one for one in FILES]
+    begun = time.process_time()
+    try:
+        verdict = discover(folder / "base.toml", paths[:2], paths[2:], Options(time_limit=8.0))
+    except SeparatrixError as error:
+        assert error.code == STOPPED and "time limit of 8 s" in str(error)
+    else:
+        assert any("time limit of 8 s" in one for one in verdict["reasons"])
+    assert time.process_time() - begun < 20

@@ -13,6 +13,7 @@ import numpy as np
 
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
+from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.refit import Fitted
@@ -51,6 +52,14 @@ def share_text(share: float) -> str:
         return "100 %"
     digits = int(np.clip(-np.floor(np.log10(lacking)), 0, 4))
     return f"{np.floor(100 * share * 10**digits) / 10**digits:.{digits}f} %"
+
+
+def noise_and_signal(data: Data) -> tuple[float, float]:
+    """Root mean square noise and standard deviation of what is compared first, over all records [SI]."""
+    sizes = [(one.signal.size, one.sigma, float(np.std(one.signal))) for one in data.prepared]
+    counts, *both = (np.array(column) for column in zip(*sizes, strict=True))
+    noise, signal = (float(np.sqrt(np.average(one**2, weights=counts))) for one in both)
+    return noise, signal
 
 
 def remains_of(

@@ -11,7 +11,7 @@ from separatrix.discovery.decision.limits import advice, detectable, equivalents
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
 from separatrix.discovery.decision.negative_controls import negative_controls
 from separatrix.discovery.decision.other_machine import other_drive, other_machine, other_phase, other_units
-from separatrix.discovery.decision.remains import Remains, remains_of
+from separatrix.discovery.decision.remains import Remains, noise_and_signal, remains_of
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import LARGER_NOISE, LITTLE, ScoredCandidate
 from separatrix.discovery.decision.stages.rig_imperfections import in_words
@@ -44,6 +44,10 @@ class Findings:
     steps: tuple[Step, ...] = ()
     stopped: str = ""
     maps: list[Map] = field(default_factory=list)
+
+
+# what is compared, in the words of units
+_COMPARED = {"motion": "position", "force": "force"}
 
 
 def verdict_of(findings: Findings) -> dict:
@@ -352,12 +356,23 @@ def _knot_of(path: str, fitted: Fitted) -> str:
 
 
 def _gap(findings: Findings) -> dict:
-    decision = findings.decision
+    """Reduced chi^2 of both machines by use of the records, and what they miss beyond the noise."""
+    decision, context = findings.decision, findings.context
     best = decision.corrected
-    gap = {"training": {"before": findings.base.fit.sample_chi2, "noise_floor": 1.0}}
-    gap["training"]["after"] = best.fitted.fit.sample_chi2 if best else gap["training"]["before"]
+    pairs = {"training": (context.training, findings.base.fit, best.fitted.fit if best else None)}
     if decision.predicted is not None:
-        before = decision.predicted.sample_chi2
-        gap["held_out"] = {"before": before, "noise_floor": 1.0}
-        gap["held_out"]["after"] = best.prediction.sample_chi2 if best else before
-    return gap
+        pairs["held_out"] = (context.held_out, decision.predicted, best.prediction if best else None)
+    unit = getattr(units_of(findings.base.model.parameters), _COMPARED[context.options.compare])
+    found = {}
+    for use, (data, before, after) in pairs.items():
+        sizes = {
+            "before": before.sample_chi2,
+            "after": (before if after is None else after).sample_chi2,
+            "noise_floor": 1.0,
+        }
+        noise, signal = noise_and_signal(data)
+        misses = {key: float(np.sqrt(max(0.0, sizes[key] - 1)) * noise) for key in ("before", "after")}
+        found[use] = sizes | {
+            "misfit": misses | {"unit": unit, "share": {key: one / signal for key, one in misses.items()}}
+        }
+    return found

@@ -10,6 +10,7 @@ from separatrix.discovery.wording import (
     at_knot,
     digits_of,
     interval,
+    misfit,
     number,
     of_effects,
     probability,
@@ -113,23 +114,31 @@ def _summary(verdict: dict) -> Section:
         lines.append(f"{path}{at_knot(one)} = {size}, {known}{interval(one, digits)}.")
     if verdict["function"]:
         lines.append(f"{verdict['families'][-1].capitalize()}: {verdict['function']['text']}.")
-    for use, one in verdict["gap"].items():
-        change = (
-            f"stays {number(one['before'])}"
-            if one["before"] == one["after"]
-            else f"goes from {number(one['before'])} to {number(one['after'])}"
-        )
-        lines.append(
-            f"The gap on {_records_of(use)}: reduced chi^2 {change}; noise alone gives "
-            f"{number(one['noise_floor'])}."
-        )
+    lines += [_gap_of(use, one) for use, one in verdict["gap"].items()]
     lines += [f"{one['text'][0].upper()}{one['text'][1:]}." for one in verdict["remains"]]
+    if verdict["separating_experiment"]:
+        lines.append(f"To measure next: {verdict['separating_experiment']}.")
     body: list = [lines[0], lines[1:]]
     if verdict["reasons"]:
         body += ["What kept the verdict from being firmer:", list(verdict["reasons"])]
     if verdict["notes"]:
         body += ["Notes:", list(verdict["notes"])]
     return Section("verdict", "Verdict", body)
+
+
+def _gap_of(use: str, one: dict) -> str:
+    """What a machine misses on the records of one use, before and after."""
+    if one["before"] == one["after"]:
+        change = f"misses {misfit(one, 'before')} beyond the noise (reduced chi^2 {number(one['before'])}"
+    else:
+        change = (
+            f"missed {misfit(one, 'before')} beyond the noise, the extended machine misses "
+            f"{misfit(one, 'after')} (reduced chi^2 {number(one['before'])} and {number(one['after'])}"
+        )
+    closed = _removed(one)
+    share = "" if closed == "-" else f"; {closed} of the excess is removed"
+    floor = number(one["noise_floor"])
+    return f"On {_records_of(use)} the base machine {change}, {floor} of noise alone){share}."
 
 
 def _records_of(use: str) -> str:
