@@ -32,7 +32,7 @@ module tape_lane_types
 
   !> Mirrors `tape_operand` of tape_types.hpp.
   type, bind(c), public :: lane_operand_t
-    integer(c_int) :: place = -1, moves = 0
+    integer(c_int) :: index = -1, moves = 0
   end type lane_operand_t
 
   !> Mirrors `tape_operation` of tape_types.hpp.

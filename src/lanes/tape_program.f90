@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> What a kernel for tapes does order by order, with the places of all operands worked out: an operation for every node whose
+!> What a kernel for tapes does order by order, with the indices of all operands worked out: an operation for every node whose
 !> coefficients feed back into the variables' rates, and apart those of arguments that grow evenly in time, whose series are known
 !> from the state at once.
 module tape_program
@@ -14,7 +14,7 @@ module tape_program
 
   public :: set_program
 
-  !> The place of the first series in `tape_values`.
+  !> The index of the first series in `tape_values`.
   integer, parameter :: series_at = 3*most_tape_nodes + 1, orders = lane_tape_order + 1
 
 contains

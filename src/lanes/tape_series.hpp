@@ -30,35 +30,45 @@ struct inverses {
 constexpr inverses inverse_of;
 
 // Coefficients of the present order of the nodes without series; values of all at the state; series of those
-// that later orders need; whether the switching functions are on their upper side. `tape_program.f90` knows
-// the order of the members.
+// that later orders need; whether the switching functions are on their upper side; what is known of sums of
+// the next order. `tape_program.f90` knows the order of the members.
 struct tape_values {
   vec now[most_tape_nodes], first[most_tape_nodes], inverse[most_tape_nodes], slip;
   series of[most_tape_series];
   mask above[most_tape_switches];
+  vec ahead[most_tape_nodes], ahead_too[most_tape_nodes];
 };
 
 static_assert(offsetof(tape_values, of) == (3 * most_tape_nodes + 1) * sizeof(vec), "as in tape_program.f90");
 
 // Coefficient k of an operand.
 LANE_LEAF vec coefficient_at(int k, const tape_values &t, const tape_operand &at) {
-  return t.now[at.place + (at.moves & k)];
+  return t.now[at.index + (at.moves & k)];
 }
 
-// Sum of a(i) b(k - i), i = from ... k - until. In two parts, so that additions need not wait for each other;
-// the terms with what this order has just made come last.
-template <int from, int until> LANE_LEAF vec products(int k, const vec *a, const vec *b) {
-  const int end = k - (until > 1 ? until : 1);
-  vec even = 0, odd = 0;
-  const vec *c = b + k;
-  int i = 1;
-  for (; i < end; i += 2) {
-    even += a[i] * c[-i];
-    odd += a[i + 1] * c[-i - 1];
+// Sum of a(i) b(k - i), i = 1 ... k - 1. Odd orders add up what is known of the next one, so that
+// coefficients are loaded once for both: `ahead`.
+LANE_LEAF vec inner_products(int k, const vec *a, const vec *b, vec &ahead) {
+  if (k % 2 == 0)
+    return k == 2 ? a[1] * b[1] : ahead + a[1] * b[k - 1] + a[k - 1] * b[1];
+  vec now = 0, next = 0;
+  if (k > 1) {
+    vec before = b[k - 1];
+    now = a[1] * before;
+    for (int i = 2; i < k; i++) {
+      vec here = b[k - i];
+      now += a[i] * here;
+      next += a[i] * before;
+      before = here;
+    }
   }
-  if (i == end)
-    even += a[i] * c[-i];
-  vec total = even + odd;
+  ahead = next;
+  return now;
+}
+
+// Sum of a(i) b(k - i), i = from ... k - until. The terms with what this order has just made come last.
+template <int from, int until> LANE_LEAF vec products(int k, const vec *a, const vec *b, vec &ahead) {
+  vec total = inner_products(k, a, b, ahead);
   if constexpr (from == 0)
     total += a[0] * b[k];
   if constexpr (until == 0)
@@ -66,13 +76,26 @@ template <int from, int until> LANE_LEAF vec products(int k, const vec *a, const
   return total;
 }
 
-LANE_LEAF vec square_term(int k, const vec *a) {
-  vec total = 0;
-  for (int i = 1; i < (k + 1) / 2; i++)
-    total += a[i] * a[k - i];
-  total += total;
-  if (k % 2 == 0)
-    total += a[k / 2] * a[k / 2];
+LANE_LEAF vec square_term(int k, const vec *a, vec &ahead) {
+  vec total;
+  if (k % 2 == 0) {
+    vec middle = a[k / 2] * a[k / 2];
+    total = k == 2 ? middle : 2.0 * (ahead + a[1] * a[k - 1]) + middle;
+  } else {
+    vec next = 0, now = 0;
+    if (k > 1) {
+      vec before = a[k - 1];
+      now = a[1] * before;
+      for (int i = 2; i < (k + 1) / 2; i++) {
+        vec here = a[k - i];
+        now += a[i] * here;
+        next += a[i] * before;
+        before = here;
+      }
+    }
+    ahead = next;
+    total = now + now;
+  }
   return total + (a[0] + a[0]) * a[k];
 }
 
@@ -234,6 +257,7 @@ template <bool bounds>
 LANE_LEAF vec coefficient(int k, const tape_machine &m, const tape_operation &n, tape_values &t) {
   const series *of = t.of;
   const vec &inverse = t.inverse[n.node];
+  vec &ahead = t.ahead[n.node];
   auto a = [&] { return coefficient_at(k, t, n.a); };
   auto less = [](vec x, vec y) { return bounds ? x + y : x - y; };
   switch (n.operation) {
@@ -244,22 +268,22 @@ LANE_LEAF vec coefficient(int k, const tape_machine &m, const tape_operation &n,
   case tape_subtract:
     return less(a(), coefficient_at(k, t, n.b));
   case tape_multiply:
-    return products<0, 0>(k, of[n.first], of[n.second]);
+    return products<0, 0>(k, of[n.first], of[n.second], ahead);
   case tape_scale:
     return t.first[n.steady] * coefficient_at(k, t, n.b);
   case tape_divide:
-    return less(a(), products<0, 1>(k, of[n.own], of[n.second])) * inverse;
+    return less(a(), products<0, 1>(k, of[n.own], of[n.second], ahead)) * inverse;
   case tape_divide_steady:
     return a() * inverse;
   case tape_negative:
     return bounds ? a() : -a();
   case tape_square:
-    return square_term(k, of[n.first]);
+    return square_term(k, of[n.first], ahead);
   case tape_sqrt:
-    return less(a(), products<1, 1>(k, of[n.own], of[n.own])) * inverse;
+    return less(a(), products<1, 1>(k, of[n.own], of[n.own], ahead)) * inverse;
   case tape_power:
-    return less(t.first[n.steady] * products<1, 0>(k, of[n.first], of[n.own]),
-                products<1, 1>(k, of[n.second], of[n.slopes])) *
+    return less(t.first[n.steady] * products<1, 0>(k, of[n.first], of[n.own], ahead),
+                products<1, 1>(k, of[n.second], of[n.slopes], t.ahead_too[n.node])) *
            inverse_of[k] * inverse;
   case tape_exp:
   case tape_sin:
@@ -267,16 +291,16 @@ LANE_LEAF vec coefficient(int k, const tape_machine &m, const tape_operation &n,
   case tape_sinh:
   case tape_cosh:
   case tape_tanh:
-    return products<1, 0>(k, of[n.first], of[n.second]) * inverse_of[k];
+    return products<1, 0>(k, of[n.first], of[n.second], ahead) * inverse_of[k];
   case tape_cos:
-    return products<1, 0>(k, of[n.first], of[n.second]) * (bounds ? inverse_of[k] : -inverse_of[k]);
+    return products<1, 0>(k, of[n.first], of[n.second], ahead) * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_sin_even:
     return of[n.first][1] * of[n.second][k - 1] * inverse_of[k];
   case tape_cos_even:
     return of[n.first][1] * of[n.second][k - 1] * (bounds ? inverse_of[k] : -inverse_of[k]);
   case tape_log:
   case tape_atan:
-    return less(a(), products<1, 1>(k, of[n.slopes], of[n.second]) * inverse_of[k]) * inverse;
+    return less(a(), products<1, 1>(k, of[n.slopes], of[n.second], ahead) * inverse_of[k]) * inverse;
   case tape_select:
     return bounds ? larger(a(), coefficient_at(k, t, n.b))
                   : pick(t.above[n.steady], a(), coefficient_at(k, t, n.b));
@@ -305,12 +329,12 @@ template <bool bounds> LANE_LEAF void raise_orders(const tape_machine &m, tape_v
   for (int k = 1; k < tape_order + bounds; k++) {
     for (const tape_operation *n = m.operation; n != m.operation + m.operations; n++) {
       vec y = coefficient<bounds>(k, m, *n, t);
-      t.now[n->to.place + (n->to.moves & k)] = y;
+      t.now[n->to.index + (n->to.moves & k)] = y;
       if (n->slopes >= 0)
         t.of[n->slopes][k] = y * double(k);
     }
     for (int i = 0; i < m.variables && k < tape_order; i++)
-      if (m.change[i].from.place >= 0)
+      if (m.change[i].from.index >= 0)
         set_coefficient(m.change[i], t.of[i], t.of, k + 1,
                         rate_at(k, m.change[i], t) * (m.unit * inverse_of[k + 1]));
   }
@@ -319,7 +343,7 @@ template <bool bounds> LANE_LEAF void raise_orders(const tape_machine &m, tape_v
 // The same of all orders above the first from the values at the state. `fresh`: nothing is known yet.
 template <bool bounds> LANE_LEAF void raise_all(const tape_machine &m, bool fresh, tape_values &t) {
   for (int i = 0; i < m.variables; i++)
-    if (m.change[i].from.place >= 0)
+    if (m.change[i].from.index >= 0)
       set_coefficient(m.change[i], t.of[i], t.of, 1, t.first[m.rate[i]] * m.unit);
   raise_even<bounds>(m, fresh, t);
   raise_orders<bounds>(m, t);

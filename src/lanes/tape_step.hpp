@@ -153,7 +153,7 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
     power *= length;
   for (int i = 0; i < m.variables; i++) {
     proof.rest[i] = 0;
-    if (m.change[i].from.place >= 0)
+    if (m.change[i].from.index >= 0)
       proof.rest[i] = rate_at(tape_order, m.change[i], g.box.series) * (power * (m.unit / orders));
     excess = larger(excess, proof.rest[i] / margin[i]);
   }

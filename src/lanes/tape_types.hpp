@@ -76,10 +76,10 @@ struct tape_term {
   int node, factor;
 };
 
-// Where coefficient k of a node is in `tape_values`, in vectors: at `place`, or k further where `moves` is -1
+// Where coefficient k of a node is in `tape_values`, in vectors: at `index`, or k further where `moves` is -1
 // (0: it stays).
 struct tape_operand {
-  int place, moves;
+  int index, moves;
 };
 
 // What is done with a node in every order: as `tape_node`, with the node that does not vary (of a branch the
@@ -96,7 +96,7 @@ struct tape_even {
   int operation, node, series, slopes, other, unused;
 };
 
-// How the coefficients of a variable follow: from a node times one that does not vary (-1: none); `place` is
+// How the coefficients of a variable follow: from a node times one that does not vary (-1: none); `index` is
 // -1 where its rate does not vary.
 struct tape_change {
   tape_operand from;
