@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from program import CASE, STARTS, Outcome, run, write_case
-from separatrix import SeparatrixError, open_result
+from separatrix import SeparatrixError, open_result, trial
 from separatrix.discovery.measured.records import read_record
 from separatrix.open import reading
 
@@ -58,7 +58,8 @@ def test_result_files(separatrix, tmp_path, path):
 
 
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.record")), ids=lambda path: path.name)
-def test_measured_records(path):
+def test_measured_records(path, monkeypatch):
+    monkeypatch.setattr(trial, "_LONGEST_WHOLE", 2)  # one of them never ends
     with pytest.raises(SeparatrixError, match=path.name):
         read_record(path)
 

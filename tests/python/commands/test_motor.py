@@ -169,8 +169,8 @@ def test_balance_of_a_ramp(separatrix, yoke, tmp_path):
 def test_branches_find_the_fold(separatrix, yoke, tmp_path):
     """The slow branch turns where it is published to."""
     report = succeed(
-        separatrix, "branches", yoke, "--parameter", "motor.voltage", "--from", "8.2", "--to", "8.3", "--searches", "2",
-        "-o", "branches.h5", folder=tmp_path, timeout=600,
+        separatrix, "branches", yoke, "--parameter", "motor.voltage", "--from", "8.2", "--to", "8.3",
+        "--searches", "1", "-o", "branches.h5", folder=tmp_path, timeout=600,
     ).out  # fmt: skip
     fold = re.search(r"SN at motor\.voltage = (\S+) V", report)
     assert abs(float(fold[1]) - 8.252828124769745) < 1e-8

@@ -28,9 +28,12 @@ HEAVY = {
     "duffing",
     "figures",
     "measures",
+    "motor",
     "oscillator",
+    "pendulum",
     "parameters",
     "reasons",
+    "structure",
     "sweep",
     "through-resonance",
 }
