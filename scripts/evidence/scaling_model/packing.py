@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 import subprocess
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 CASE = SOURCE / "docs" / "record" / "basin_1e8.toml"
 """Cheap trajectories, each computed: the file is a large part of the run."""
 RANKS = 2
+SLAB = 2**18
+"""Points of a slab (src/io/slabs.f90)."""
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
@@ -67,8 +70,10 @@ class Packing:
         return RANKS * (self.middle(-1, "packed") - self.middle(-1, "alone")) / points
 
     def seconds(self, points: float, ranks: int) -> float:
-        """What so many ranks would take for such a map."""
-        return self.fixed + points * (self.alone_per_point + self.shared_per_point / ranks)
+        """What so many ranks would take for such a map: whole slabs, in rounds of one for each rank."""
+        slabs = math.ceil(points / SLAB)
+        packed = min(points / slabs, SLAB) * math.ceil(slabs / ranks)
+        return self.fixed + points * self.alone_per_point + packed * self.shared_per_point
 
 
 def seconds_of(words: str) -> float:
