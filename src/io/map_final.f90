@@ -95,8 +95,8 @@ contains
       if (.not. allocated(error)) call fill(new, schema, error, packing)
       call complete(new, error)
     end if
-    call team%agree(error)
     alone = alone + monotonic_seconds()
+    call team%agree(error)
     if (.not. allocated(error)) call read_back(name, packing, team, error)
     alone = alone - monotonic_seconds()
     if (team%is_root()) call publish(name, file%path, error)

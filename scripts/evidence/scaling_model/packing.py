@@ -52,6 +52,13 @@ class Packing:
         """Median of an attribute over the runs of a size."""
         return statistics.median(getattr(run, name) for run in self.runs[size])
 
+    def least(self, size: int, name: str) -> float:
+        """Least of an attribute over the runs of a size.
+
+        Waits for a disk that others use do not grow with the map.
+        """
+        return min(getattr(run, name) for run in self.runs[size])
+
     @property
     def fixed(self) -> float:
         """Seconds of rank 0 alone that do not grow with the map."""
@@ -61,7 +68,7 @@ class Packing:
     def alone_per_point(self) -> float:
         """Seconds of rank 0 alone for each point of the map."""
         more = self.runs[-1][0].points - self.runs[0][0].points
-        return max((self.middle(-1, "alone") - self.middle(0, "alone")) / more, 0.0)
+        return max((self.least(-1, "alone") - self.least(0, "alone")) / more, 0.0)
 
     @property
     def shared_per_point(self) -> float:
