@@ -18,11 +18,22 @@ enum { guarded_count = sizeof guarded / sizeof *guarded };
 static struct sigaction before[guarded_count];
 static char message[1024];
 static int exit_code;
+static volatile sig_atomic_t active;
+static int held, timed;
 /* Standard error, which is silent meanwhile: the C library has a word of its own before it aborts. */
 static int messages = -1;
 
+static void speak_again(void);
+
 static void give_up(int number) {
-  (void)number;
+  if (!active) {
+    /* Between two guards of one hold: not of the library that is guarded. */
+    speak_again();
+    for (size_t i = 0; i < guarded_count; i++)
+      sigaction(guarded[i], &before[i], NULL);
+    raise(number);
+    return;
+  }
   if (write(messages < 0 ? STDERR_FILENO : messages, message, strlen(message)) < 0)
     _exit(exit_code);
   _exit(exit_code);
@@ -45,25 +56,58 @@ static void speak_again(void) {
   messages = -1;
 }
 
-/* From here to separatrix_guard_end the program ends with `code`, and prints `text`, when a library crashes
-   or uses more than `seconds` of the processor (0 = no limit). Not to be nested. */
-void separatrix_guard_begin(const char *text, int seconds, int code) {
-  const struct itimerval limit = {{0, 0}, {seconds, 0}};
+static void install(void) {
   struct sigaction action = {0};
-  snprintf(message, sizeof message, "separatrix: %s\n", text);
-  exit_code = code;
   action.sa_handler = give_up;
   sigemptyset(&action.sa_mask);
   for (size_t i = 0; i < guarded_count; i++)
     sigaction(guarded[i], &action, &before[i]);
   silence();
-  setitimer(ITIMER_PROF, &limit, NULL);
+}
+
+static void uninstall(void) {
+  for (size_t i = 0; i < guarded_count; i++)
+    sigaction(guarded[i], &before[i], NULL);
+  speak_again();
+}
+
+/* From here to separatrix_guard_end the program ends with `code`, and prints `text`, when a library crashes
+   or uses more than `seconds` of the processor (0 = no limit). Not to be nested. */
+void separatrix_guard_begin(const char *text, int seconds, int code) {
+  const struct itimerval limit = {{0, 0}, {seconds, 0}};
+  snprintf(message, sizeof message, "separatrix: %s\n", text);
+  exit_code = code;
+  if (!held)
+    install();
+  active = 1;
+  timed = seconds > 0;
+  if (timed)
+    setitimer(ITIMER_PROF, &limit, NULL);
 }
 
 void separatrix_guard_end(void) {
   const struct itimerval none = {{0, 0}, {0, 0}};
-  setitimer(ITIMER_PROF, &none, NULL);
-  for (size_t i = 0; i < guarded_count; i++)
-    sigaction(guarded[i], &before[i], NULL);
-  speak_again();
+  if (timed)
+    setitimer(ITIMER_PROF, &none, NULL);
+  timed = 0;
+  active = 0;
+  if (!held)
+    uninstall();
+}
+
+/* From here to separatrix_guard_release a guard costs a few system calls less, and standard error is silent
+   between guards too. */
+void separatrix_guard_hold(void) {
+  if (held)
+    return;
+  active = 0;
+  install();
+  held = 1;
+}
+
+void separatrix_guard_release(void) {
+  if (!held)
+    return;
+  held = 0;
+  uninstall();
 }

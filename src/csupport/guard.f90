@@ -7,7 +7,7 @@ module guard
   implicit none
   private
 
-  public :: begin_guard, end_guard
+  public :: begin_guard, end_guard, hold_guard, release_guard
 
   interface
     subroutine c_guard_begin(text, seconds, code) bind(c, name='separatrix_guard_begin')
@@ -19,6 +19,13 @@ module guard
     !> Ends what `begin_guard` began.
     subroutine end_guard() bind(c, name='separatrix_guard_end')
     end subroutine end_guard
+
+    !> Until `release_guard` many guards cost little. Standard error is silent meanwhile.
+    subroutine hold_guard() bind(c, name='separatrix_guard_hold')
+    end subroutine hold_guard
+
+    subroutine release_guard() bind(c, name='separatrix_guard_release')
+    end subroutine release_guard
   end interface
 
 contains

@@ -39,8 +39,8 @@ module last_wait
 
 contains
 
-  !> Before any rank begins a tile: `tiles` of the working file `part` are of this run, `done` of them finished. Where the file counts others,
-  !> as those that are computed again, only a stop bounds the wait.
+  !> Before any rank begins a tile: `tiles` of the working file `part` are of this run, `done` of them finished. Where the file
+  !> counts others, as those that are computed again, only a stop bounds the wait.
   subroutine begin(self, part, tiles, done, team)
     class(last_wait_t), intent(out) :: self
     character(len=*), intent(in) :: part

@@ -5,9 +5,11 @@
 !> its own name it exists only complete and verified.
 module map_final
   use attribute_seal, only: seal_attributes
+  use byte_file, only: byte_file_t
   use checksum, only: crc32
   use errors, only: error_t, fail
   use files, only: publish_file, remove_file
+  use guard, only: hold_guard, release_guard
   use h5, only: h5_close, h5_close_dataset, h5_create, h5_dataset_t, h5_file_t, h5_open_dataset, h5_write
   use h5_attributes, only: h5_put_numbers
   use kinds, only: int64, real64
@@ -86,16 +88,18 @@ contains
     end if
     call file%store%close(ignored)
     alone = alone + packing%alone - monotonic_seconds()
+    ! The others sync what they have written meanwhile.
+    call packing%finish(.not. team%is_root(), error)
     if (team%is_root()) then
+      call hold_guard()
       if (.not. allocated(error)) call fill(new, schema, error, packing)
       call complete(new, error)
     end if
-    call team%agree(error)
     alone = alone + monotonic_seconds()
-    if (.not. allocated(error)) call packing%check(name, error)
     call team%agree(error)
+    if (.not. allocated(error)) call read_back(name, packing, team, error)
     alone = alone - monotonic_seconds()
-    if (team%is_root()) call publish(name, file%path, error, packing%checked_names())
+    if (team%is_root()) call publish(name, file%path, error)
     call team%agree(error)
     alone = alone + monotonic_seconds()
     if (allocated(error)) then
@@ -106,6 +110,34 @@ contains
     if (team%is_root()) call remove_file(working_path(file%path), error)
     call team%agree(error)
   end subroutine repack
+
+  !> Reads the file back: all ranks what was packed, the last one the rest, while the first one syncs it. Collective.
+  subroutine read_back(name, packing, team, error)
+    character(len=*), intent(in) :: name
+    type(packing_t), intent(in) :: packing
+    class(team_t), intent(in) :: team
+    type(error_t), allocatable, intent(out) :: error
+    type(byte_file_t) :: bytes
+    call packing%check(name, error)
+    if (allocated(error)) then
+      continue
+    else if (team%rank() == team%size() - 1) then
+      call verify_held(name, error, packing%checked_names())
+    else if (team%is_root()) then
+      call bytes%open(name, .true., error)
+      if (.not. allocated(error)) call bytes%close(error, durable=.true.)
+    end if
+    call team%agree(error)
+  end subroutine read_back
+
+  subroutine verify_held(name, error, skipped)
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), intent(in), optional :: skipped(:)
+    call hold_guard()
+    call verify_file(name, error, skipped=skipped)
+    call release_guard()
+  end subroutine verify_held
 
   !> The schema of the final file.
   function whole_schema(file, extra) result(schema)
@@ -157,8 +189,10 @@ contains
     whole = schema
     call whole%append(nothing)
     call create(path//'.new', whole, new, error)
+    call hold_guard()
     if (.not. allocated(error)) call fill(new, whole, error)
     call complete(new, error)
+    if (.not. allocated(error)) call verify_held(path//'.new', error)
     call publish(path//'.new', path, error)
   end subroutine write_whole
 
@@ -168,11 +202,13 @@ contains
     type(schema_t), intent(in) :: schema
     type(h5_file_t), intent(out) :: new
     type(error_t), allocatable, intent(out) :: error
+    call hold_guard()
     call h5_create(name, new, error)
     if (.not. allocated(error)) call create_objects(new, schema, .false., error)
+    call release_guard()
   end subroutine create
 
-  !> Marks the file as complete, unless there is an error, and closes it.
+  !> Marks the file as complete, unless there is an error, and closes it. Ends the hold of the guard.
   subroutine complete(new, error)
     type(h5_file_t), intent(inout) :: new
     type(error_t), allocatable, intent(inout) :: error
@@ -184,15 +220,14 @@ contains
     else
       call h5_close(new, error)
     end if
+    call release_guard()
   end subroutine complete
 
-  !> Reads a file back, but for the datasets `checked`, and gives it its name; removes it where there is an error.
-  subroutine publish(name, path, error, checked)
+  !> Gives a file its name; removes it where there is an error.
+  subroutine publish(name, path, error)
     character(len=*), intent(in) :: name, path
     type(error_t), allocatable, intent(inout) :: error
-    character(len=*), intent(in), optional :: checked(:)
     type(error_t), allocatable :: ignored
-    if (.not. allocated(error)) call verify_file(name, error, skipped=checked)
     if (.not. allocated(error)) call publish_file(name, path, error)
     if (allocated(error)) call remove_file(name, ignored)
   end subroutine publish

@@ -42,11 +42,14 @@ module map_packing
     integer(int64), allocatable, public :: states(:), tile_checksums(:)
     !> Slabs that this rank checks, and per variable length and checksum of their chunks.
     integer(int64), allocatable :: checked(:), expected(:, :, :)
+    !> Where this rank writes chunks, from `pack` to `finish`.
+    type(byte_file_t) :: file
     !> Seconds in which rank 0 took the offsets of chunks, and the others waited.
     real(real64), public :: alone = 0
   contains
     procedure :: begin => begin_packing
     procedure :: pack => pack_variables
+    procedure :: finish => finish_packing
     procedure :: check => check_packed
     procedure :: checked_names
   end type packing_t
@@ -72,7 +75,7 @@ contains
   end subroutine begin_packing
 
   !> Compresses and writes all chunks into the file `path`, which rank 0 has open as `new`, with the datasets in it. Collective;
-  !> code 74, the same on all ranks.
+  !> code 74, the same on all ranks. `finish` follows.
   subroutine pack_variables(self, store, path, new, team, error)
     class(packing_t), intent(inout) :: self
     type(tile_store_t), intent(in) :: store
@@ -81,13 +84,12 @@ contains
     class(team_t), intent(in) :: team
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: later
-    type(byte_file_t) :: file
     type(h5_dataset_t) :: datasets(size(self%types))
     integer(int64) :: first, count
     integer :: i
     self%is_packed = .true.
     call keep_memory(kept)
-    call file%open(path, .true., error)
+    call self%file%open(path, .true., error)
     do i = 1, size(datasets)
       if (team%is_root() .and. .not. allocated(error)) call h5_open_dataset(new, trim(self%names(i)), datasets(i), error)
     end do
@@ -95,10 +97,8 @@ contains
     do first = 1, slab_count(self%lengths), team%size()
       if (allocated(error)) exit
       count = min(int(team%size(), int64), slab_count(self%lengths) - first + 1)
-      call pack_round(self, store, first, int(count), datasets, new, file, team, error)
+      call pack_round(self, store, first, int(count), datasets, new, team, error)
     end do
-    call file%close(later, durable=.not. team%is_root())
-    if (.not. allocated(error) .and. allocated(later)) call move_alloc(later, error)
     do i = 1, size(datasets)
       call h5_close_dataset(datasets(i), later)
       if (.not. allocated(error) .and. allocated(later)) call move_alloc(later, error)
@@ -106,15 +106,24 @@ contains
     call team%agree(error)
   end subroutine pack_variables
 
+  !> After `pack`, also where that has failed: what this rank has written is on the disk. `durable`: else another one syncs.
+  subroutine finish_packing(self, durable, error)
+    class(packing_t), intent(inout) :: self
+    logical, intent(in) :: durable
+    type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: later
+    call self%file%close(later, durable=durable)
+    if (.not. allocated(error) .and. allocated(later)) call move_alloc(later, error)
+  end subroutine finish_packing
+
   !> The slabs `first` to `first + count - 1`, one for each rank.
-  subroutine pack_round(self, store, first, count, datasets, new, file, team, error)
+  subroutine pack_round(self, store, first, count, datasets, new, team, error)
     class(packing_t), intent(inout) :: self
     type(tile_store_t), intent(in) :: store
     integer(int64), intent(in) :: first
     integer, intent(in) :: count
     type(h5_dataset_t), intent(in) :: datasets(:)
     type(h5_file_t), intent(in) :: new
-    type(byte_file_t), intent(in) :: file
     class(team_t), intent(in) :: team
     type(error_t), allocatable, intent(out) :: error
     type(values_t) :: parts(self%most_chunks, size(self%types))
@@ -147,7 +156,7 @@ contains
     do v = 1, size(self%types)
       do k = 1, self%most_chunks
         if (mine > count .or. allocated(error)) exit
-        if (words(k, v, mine) > 0) call file%write(parts(k, v)%bytes, offsets(k, v, mine), error)
+        if (words(k, v, mine) > 0) call self%file%write(parts(k, v)%bytes, offsets(k, v, mine), error)
       end do
     end do
     call team%agree(error)

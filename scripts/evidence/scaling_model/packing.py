@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 import subprocess
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 CASE = SOURCE / "docs" / "record" / "basin_1e8.toml"
 """Cheap trajectories, each computed: the file is a large part of the run."""
 RANKS = 2
+SLAB = 2**18
+"""Points of a slab (src/io/slabs.f90)."""
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
@@ -49,6 +52,13 @@ class Packing:
         """Median of an attribute over the runs of a size."""
         return statistics.median(getattr(run, name) for run in self.runs[size])
 
+    def least(self, size: int, name: str) -> float:
+        """Least of an attribute over the runs of a size.
+
+        Waits for a disk that others use do not grow with the map.
+        """
+        return min(getattr(run, name) for run in self.runs[size])
+
     @property
     def fixed(self) -> float:
         """Seconds of rank 0 alone that do not grow with the map."""
@@ -58,7 +68,7 @@ class Packing:
     def alone_per_point(self) -> float:
         """Seconds of rank 0 alone for each point of the map."""
         more = self.runs[-1][0].points - self.runs[0][0].points
-        return max((self.middle(-1, "alone") - self.middle(0, "alone")) / more, 0.0)
+        return max((self.least(-1, "alone") - self.least(0, "alone")) / more, 0.0)
 
     @property
     def shared_per_point(self) -> float:
@@ -67,8 +77,10 @@ class Packing:
         return RANKS * (self.middle(-1, "packed") - self.middle(-1, "alone")) / points
 
     def seconds(self, points: float, ranks: int) -> float:
-        """What so many ranks would take for such a map."""
-        return self.fixed + points * (self.alone_per_point + self.shared_per_point / ranks)
+        """What so many ranks would take for such a map: whole slabs, in rounds of one for each rank."""
+        slabs = math.ceil(points / SLAB)
+        packed = min(points / slabs, SLAB) * math.ceil(slabs / ranks)
+        return self.fixed + points * self.alone_per_point + packed * self.shared_per_point
 
 
 def seconds_of(words: str) -> float:

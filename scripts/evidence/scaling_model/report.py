@@ -29,6 +29,7 @@ BAR_FINISH = 0.05
 BAR_MEMORY = 1.1
 """Largest over smallest peak that counts as constant."""
 MIB = 2**20
+JOBS_BEGIN, JOBS_END = "<!-- jobs -->", "<!-- /jobs -->"
 MOST_TILES = 2**20
 """Of src/config/case_setup.f90."""
 
@@ -174,6 +175,53 @@ def looks_table(results: Results) -> str:
     return table(header, rows)
 
 
+def seconds(value: float) -> str:
+    """Two digits."""
+    return f"{value:.2g} s"
+
+
+def jobs_section(
+    jobs: dict[int, list[float]], mean: float, before: float, found: packing.Packing, version: dict[str, str]
+) -> str:
+    """Return the table of whole jobs with what it was made from."""
+    means = (mean, *simulation.JOB_TILE_SECONDS)
+    header = ["mean time of a tile (of the tiles of a rank)"]
+    header += [f"{number(ranks)} ranks" for ranks in jobs]
+    rows = [
+        [
+            f"{seconds(value)} ({simulation.USUAL * value:.0f} s)",
+            *(percent(line[i]) for line in jobs.values()),
+        ]
+        for i, value in enumerate(means)
+    ]
+    lines = [
+        f"* {number(ranks)} ranks: {reached(jobs[ranks], bar, means)}"
+        for ranks, bar in simulation.JOB_RANKS.items()
+    ]
+    made = (
+        f"Obtained with commit {version['commit']}: start and search {before:.1f} s; final file "
+        f"{1000 * found.fixed:.0f} ms, {1e9 * found.alone_per_point:.1f} ns of rank 0 alone for each point, "
+        f"{1e9 * found.shared_per_point:.0f} ns\nfor each point that a rank packs. The final file of "
+        f"{number(found.runs[-1][0].points)} points took {percent(found.middle(-1, 'share'))} of the run on "
+        f"{packing.RANKS} ranks."
+    )
+    return "\n".join([JOBS_BEGIN, made, "", table(header, rows), "", *lines, JOBS_END])
+
+
+def reached(line: list[float], bar: float, means: tuple[float, ...]) -> str:
+    """Return from which time of a tile on a bar holds."""
+    least = None
+    for value, found in reversed(list(zip(means, line, strict=True))):
+        if found < bar:
+            break
+        least = value
+    if least is None:
+        return f"{100 * bar:.0f} % is not reached by these jobs"
+    return (
+        f"{100 * bar:.0f} % from tiles of {seconds(least)} on, {simulation.USUAL * least:.0f} s for each rank"
+    )
+
+
 def packing_table(found: packing.Packing) -> str:
     """The final file of small and large maps."""
     rows = [
@@ -235,9 +283,7 @@ def bar_table(results: Results) -> str:
         [
             f"the final file, of a run on {packing.RANKS} ranks",
             f"<= {100 * BAR_FINISH:.0f} %",
-            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points; "
-            f"simulated {number(simulation.MANY_RANKS)} ranks with writing and it: "
-            f"{percent(simulated.with_file[index])}",
+            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points",
             met[finish <= BAR_FINISH] if finish <= BAR_FINISH or not busy(results) else "machine busy",
         ],
         [
@@ -322,5 +368,7 @@ def page(results: Results, quick: bool) -> str:
         catalogues=memory_table(found.catalogue, found.entries),
         per_tile=f"{found.bytes_per_tile:.0f}",
         per_attractor=f"{found.bytes_per_attractor / 1000:.1f}",
+        jobs=jobs_section(simulated.jobs, simulated.mean, simulated.before, results.packing, results.version),
+        rate=max(simulation.STORES, key=simulation.STORES.get),
         conditions=conditions(results),
     )

@@ -49,6 +49,11 @@ class Run:
         return float(self.end.max())
 
     @property
+    def around(self) -> float:
+        """Seconds before the first tile and after the last: start, search, final file."""
+        return self.wall - self.tile_phase
+
+    @property
     def idle(self) -> float:
         """Share of the ranks' time in that phase that is not spent in tiles."""
         return 1 - float(self.costs.sum()) / (self.ranks * self.tile_phase)

@@ -140,13 +140,33 @@ def check_model(program: Program, model: Model, results: Results) -> None:
         results.checks.append(Check("program", ranks, per_node, found, expected))
 
 
+def only_jobs(build: Path, page: Path) -> None:
+    """Measure what the section on whole jobs needs, and replace that section."""
+    with tempfile.TemporaryDirectory(prefix="scaling-") as name:
+        folder = Path(name)
+        program = Program(build, folder)
+        base = program.uneven(1, Sizes.ratios, 32 * TILE)
+        packing = time_files(program, Sizes.packed, Sizes.repetitions)
+        mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
+        simulation = Simulation(Model(folder), base.costs, mean, packing)
+        jobs = simulation.whole_jobs(base.around)
+        section = report.jobs_section(jobs, mean, base.around, packing, program.version)
+    before, rest = page.read_text().split(report.JOBS_BEGIN)
+    page.write_text(before + section + rest.split(report.JOBS_END)[1])
+    print(section)
+
+
 def main() -> None:
     """Run everything."""
     parser = argparse.ArgumentParser(prog="scaling")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--build", type=Path, default=SOURCE / "build")
     parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "scaling.md")
+    parser.add_argument("--jobs", action="store_true", help="only the section on whole jobs")
     options = parser.parse_args()
+    if options.jobs:
+        only_jobs(options.build, options.output)
+        return
     began = time.perf_counter()
     results = Results(QUICK if options.quick else Sizes(), ranks_here())
     before = os.getloadavg()[0]
@@ -164,7 +184,7 @@ def main() -> None:
         progress("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
-        results.simulated = Simulation(model, base.costs, mean, results.packing).everything(BAR)
+        results.simulated = Simulation(model, base.costs, mean, results.packing).everything(BAR, base.around)
         progress("memory")
         sizes = results.sizes
         results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)

@@ -26,6 +26,9 @@ CALL = 1e-3
 """Seconds of a call that writes: a message and a lock of the file system; an assumption."""
 STORES = {"100 GB/s": 1e11, "1 TB/s": 1e12}
 """Bytes per second that a file system takes from all ranks; assumptions."""
+JOB_RANKS = {1000: 0.9, 10_000: 0.9, 100_000: 0.8}
+"""Ranks of whole jobs, and the efficiency that they have to reach."""
+JOB_TILE_SECONDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 RECORD_BYTES = 48 * TRAJECTORIES_PER_TILE + 16
 """A tile in the working file of the case of the packing runs."""
 
@@ -56,6 +59,10 @@ class Simulated:
     longest_queue: int
     least_tiles: int | None
     """Tiles per rank from which on the bar holds."""
+    jobs: dict[int, list[float]]
+    """ranks: efficiency of whole jobs for the mean and each of JOB_TILE_SECONDS"""
+    before: float
+    """Seconds before the first tile of a whole job."""
 
 
 class Simulation:
@@ -69,17 +76,26 @@ class Simulation:
         machine, tiles = self.problem(ranks, per_rank, spread, mean or self.mean, **more)
         return self.model.run(machine, tiles).efficiency
 
-    def stored(self, ranks: int, rate: float) -> Outcome:
+    def stored(self, ranks: int, rate: float, mean: float = 0) -> Outcome:
         """Run a map of the usual size and the bar's spread whose ranks share a rate of writing."""
         times = {"write": CALL, "write_tile": RECORD_BYTES * ranks / rate}
-        return self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, self.mean, **times))
+        return self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, mean or self.mean, **times))
 
-    def with_file(self, ranks: int, rate: float) -> float:
-        """Efficiency with writing and the final file, for which the tiles are read back at the same rate."""
-        found = self.stored(ranks, rate)
+    def with_file(self, ranks: int, rate: float, mean: float = 0, before: float = 0) -> float:
+        """Efficiency with writing and the final file, for which the tiles are read back at the same rate.
+
+        `before`: seconds before the first tile.
+        """
+        found = self.stored(ranks, rate, mean)
         finish = self.packing.seconds(ranks * USUAL * TRAJECTORIES_PER_TILE, ranks)
         finish += ranks * USUAL * RECORD_BYTES / rate
-        return float(found.busy.sum() / (ranks * (found.makespan + finish)))
+        return float(found.busy.sum() / (ranks * (before + found.makespan + finish)))
+
+    def whole_jobs(self, before: float) -> dict[int, list[float]]:
+        """Efficiency of whole jobs: for each number of ranks the measured mean, then JOB_TILE_SECONDS."""
+        rate = max(STORES.values())
+        means = (self.mean, *JOB_TILE_SECONDS)
+        return {ranks: [self.with_file(ranks, rate, mean, before) for mean in means] for ranks in JOB_RANKS}
 
     def problem(self, ranks: int, per_rank: int, spread: float, mean: float, **more):
         """Return the machine and the tiles."""
@@ -95,8 +111,8 @@ class Simulation:
             found = per_rank
         return found
 
-    def everything(self, bar: float) -> Simulated:
-        """All that the page shows."""
+    def everything(self, bar: float, before: float) -> Simulated:
+        """All that the page shows; `before`: seconds before the first tile of a whole job."""
         machine, tiles = self.problem(MANY_RANKS, USUAL, BAR_SPREAD, self.mean)
         many = self.model.run(machine, tiles)
         neighbours = [
@@ -125,4 +141,6 @@ class Simulation:
             questions=int(many.questions.sum()),
             longest_queue=many.longest_queue,
             least_tiles=self.least_tiles(bar),
+            jobs=self.whole_jobs(before),
+            before=before,
         )
