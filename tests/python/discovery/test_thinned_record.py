@@ -75,6 +75,8 @@ def test_a_record_of_several_bodies_is_thinned_with_its_noise() -> None:
     sensor = prepared.sensors[0]
     assert prepared.block == 7 and sensor.values.size == prepared.samples.t.size == COUNT // 7
     assert sensor.sigma == pytest.approx(SIGMA / np.sqrt(7), rel=0.1)
+    # a poor fit would show a larger one
+    assert sensor.stated
     assert "30001 samples, fitted as 4285 values, each of 7" in prepared.notes[-1]
     assert sensor.known.sum() > 0.999 * sensor.known.size
     prepared.leave_out(np.array([100]))

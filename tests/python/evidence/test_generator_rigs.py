@@ -43,12 +43,12 @@ def test_a_decay_is_that_of_dry_and_viscous_friction(rigs: ModuleType, tmp_path)
     assert t.size == 30_000
     # from rest at 0.3 m to the first turn: about the middle that friction shifts
     rate = -0.05 + 1j * np.sqrt(40 - 0.05**2)
-    swing = t < np.pi / rate.imag
+    half = t < np.pi / rate.imag
     amplitude = (0.3 - dry / 40) * np.array([1, -rate.real / rate.imag])
-    turn = rate.imag * t[swing]
-    wanted = dry / 40 + np.exp(rate.real * t[swing]) * (
+    turn = rate.imag * t[half]
+    wanted = dry / 40 + np.exp(rate.real * t[half]) * (
         amplitude[0] * np.cos(turn) + amplitude[1] * np.sin(turn)
     )
     noise = 2e-3 * np.std(x)
-    assert np.std(x[swing] - wanted) == pytest.approx(noise, rel=0.1)
-    assert abs(np.mean(x[swing] - wanted)) < 5 * noise / np.sqrt(swing.sum())
+    assert np.std(x[half] - wanted) == pytest.approx(noise, rel=0.1)
+    assert abs(np.mean(x[half] - wanted)) < 5 * noise / np.sqrt(half.sum())

@@ -156,8 +156,9 @@ def _thin(prepared: SensedPrepared) -> None:
     watched = {"x": thin.x, "v": thin.v}
     for one in sensors:
         one.values = thin.sensors.get(one.name, watched.get(one.kind))
-        # noise with memory is not as much smaller
-        one.sigma = max(one.sigma / np.sqrt(size), white_noise(one.values))
+        # noise with memory is not as much smaller; white noise is known better than any fit shows it
+        expected, seen = one.sigma / np.sqrt(size), white_noise(one.values)
+        one.sigma, one.stated = max(expected, seen), one.stated or seen < RECORDS.white * expected
         one.known = known.copy()
     prepared.block, prepared.samples, prepared.sigma = size, whole(thin), sensors[0].sigma
     prepared.resolution /= np.sqrt(size)

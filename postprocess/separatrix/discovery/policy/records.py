@@ -116,6 +116,7 @@ class Records:
     # measured/thinned_record.py
     thinned_rows: int = row(4000, "1", "effort", "rows to which a record of several bodies is thinned")
     rough: float = row(5.0, "1", "test", "fourth difference of means over its noise that is rough")
+    white: float = row(1.2, "1", "test", "noise of means over that of white noise that is white")
     most_rough: float = row(0.1, "1", "test", "share of rows that may be rough")
     # workflow.py
     held_out_end: float = row(0.3, "1", "campaign", "share of an only record that is held out")
