@@ -15,6 +15,8 @@ struct tape_range {
   vec least, most_slope, most_curvature, last;
 };
 
+static_assert(tape_order % 3 == 0, "to_bernstein takes three rounds at a time");
+
 // Bernstein coefficients over the step.
 LANE_LEAF void to_bernstein(const vec *p, vec *b) {
   const int n = tape_order;
@@ -23,9 +25,24 @@ LANE_LEAF void to_bernstein(const vec *p, vec *b) {
     b[k] = p[k] * inverse;
     inverse = inverse * (k + 1) / (n - k + (k == n));
   }
-  for (int k = 1; k <= n; k++)
-    for (int i = n; i >= k; i--)
-      b[i] += b[i - 1];
+  // Three of the `n` rounds of sums at a time: each number is loaded and stored once for them.
+  for (int k = 1; k <= n; k += 3) {
+    vec zeroth = b[k], first = zeroth + b[k - 1];
+    b[k] = first;
+    vec here = b[k + 1], next = here + zeroth, second = next + first;
+    zeroth = here;
+    first = next;
+    b[k + 1] = second;
+    for (int i = k + 2; i <= n; i++) {
+      here = b[i];
+      next = here + zeroth;
+      vec after = next + first;
+      b[i] = after + second;
+      zeroth = here;
+      first = next;
+      second = after;
+    }
+  }
 }
 
 // Lower and upper bound over the step.
