@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guard around calls into a library: a crash inside ends with its code and word, one outside stays a crash."""
+"""The guard around calls into a library: a crash inside ends with its code, one outside stays a crash."""
 
 import signal
 import subprocess

@@ -236,7 +236,7 @@ def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, 
     assert "has been removed or moved" in (tmp_path / "log").read_text()
     if moved:
         elsewhere.rename(part)
-        process = life.launch(mpi_separatrix, tmp_path, ranks, *long, "--resume", "--time-limit", "1")
+        process = life.launch(mpi_separatrix, tmp_path, ranks, *long, "--resume", "--time-limit", "8")
         assert process.wait(60) in (0, 75)
         assert "tiles were done before" in (tmp_path / "log").read_text()
 
