@@ -157,7 +157,8 @@ def _thin(prepared: SensedPrepared) -> None:
     for one in sensors:
         one.values = thin.sensors.get(one.name, watched.get(one.kind))
         # noise with memory is not as much smaller; white noise is known better than any fit shows it
-        expected, seen = one.sigma / np.sqrt(size), white_noise(one.values)
+        # the correction of the curvature adds the noise of the means two blocks apart
+        expected, seen = one.sigma * np.sqrt((1 + 1 / 24) / size), white_noise(one.values)
         one.sigma, one.stated = max(expected, seen), one.stated or seen < RECORDS.white * expected
         one.known = known.copy()
     prepared.block, prepared.samples, prepared.sigma = size, whole(thin), sensors[0].sigma
