@@ -4,6 +4,10 @@
 
 import numpy as np
 import pytest
+from separatrix.discovery import Options
+from separatrix.discovery.fitting.data import fit_stages
+from separatrix.discovery.fitting.observations import observation_of
+from separatrix.discovery.fitting.sensed import measure_sensors
 from separatrix.discovery.measured.records import Record, make_record
 from separatrix.discovery.measured.sensors import prepare_sensors
 from separatrix.discovery.measured.thinned_record import (
@@ -81,3 +85,19 @@ def test_a_record_of_several_bodies_is_thinned_with_its_noise() -> None:
     assert sensor.known.sum() > 0.999 * sensor.known.size
     prepared.leave_out(np.array([100]))
     assert not sensor.known[99:103].any() and sensor.known[98]
+
+
+@pytest.mark.usefixtures("library")
+def test_what_a_machine_misses_is_no_memory_of_noise_that_is_known() -> None:
+    x = motion(T) + SIGMA * np.random.default_rng(3).standard_normal(COUNT)
+    header = {"drive_frequency_rad_s": 7.0, "phase": 0.0, "units": "t s, x.first m"}
+    observed = observation_of(Model.from_text(CASE), "motion")
+    record = make_record("r", {"t": T, "x.first": x}, header)
+    data = observed.gather([observed.prepare(record, None)], Options())
+    free = data.unknowns(observed.model)
+    problem, fit = fit_stages(
+        data, observed.model, free, np.array([one.value for one in free]), stages=[data.last]
+    )
+    assert fit.reduced_chi2 > 10
+    measure_sensors(data, problem, fit)
+    assert data.prepared[0].memory == 0

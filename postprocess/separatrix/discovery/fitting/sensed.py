@@ -340,7 +340,8 @@ def measure_sensors(data: SensedData, problem: CoordinateProblem, fit: Fit) -> N
             sensor = data.prepared[number].sensor(name)
             if sensor is not None:
                 factors[id(sensor)] = (sensor, factor)
-    white = [factor**2 for _, factor in factors.values()]
+    # noise that is known does not grow with a misfit
+    white = [1.0 if sensor.stated else factor**2 for sensor, factor in factors.values()]
     misfit = fit.reduced_chi2 / max(float(np.median(white or [1.0])), 1e-300)
     for sensor, factor in factors.values():
         if not sensor.stated:
