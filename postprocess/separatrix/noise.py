@@ -164,7 +164,7 @@ def first_passage(
     -------
     xarray.Dataset
         Over (x0, v0): `survival` of the duration, `survival_lower` and `survival_upper`, the 95 % interval of
-        Wilson; `passage_time` [s], the mean of the first passages, of motions that stay the duration.
+        Wilson; `passage_time` [s], the mean of the first passages; motions that stay count with the duration.
 
     Examples
     --------
@@ -259,7 +259,8 @@ def _checked(
             f'noise: found restitution with contact.law "{contact["law"]}", allowed newton', USAGE
         )
     rate, deviation = impulses or (0.0, 0.0)
-    if min(force, rate, deviation, restitution) < 0 or (impulses and not rate > 0):
+    sizes = (force, rate, deviation, restitution)
+    if not all(0 <= one < np.inf for one in sizes) or (impulses and not rate > 0):
         raise SeparatrixError(
             "noise: allowed are values of 0 or more, and a rate of impulses more than 0", USAGE
         )
@@ -338,11 +339,12 @@ class _Ensemble:
         self.drawn: dict[tuple[int, int], np.ndarray] = {}
         self._wait(np.arange(len(starts)))
 
-    def look(self) -> None:
-        """Note what has left."""
+    def look(self, which: np.ndarray | slice = slice(None)) -> None:
+        """Note which of these motions have left."""
         lower, upper = self.noise.leaves
-        out = (self.state[:, 0] < lower) | (self.state[:, 0] > upper)
-        self.left = np.where(out, np.minimum(self.left, self.clock), self.left)
+        x = self.state[which, 0]
+        out = (x < lower) | (x > upper)
+        self.left[which] = np.where(out, np.minimum(self.left[which], self.clock[which]), self.left[which])
 
     def move_to(self, until: float) -> None:
         """Move all to a time [s], past impulses and impacts of random restitution."""
@@ -401,7 +403,7 @@ class _Ensemble:
         for number in np.unique(self.impulses[struck_now]):
             mine = struck_now[self.impulses[struck_now] == number]
             self.state[mine, 1] += deviation * self._numbers(_IMPULSE, int(number))[mine]
-        self.look()
+        self.look(struck_now)
         self.impulses[struck_now] += 1
         self._wait(struck_now)
 

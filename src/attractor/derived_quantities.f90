@@ -150,14 +150,14 @@ contains
   end function is_speed
 
   !> Values of the expressions (rows; 0 of a power) at the samples of a log that began with the crank at `crank_angle` [rad]. Not
-  !> `ok` where an operation is not defined.
+  !> `ok` are those with an operation that is not defined somewhere.
   pure subroutine values_at_samples(machine, compiled, crank_angle, log, values, ok)
     class(machine_t), intent(in) :: machine
     type(compiled_t), intent(in) :: compiled
     real(wp), intent(in) :: crank_angle
     type(log_t), intent(in) :: log
     real(wp), allocatable, intent(out) :: values(:, :)
-    logical, intent(out) :: ok
+    logical, intent(out) :: ok(:)
     type(machine_column_t), allocatable :: columns(:)
     real(wp), allocatable :: variables(:, :), value(:)
     integer, allocatable :: fault(:)
@@ -178,8 +178,8 @@ contains
       call evaluate(compiled%tape, variables(:count_variables, k), [real(wp) ::], value, fault)
       do i = 1, size(compiled%nodes)
         if (compiled%nodes(i) == 0) cycle
-        values(i, k) = value(compiled%nodes(i))
-        ok = ok .and. fault(compiled%nodes(i)) == 0
+        ok(i) = ok(i) .and. fault(compiled%nodes(i)) == 0
+        if (ok(i)) values(i, k) = value(compiled%nodes(i))
       end do
     end do
   end subroutine values_at_samples

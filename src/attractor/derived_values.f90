@@ -51,7 +51,7 @@ contains
     type(log_t) :: log
     real(wp), allocatable :: ends(:, :)
     integer :: i, faulty
-    logical :: ok
+    logical :: ok, known(size(wanted))
     values = ieee_value(1.0_wp, ieee_quiet_nan)
     call compile(machine, laws, wanted, compiled, faulty, error)
     if (allocated(error) .or. .not. lasts > 0) return
@@ -61,9 +61,9 @@ contains
     do i = 1, size(wanted)
       if (is_power(wanted(i))) values(i) = power_of(wanted(i), log, lasts)
     end do
-    call values_at_samples(machine, compiled, angle_at(machine, start), log, ends, ok)
+    call values_at_samples(machine, compiled, angle_at(machine, start), log, ends, known)
     do i = 1, size(wanted)
-      if (wanted(i)%quantity == 'drift' .and. ok) values(i) = (ends(i, size(ends, 2)) - ends(i, 1))/periods
+      if (wanted(i)%quantity == 'drift' .and. known(i)) values(i) = (ends(i, size(ends, 2)) - ends(i, 1))/periods
     end do
     if (any(wanted%quantity == 'mean' .or. wanted%quantity == 'rms')) then
       call average(machine, compiled, wanted, start, lasts, periods, log, values)
@@ -134,15 +134,15 @@ contains
     real(wp), intent(inout) :: values(:)
     real(wp), dimension(size(wanted)) :: means, squares, before, before_squares, difference
     integer :: panels
-    logical :: ok
-    logical :: averaged(size(wanted))
+    logical :: ok, known(size(wanted)), averaged(size(wanted))
     averaged = wanted%quantity == 'mean' .or. wanted%quantity == 'rms'
     panels = first_panels
     difference = huge(1.0_wp)
     do while (panels <= most_panels)
       call integrate(machine, compiled, start, lasts, breaks_of(machine, start, lasts, log), lasts/periods/panels, means, squares, &
-                     ok)
-      if (.not. ok) return
+                     known, ok)
+      averaged = averaged .and. known
+      if (.not. ok .or. .not. any(averaged)) return
       if (panels > first_panels) then
         difference = abs(means - before)
         where (wanted%quantity == 'rms') difference = abs(sqrt(squares) - sqrt(before_squares))
@@ -183,14 +183,14 @@ contains
     breaks = [breaks, lasts]
   end function breaks_of
 
-  !> Mean of each expression and of its square, with panels of at most `longest` [s].
-  pure subroutine integrate(machine, compiled, start, lasts, breaks, longest, means, squares, ok)
+  !> Mean of each expression that is defined at all points, and of its square, with panels of at most `longest` [s].
+  pure subroutine integrate(machine, compiled, start, lasts, breaks, longest, means, squares, known, ok)
     class(machine_t), intent(in) :: machine
     type(compiled_t), intent(in) :: compiled
     type(section_state_t), intent(in) :: start
     real(wp), intent(in) :: lasts, breaks(:), longest
     real(wp), intent(out) :: means(:), squares(:)
-    logical, intent(out) :: ok
+    logical, intent(out) :: known(:), ok
     type(log_t) :: log
     real(wp), allocatable :: instants(:), weight(:), values(:, :)
     real(wp) :: length
@@ -215,8 +215,8 @@ contains
     log%balance%kept = .false.
     call fly(machine, start, lasts, instants, .false., log, ok)
     ok = ok .and. log%samples == size(instants)
-    if (ok) call values_at_samples(machine, compiled, angle_at(machine, start), log, values, ok)
     if (.not. ok) return
+    call values_at_samples(machine, compiled, angle_at(machine, start), log, values, known)
     means = matmul(values, weight)/lasts
     squares = matmul(values**2, weight)/lasts
   end subroutine integrate

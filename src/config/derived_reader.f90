@@ -90,10 +90,14 @@ contains
     type(error_t), allocatable :: error
     integer :: i, faulty
     if (size(the_case%derived) == 0) return
+    do i = 1, size(the_case%derived)
+      if (len_trim(the_case%derived(i)%expression) > 0) cycle
+      call report(source, 'derived.'//trim(the_case%derived(i)%name)//'.expression', 'found "", allowed an expression, as in "x^2"')
+    end do
     call machine_of(the_case%laws, options_t(), machine, error)
     if (allocated(error)) return
     do i = 1, size(the_case%derived)
-      if (is_power(the_case%derived(i)) .or. len(the_case%derived(i)%expression) == 0) cycle
+      if (is_power(the_case%derived(i)) .or. len_trim(the_case%derived(i)%expression) == 0) cycle
       call compile(machine, the_case%laws, the_case%derived(i:i), compiled, faulty, error)
       if (allocated(error)) call report(source, 'derived.'//trim(the_case%derived(i)%name)//'.expression', error%message)
     end do

@@ -125,8 +125,11 @@ contains
     real(wp), allocatable, intent(out) :: values(:)
     type(schema_t), intent(inout) :: schema
     integer :: i
-    call derive_motion(moving, grid, span, cycle, values)
-    if (reason /= reason_time_over) values = ieee_value(1.0_wp, ieee_quiet_nan)
+    if (reason == reason_time_over) then
+      call derive_motion(moving, grid, span, cycle, values)
+    else
+      allocate (values(size(grid%derived)), source=ieee_value(1.0_wp, ieee_quiet_nan))
+    end if
     do i = 1, size(values)
       call schema%add_attribute('', 'derived_'//trim(grid%derived(i)%name), values(i))
       call schema%add_attribute('', 'derived_'//trim(grid%derived(i)%name)//'_units', grid%derived(i)%unit)

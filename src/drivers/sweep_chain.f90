@@ -133,8 +133,7 @@ contains
     found = 0
     before = 0
     mark = 0
-    visited = values
-    if (.not. up) visited = values(size(values):1:-1)
+    visited = merge(values, values(size(values):1:-1), up)
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
       call hold_parameter(grid, span, path, visited(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, &
@@ -169,9 +168,15 @@ contains
       call check_stop(journal, time_limit, 'running '//trim(path)//trim(merge(' up  ', ' down', up)), error)
       if (allocated(error)) return
     end do
-    packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(found, wp), &
-              reshape(limits(:, :found), [limit_numbers*found])]
+    packed = packed_chain(holds, points, limits(:, :found))
   end subroutine run_chain
+
+  pure function packed_chain(holds, points, limits) result(packed)
+    real(wp), intent(in) :: holds(:, :), points(:, :, :), limits(:, :)
+    real(wp), allocatable :: packed(:)
+    packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(size(limits, 2), wp), &
+              reshape(limits, [size(limits)])]
+  end function packed_chain
 
   !> The state before the first hold: a motor has a speed, and a current or an integral, too.
   pure type(section_state_t) function first_state(grid) result(state)

@@ -126,10 +126,8 @@ contains
     real(wp) :: busy, waited, begun
     integer :: tile, position
     logical :: whole
-    associate (command => session%command)
-      mine = pack([(tile, tile=1, file%tile_count())], &
-                  [(in_shard(tile, command%shard, command%shard_count), tile=1, file%tile_count())])
-    end associate
+    mine = pack([(tile, tile=1, file%tile_count())], &
+                [(in_shard(tile, session%command%shard, session%command%shard_count), tile=1, file%tile_count())])
     unfinished = in_order_of_file(file, pack(mine, [(.not. file%tile_done(mine(tile)), tile=1, size(mine))]))
     watch%total = sum([(file%tiling%points(mine(tile)), tile=1, size(mine))])
     watch%before = note_earlier(session, file, work)

@@ -230,6 +230,7 @@ def test_ranks_and_shares_have_the_same_bits(separatrix, tmp_path):
         ('expression = "x + y"\nunit = "m"', "column 5: found name 'y'"),
         ('expression = "x"\nunit = "mm"', 'allowed the unit of SI, "m"'),
         ('expression = "x"', "derived.a.unit"),
+        ('expression = ""\nunit = "m"', 'found "", allowed an expression'),
         ('expression = "x"\nunit = "m"\nof = "drive"', "derived.a.of"),
     ],
 )
@@ -244,6 +245,8 @@ def test_what_is_wrong_is_named(separatrix, tmp_path, table, message):
 def test_an_operation_that_is_not_defined_is_not_known(separatrix, tmp_path):
     """A logarithm of positions of both signs."""
     text = LINEAR + '[derived.a]\nexpression = "log(x)"\nunit = "1"\n'
-    assert np.isnan(derived(tmp_path, separatrix, "trajectory", text)["a"])
+    text += '[derived.b]\nquantity = "rms"\nexpression = "v"\nunit = "m/s"\n'
+    found = derived(tmp_path, separatrix, "trajectory", text)
+    assert np.isnan(found["a"]) and found["b"] > 0
     info = succeed(separatrix, "trajectory", "case.toml", "-o", "again.h5", folder=tmp_path)
     assert "a: not known (mean of log(x))" in info.out

@@ -82,6 +82,10 @@ def test_a_motion_is_the_same_for_any_number_of_motions():
     few = sx.noisy(case, 0.0, 0.0, motions=3, samples=3, **noise)
     many = sx.noisy(case, 0.0, 0.0, motions=40, samples=3, **noise)
     assert np.array_equal(few.x, many.x[:3])
+    few = sx.noisy(case, 0.0, 0.0, motions=10, samples=3, leaves=(-0.019, 0.019), **noise)
+    many = sx.noisy(case, 0.0, 0.0, motions=40, samples=3, leaves=(-0.019, 0.019), **noise)
+    assert np.array_equal(few.first_passage, many.first_passage[:10], equal_nan=True)
+    few = sx.noisy(case, 0.0, 0.0, motions=3, samples=3, **noise)
     again = sx.noisy(case, 0.0, 0.0, motions=3, samples=3, **noise)
     assert np.array_equal(few.v, again.v)
     other = sx.noisy(case, 0.0, 0.0, motions=3, samples=3, seed=2, **noise)
@@ -133,6 +137,8 @@ def test_the_interval_of_wilson():
     "text, more, message",
     [
         (LINEAR, {"force": -1.0}, "values of 0 or more"),
+        (LINEAR, {"force": np.nan}, "values of 0 or more"),
+        (LINEAR, {"impulses": (1.0, np.inf)}, "values of 0 or more"),
         (LINEAR, {"impulses": (0.0, 1.0)}, "rate of impulses more than 0"),
         (LINEAR, {"restitution": 0.1}, "allowed newton"),
         (LINEAR, {"leaves": (1.0, -1.0)}, "lower < upper"),
