@@ -267,6 +267,10 @@ def _checked(
     at_impact = isinstance(leaves, str)
     if at_impact and leaves != "impact":
         raise SeparatrixError(f'leaves: found "{leaves}", allowed "impact" or (lower, upper)', USAGE)
+    if at_impact and contact["law"] == "none":
+        raise SeparatrixError(
+            'leaves: found "impact" of a body without a contact, allowed (lower, upper)', USAGE
+        )
     lower, upper = (-np.inf, np.inf) if leaves is None or at_impact else map(float, leaves)
     if not lower < upper:
         raise SeparatrixError(f"leaves: found {lower} and {upper}, allowed lower < upper", USAGE)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from separatrix.errors import CANNOT_CREATE, SeparatrixError
 from separatrix.version import __version__
 from separatrix.whole_files import written_whole
 
@@ -20,11 +19,7 @@ def save(figure: Figure, stem: Path, formats: Sequence[str], dpi: int) -> list[P
 
 
 def _save_one(figure: Figure, path: Path, suffix: str, dpi: int) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SeparatrixError(f"{path}: cannot be written ({error.strerror})", CANNOT_CREATE) from error
-    with written_whole(path) as temporary:
+    with written_whole(path, make_folder=True) as temporary:
         figure.savefig(temporary, format=suffix, dpi=dpi, metadata=_metadata(suffix))
     return path
 

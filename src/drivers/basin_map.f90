@@ -81,7 +81,7 @@ contains
     extra%positions_are_angles = position_is_angle(session%the_case%laws)
     call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
     call add_crank_catalogue(session%team, work%grid, work%catalogues, extra)
-    call add_derived_catalogue(session%team, work%grid, work%catalogues, work%span, extra)
+    if (complete) call add_derived_catalogue(session%team, work%grid, work%catalogues, work%span, extra)
     if (allocated(work%grid%drawn)) call add_sample_shares(extra, work%captured, points_of_slice(work%grid))
     if (work%refine%active) call add_refinement(extra, work, work%grid%shape, work%origins)
     call finish_tiles(session, file, complete, extra)

@@ -7,10 +7,9 @@ module crank_catalogue
   use crank_summary, only: crank_numbers, crank_outcomes, crank_summary_t, crank_table, crank_values, last_crank_outcome, &
     no_summary
   use crank_turns, only: summarize_attractor
-  use errors, only: error_t
-  use grid, only: grid_t, slice_motion
-  use kinds, only: int64, wp
-  use machine_type, only: machine_t
+  use entry_walk, only: begin_walk, entry_walk_t
+  use grid, only: grid_t
+  use kinds, only: wp
   use map_schema, only: schema_t, type_float64, type_int8
   use motor_choices, only: has_motor
   use team, only: team_t
@@ -61,28 +60,17 @@ contains
     type(grid_t), intent(in) :: grid
     type(catalogue_t), intent(in) :: catalogues(:)
     real(wp), allocatable, intent(out) :: values(:, :)
-    real(wp), allocatable :: mine(:), gathered(:)
-    class(machine_t), allocatable :: machine
-    type(error_t), allocatable :: error
+    type(entry_walk_t) :: walk
     type(crank_summary_t) :: crank
-    integer :: i, k, entry
-    allocate (mine(0))
-    entry = 0
-    do i = 1, size(catalogues)
-      if (modulo(i, team%size()) == team%rank()) call slice_motion(grid, int(i - 1, int64), machine, error)
-      do k = 1, size(catalogues(i)%attractors)
-        entry = entry + 1
-        if (modulo(i, team%size()) /= team%rank() .or. allocated(error)) cycle
-        call summarize_attractor(machine, catalogues(i)%attractors(k), crank)
-        mine = [mine, real(entry, wp), real(crank%outcome, wp), crank_values(crank)]
-      end do
+    logical :: found
+    walk = begin_walk(team, catalogues)
+    do
+      call walk%next(grid, found)
+      if (.not. found) exit
+      call summarize_attractor(walk%machine, catalogues(walk%catalogue)%attractors(walk%attractor), crank)
+      call walk%note([real(crank%outcome, wp), crank_values(crank)])
     end do
-    call team%allgather(mine, gathered)
-    ! What no rank could summarise is not known.
-    values = spread([0.0_wp, crank_values(no_summary())], 2, entry)
-    do i = 1, size(gathered), 2 + crank_numbers
-      values(:, nint(gathered(i))) = gathered(i + 1:i + 1 + crank_numbers)
-    end do
+    call walk%gather(team, [0.0_wp, crank_values(no_summary())], values)
   end subroutine summarize_entries
 
 end module crank_catalogue

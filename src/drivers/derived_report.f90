@@ -7,8 +7,8 @@ module derived_report
   use basin, only: catalogue_t
   use derived_quantities, only: derived_t
   use derived_values, only: derive_attractor, derive_over
-  use errors, only: error_t
-  use grid, only: grid_t, slice_laws, slice_motion
+  use entry_walk, only: begin_walk, entry_walk_t
+  use grid, only: grid_t, slice_laws
   use journal, only: json_number, journal_t
   use kinds, only: int64, wp
   use machine_type, only: machine_t, section_state_t
@@ -52,27 +52,19 @@ contains
     type(catalogue_t), intent(in) :: catalogues(:)
     type(span_t), intent(in) :: span
     real(wp), allocatable, intent(out) :: values(:, :)
-    real(wp) :: found(size(grid%derived))
-    real(wp), allocatable :: mine(:), gathered(:)
-    class(machine_t), allocatable :: machine
-    type(error_t), allocatable :: error
-    integer :: i, k, entry
-    allocate (mine(0))
-    entry = 0
-    do i = 1, size(catalogues)
-      if (modulo(i, team%size()) == team%rank()) call slice_motion(grid, int(i - 1, int64), machine, error)
-      do k = 1, size(catalogues(i)%attractors)
-        entry = entry + 1
-        if (modulo(i, team%size()) /= team%rank() .or. allocated(error)) cycle
-        call derive_attractor(machine, slice_laws(grid, int(i - 1, int64)), grid%derived, catalogues(i)%attractors, k, span, found)
-        mine = [mine, real(entry, wp), found]
-      end do
+    type(entry_walk_t) :: walk
+    real(wp), dimension(size(grid%derived)) :: numbers, not_known
+    logical :: found
+    walk = begin_walk(team, catalogues)
+    do
+      call walk%next(grid, found)
+      if (.not. found) exit
+      call derive_attractor(walk%machine, slice_laws(grid, int(walk%catalogue - 1, int64)), grid%derived, &
+                            catalogues(walk%catalogue)%attractors, walk%attractor, span, numbers)
+      call walk%note(numbers)
     end do
-    call team%allgather(mine, gathered)
-    allocate (values(size(grid%derived), entry), source=ieee_value(1.0_wp, ieee_quiet_nan))
-    do i = 1, size(gathered), 1 + size(found)
-      values(:, nint(gathered(i))) = gathered(i + 1:i + size(found))
-    end do
+    not_known = ieee_value(1.0_wp, ieee_quiet_nan)
+    call walk%gather(team, not_known, values)
   end subroutine derive_entries
 
   !> Quantities of one motion from the start of a grid: over the `cycle` on which it has settled; what that does not determine over

@@ -15,7 +15,7 @@ import numpy as np
 from simulator import FOLDER
 
 sys.path[:0] = [str(FOLDER.parent / "referee"), str(FOLDER.parent / "python")]
-from hidden_bodies import flown  # noqa: E402
+from hidden_bodies import SPRINGS, flown  # noqa: E402
 from structures import Friction, Rigid, Soft, Structure  # noqa: E402
 
 RECORDS = ("first.csv", "second.csv", "held_out.csv")
@@ -49,20 +49,9 @@ class Rig:
 def chain(draw: np.random.Generator) -> Rig:
     """Two masses; dry friction and a wall at the second, where drag is missing."""
     drag = draw.uniform(0.4, 0.8)
-    case = """
-body.first.mass = 1
-body.second.mass = 0.8
-watch.body = "second"
-drive.force = {law = "force", body = "first", amplitude = 4.1, frequency = 7}
-run.duration = 20
-[spring.frame]
-between = ["first"]
-stiffness = 41
-damping = 0.28
-[spring.coupling]
-between = ["first", "second"]
-stiffness = 58
-damping = 0.22
+    case = (
+        SPRINGS
+        + """
 [friction.rail]
 between = ["second"]
 force = 0.16
@@ -72,6 +61,7 @@ law = "newton"
 restitution = 0.73
 upper = 0.123
 """
+    )
 
     def machine(w: float) -> Structure:
         def force(t, q, v):
@@ -228,21 +218,6 @@ upper = 0.151
 def play(draw: np.random.Generator) -> Rig:
     """Two masses whose coupling has a free play."""
     half = draw.uniform(0.002, 0.005)
-    case = """
-body.first.mass = 1
-body.second.mass = 0.8
-watch.body = "second"
-drive.force = {law = "force", body = "first", amplitude = 4.1, frequency = 7}
-run.duration = 20
-[spring.frame]
-between = ["first"]
-stiffness = 41
-damping = 0.28
-[spring.coupling]
-between = ["first", "second"]
-stiffness = 58
-damping = 0.22
-"""
 
     def machine(w: float) -> Structure:
         def force(t, q, v):
@@ -252,7 +227,7 @@ damping = 0.22
         soft = [Soft([-1, 1], side * half, side, lambda p, rate: 60 * p) for side in (1, -1)]
         return Structure([1, 0.8], force, soft=soft, tolerance=ACCURACY)
 
-    return Rig(case, machine, (6.0, 7.5, 9.0), ("backlash@spring.coupling",), ("x.first", "x.second"))
+    return Rig(SPRINGS, machine, (6.0, 7.5, 9.0), ("backlash@spring.coupling",), ("x.first", "x.second"))
 
 
 def duffing(draw: np.random.Generator) -> Rig:
@@ -268,8 +243,7 @@ run.duration = 1
 """
 
     def several(number: float, t: np.ndarray) -> np.ndarray:
-        tones = (4.0 + number, 6.5 + 0.5 * number, 9.0)
-        return sum(2.2 * np.cos(w * t + phase) for w, phase in zip(tones, phases[int(number)], strict=True))
+        return _tones(2.2, (4.0 + number, 6.5 + 0.5 * number, 9.0), phases[int(number)], t)
 
     def machine(number: float) -> Structure:
         def force(t, q, v):
@@ -341,8 +315,7 @@ run.duration = 1
 """
 
     def several(number: float, t: np.ndarray) -> np.ndarray:
-        tones = (2.0 + 0.5 * number, 7.0 - number)
-        return sum(5.0 * np.cos(w * t + phase) for w, phase in zip(tones, phases[int(number)], strict=True))
+        return _tones(5.0, (2.0 + 0.5 * number, 7.0 - number), phases[int(number)], t)
 
     def machine(number: float) -> Structure:
         def push(t, q, v):
@@ -357,6 +330,11 @@ run.duration = 1
 RIGS = {
     one.__name__: one for one in (chain, belt, capsule, hammer, slide, play, duffing, decay, pendulum, force)
 }
+
+
+def _tones(size: float, frequencies: tuple[float, ...], phases: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """A force of several frequencies [rad/s]."""
+    return sum(size * np.cos(w * t + phase) for w, phase in zip(frequencies, phases, strict=True))
 
 
 def _dry(row: list[float], level: float) -> Friction:

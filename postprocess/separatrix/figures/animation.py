@@ -16,10 +16,11 @@ from PIL import Image
 
 from separatrix import style
 from separatrix.classes import CLASS_FIELDS
-from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
+from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures import basin
 from separatrix.figures.look import DEFAULT, Look
 from separatrix.labels import value_label
+from separatrix.whole_files import written_whole
 
 FORMATS = (".gif", ".mp4")
 
@@ -73,19 +74,15 @@ def write_film(images: Iterable[Image.Image], path: Path, frames_per_second: flo
     frames = [image.convert("RGB") for image in images]
     size = tuple(max(image.size[k] for image in frames) // 2 * 2 for k in (0, 1))
     frames = [_on_page(image, size) for image in frames]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with written_whole(path, make_folder=True) as temporary:
         if path.suffix == ".gif":
             first, *rest = (image.quantize(128) for image in frames)
             first.save(
-                path, save_all=True, append_images=rest, duration=round(1000 / frames_per_second), loop=0
-            )
+                temporary, format="GIF", save_all=True, append_images=rest,
+                duration=round(1000 / frames_per_second), loop=0,
+            )  # fmt: skip
         else:
-            _film(frames, path, frames_per_second)
-    except OSError as error:
-        raise SeparatrixError(
-            f"{path}: cannot be written ({error.strerror or error})", CANNOT_CREATE
-        ) from error
+            _film(frames, temporary, frames_per_second)
     return path
 
 
@@ -125,7 +122,7 @@ def _film(frames: list[Image.Image], path: Path, frames_per_second: float) -> No
         for number, frame in enumerate(frames):
             frame.save(Path(folder) / f"{number:06d}.png")
         command = [str(ffmpeg()), "-y", "-loglevel", "error", "-framerate", str(frames_per_second)]
-        command += ["-i", str(Path(folder) / "%06d.png"), "-pix_fmt", "yuv420p", str(path)]
+        command += ["-i", str(Path(folder) / "%06d.png"), "-pix_fmt", "yuv420p", "-f", "mp4", str(path)]
         ended = subprocess.run(command, capture_output=True, text=True)
         if ended.returncode:
             raise OSError(ended.stderr.strip().splitlines()[-1] if ended.stderr.strip() else "ffmpeg failed")

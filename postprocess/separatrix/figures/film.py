@@ -56,6 +56,11 @@ def film(
         raise SeparatrixError(
             f"film: found {begin:g} s to {end:g} s, allowed within {time[0]:g} s to {time[-1]:g} s", USAGE
         )
+    shown = np.count_nonzero((time >= begin) & (time <= end))
+    if shown < 2:
+        raise SeparatrixError(
+            f"film: found {shown} samples from {begin:g} s to {end:g} s, allowed two or more", USAGE
+        )
     step = speed / frames_per_second
     if (end - begin) / step > _MOST_FRAMES:
         raise SeparatrixError(

@@ -228,7 +228,7 @@ def test_ranks_and_shares_have_the_same_bits(separatrix, tmp_path):
         ('quantity = "median"', "derived.a.quantity"),
         ('quantity = "power"\nof = "wind"', "allowed friction, damping, contacts, drive"),
         ('expression = "x + y"\nunit = "m"', "column 5: found name 'y'"),
-        ('expression = "x"\nunit = "mm"', 'allowed the unit of SI, "m"'),
+        ('expression = "x"\nunit = "mm"', 'allowed the SI unit, "m"'),
         ('expression = "x"', "derived.a.unit"),
         ('expression = ""\nunit = "m"', 'found "", allowed an expression'),
         ('expression = "x"\nunit = "m"\nof = "drive"', "derived.a.of"),

@@ -115,6 +115,8 @@ def test_a_film_that_cannot_be_made_is_refused(case, tmp_path, monkeypatch):
         motion.separatrix.film(tmp_path / "a.avi")
     with pytest.raises(sx.SeparatrixError, match="allowed within 0 s to 5 s"):
         motion.separatrix.film(tmp_path / "a.gif", begin=4, end=6)
+    with pytest.raises(sx.SeparatrixError, match="samples from .* allowed two or more"):
+        motion.separatrix.film(tmp_path / "a.gif", begin=1, end=1.0001)
     with pytest.raises(sx.SeparatrixError, match="frames, allowed 3000"):
         motion.separatrix.film(tmp_path / "a.gif", begin=0, end=5, speed=1e-4)
     assert not list(tmp_path.iterdir())

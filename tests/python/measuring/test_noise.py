@@ -143,6 +143,7 @@ def test_the_interval_of_wilson():
         (LINEAR, {"restitution": 0.1}, "allowed newton"),
         (LINEAR, {"leaves": (1.0, -1.0)}, "lower < upper"),
         (LINEAR, {"leaves": "rest"}, 'allowed "impact"'),
+        (LINEAR, {"leaves": "impact"}, "without a contact"),
         (LINEAR, {"motions": 0}, "motions from 1"),
         ('body.a.mass = 1\nspring.s = { between = ["a"], stiffness = 1 }\n', {}, "several bodies"),
     ],

@@ -46,8 +46,9 @@ class Findings:
     maps: list[Map] = field(default_factory=list)
 
 
-# what is compared, in the words of units
-_COMPARED = {"motion": "position", "force": "force"}
+# what a sensor of a kind shows, in the words of units; of a kind without a word there the unit itself
+_SHOWN = {"x": "position", "v": "velocity", "F": "force"}
+_UNITS = {"a": "m/s^2", "i": "A"}
 
 
 def verdict_of(findings: Findings) -> dict:
@@ -355,6 +356,19 @@ def _knot_of(path: str, fitted: Fitted) -> str:
     return ""
 
 
+def _unit_of_misfit(findings: Findings) -> str:
+    """The unit of what is compared first."""
+    context = findings.context
+    sensors = getattr(context.training.prepared[0], "sensors", None)
+    if context.options.compare == "force":
+        kind = "F"
+    else:
+        kind = sensors[0].kind if sensors else "x"
+    if kind in _UNITS:
+        return _UNITS[kind]
+    return getattr(units_of(findings.base.model.parameters), _SHOWN[kind])
+
+
 def _gap(findings: Findings) -> dict:
     """Reduced chi^2 of both machines by use of the records, and what they miss beyond the noise."""
     decision, context = findings.decision, findings.context
@@ -362,7 +376,7 @@ def _gap(findings: Findings) -> dict:
     pairs = {"training": (context.training, findings.base.fit, best.fitted.fit if best else None)}
     if decision.predicted is not None:
         pairs["held_out"] = (context.held_out, decision.predicted, best.prediction if best else None)
-    unit = getattr(units_of(findings.base.model.parameters), _COMPARED[context.options.compare])
+    unit = _unit_of_misfit(findings)
     found = {}
     for use, (data, before, after) in pairs.items():
         sizes = {

@@ -3,8 +3,8 @@
 """A measured force on fewer knots that moves the body in the same way.
 
 A flight ends a step at every knot of a force, so one that is sampled far faster than it changes costs most
-of a fit. The force on fewer knots is the projection on the piecewise linear functions over them: its impulse
-and the displacement that it makes agree with those of all samples at every knot.
+of a fit. The force on fewer knots is the projection on the piecewise linear functions over them: the
+displacement that it makes agrees with that of all samples at every knot, its impulse at the end.
 """
 
 import numpy as np
