@@ -360,10 +360,7 @@ def _unit_of_misfit(findings: Findings) -> str:
     """The unit of what is compared first."""
     context = findings.context
     sensors = getattr(context.training.prepared[0], "sensors", None)
-    if context.options.compare == "force":
-        kind = "F"
-    else:
-        kind = sensors[0].kind if sensors else "x"
+    kind = sensors[0].kind if sensors else {"motion": "x", "force": "F"}[context.options.compare]
     if kind in _UNITS:
         return _UNITS[kind]
     return getattr(units_of(findings.base.model.parameters), _SHOWN[kind])
