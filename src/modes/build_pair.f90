@@ -220,7 +220,7 @@ contains
     end associate
   end subroutine name_driver
 
-  !> Friction between the bodies, and stops of the driven one on the ground or on the other; `given`: the motion of the other is given.
+  !> Friction between the bodies, and stops of the driven one on the ground or on the other; `given`: the other has a given motion.
   pure subroutine add_joints(body, stop, given, machine)
     type(law_choice_t), intent(in) :: body, stop
     logical, intent(in) :: given
