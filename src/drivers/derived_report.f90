@@ -22,7 +22,7 @@ module derived_report
   implicit none
   private
 
-  public :: add_derived_catalogue, describe_derived, report_derived, derived_meaning
+  public :: add_derived_catalogue, add_derived_column, describe_derived, report_derived
 
 contains
 
@@ -39,11 +39,20 @@ contains
     call derive_entries(team, grid, catalogues, span, values)
     if (size(values, 2) == 0) return
     do i = 1, size(grid%derived)
-      call schema%add_variable('derived_'//trim(grid%derived(i)%name), type_float64, ['entry'], units=grid%derived(i)%unit, &
-                               own_units=.true., long_name=derived_meaning(grid%derived(i))//' over the cycle or window', &
-                               data=values(i, :), group='catalogue')
+      call add_derived_column(grid%derived(i), ['entry'], values(i, :), schema, 'catalogue')
     end do
   end subroutine add_derived_catalogue
+
+  !> Adds the values of one quantity over some dimensions.
+  subroutine add_derived_column(one, dimensions, values, schema, group)
+    type(derived_t), intent(in) :: one
+    character(len=*), intent(in) :: dimensions(:)
+    real(wp), intent(in) :: values(:)
+    type(schema_t), intent(inout) :: schema
+    character(len=*), intent(in), optional :: group
+    call schema%add_variable('derived_'//trim(one%name), type_float64, dimensions, units=one%unit, own_units=.true., &
+                             long_name=derived_meaning(one)//' over the cycle or window', data=values, group=group)
+  end subroutine add_derived_column
 
   !> Quantities (rows) of every entry (columns), slice after slice.
   subroutine derive_entries(team, grid, catalogues, span, values)

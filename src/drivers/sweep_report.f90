@@ -6,7 +6,7 @@ module sweep_report
   use attractors, only: regime_impact, regime_names
   use case_type, only: contact_position => contact_law
   use constants, only: unreachable
-  use derived_report, only: derived_meaning
+  use derived_report, only: add_derived_column
   use contact_law, only: add_to_contact, barrier_positions, contact_of, contact_t
   use crank_summary, only: crank_numbers, crank_outcomes, crank_table, last_crank_outcome
   use file_layout, only: add_axes, add_reason, add_regime
@@ -99,11 +99,8 @@ contains
     type(schema_t), intent(inout) :: schema
     integer :: i
     do i = 1, size(session%the_case%derived)
-      associate (one => session%the_case%derived(i))
-        call schema%add_variable('derived_'//trim(one%name), type_float64, dimensions, units=one%unit, own_units=.true., &
-                                 long_name=derived_meaning(one)//' over the cycle or window', &
-                                 data=reshape(chains%holds(hold_derived + i - 1, :, :), [2*size(chains%holds, 2)]))
-      end associate
+      call add_derived_column(session%the_case%derived(i), dimensions, &
+                              reshape(chains%holds(hold_derived + i - 1, :, :), [2*size(chains%holds, 2)]), schema)
     end do
   end subroutine add_derived
 

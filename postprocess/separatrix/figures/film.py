@@ -16,6 +16,7 @@ from PIL import Image
 from separatrix import style
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures.animation import check_format, write_film
+from separatrix.figures.pair import carried_stop, stops_of
 from separatrix.figures.trajectory import other_bodies, watched_body
 from separatrix.labels import axis_label, unit
 
@@ -93,6 +94,8 @@ class _Scene:
         self.foot = (
             motion["drive"].values if "drive" in motion and np.ptp(motion["drive"].values) > 0 else None
         )
+        # stops that the driving body carries, relative to it, and their lines
+        self.carried = [(one, None) for one in stops_of(motion)] if carried_stop(motion) else []
         self.is_angle = float(motion.attrs.get("turn", 0)) > 0
         self.figure = Figure(figsize=(5.0, 3.6), layout="constrained")
         top, below = self.figure.subplots(2, 1, height_ratios=(2, 3) if not self.is_angle else (1, 1))
@@ -113,15 +116,15 @@ class _Scene:
             return
         values = [one[shown] for one in self.positions.values()]
         values += [self.foot[shown]] if self.foot is not None else []
-        walls = [
-            float(motion.attrs[key]) for key in ("barrier_upper", "barrier_lower") if key in motion.attrs
-        ]
+        walls = [] if carried_stop(motion) else stops_of(motion)
+        values += [self.positions["driving body"][shown] + one for one, _ in self.carried]
         low = min([one.min() for one in values] + walls)
         high = max([one.max() for one in values] + walls)
         room = 0.1 * (high - low or 1.0)
         ax.set(xlim=(low - room, high + room), ylim=(-1, 1), xlabel=axis_label(motion["x"]))
         for wall in walls:
             ax.axvline(wall, color=style.BARRIER, linewidth=3)
+        self.carried = [(one, ax.axvline(one, color=style.BARRIER, linewidth=3)) for one, _ in self.carried]
         self.spring = ax.plot([], [], color="#555555", linewidth=0.8)[0]
         self.foot_mark = ax.plot([], [], linestyle="", marker="|", markersize=16, color="#555555")[0]
         for k, name in enumerate(self.positions):
@@ -142,9 +145,8 @@ class _Scene:
                 (ax.plot([], [], color=style.MOTION, linewidth=1.0, linestyle=line)[0],
                  ax.plot([], [], linestyle="", marker="o", markersize=4, color="black")[0])
             )  # fmt: skip
-        for key in ("barrier_upper", "barrier_lower"):
-            if key in motion.attrs:
-                ax.axhline(float(motion.attrs[key]), color=style.BARRIER, linewidth=1.2)
+        for wall in [] if carried_stop(motion) else stops_of(motion):
+            ax.axhline(wall, color=style.BARRIER, linewidth=1.2)
         ax.set(xlim=(begin, end), xlabel=axis_label(motion["time"]), ylabel=f"position ({unit(motion['x'])})")
 
     def move_to(self, now: float) -> None:
@@ -155,6 +157,9 @@ class _Scene:
             line.set_data(np.append(self.time[past], now), np.append(values[past], at))
             point.set_data([now], [at])
             body.set_data([0, np.sin(at)], [0, -np.cos(at)]) if self.is_angle else body.set_data([at], [0])
+        for one, wall in self.carried:
+            driver = float(np.interp(now, self.time, self.positions["driving body"]))
+            wall.set_xdata([driver + one, driver + one])
         if self.foot is None or self.is_angle:
             return
         foot = float(np.interp(now, self.time, self.foot))

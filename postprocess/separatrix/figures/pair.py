@@ -36,7 +36,7 @@ def history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     name, distance, stops = _distance(result)
     apart.plot(time, distance, color=style.MOTION)
     apart.set_ylabel(f"{name} ({unit(result['x'])})")
-    grounded = [] if carried_stop(result) else _stops(result)
+    grounded = [] if carried_stop(result) else stops_of(result)
     for ax, levels in ((both, grounded), (apart, stops)):
         for level in levels:
             ax.axhline(level, color=style.BARRIER, linewidth=1.2, zorder=1)
@@ -49,7 +49,7 @@ def history(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
     handles = [
         Line2D([], [], color=style.MOTION, label="driven body"),
         Line2D([], [], color=DRIVER, linewidth=0.8, linestyle=(0, (4, 2)), label="driving body"),
-        *([Line2D([], [], color=style.BARRIER, linewidth=1.2, label="barrier")] if _stops(result) else []),
+        *([Line2D([], [], color=style.BARRIER, linewidth=1.2, label="barrier")] if stops_of(result) else []),
         *(Patch(color=BANDS[mode], label=flag_text(mode)) for mode in BANDS if mode in shaded),
     ]
     return page.finish(title, caption(result, look), handles, columns=min(len(handles), 5))
@@ -72,13 +72,14 @@ def shade_modes(ax: Axes, result: xr.Dataset) -> set[str]:
 
 def _distance(result: xr.Dataset) -> tuple[str, np.ndarray, list[float]]:
     """Distance from the stop on the ground, or between the bodies, and where the stops are in it."""
-    stops = _stops(result)
+    stops = stops_of(result)
     if stops and not carried_stop(result):
         return "distance from\nthe stop $|X - x_2|$", np.abs(stops[0] - result["x"].values), [0.0]
     return "$x_2 - x_1$", result["x"].values - result["driver_x"].values, stops
 
 
-def _stops(result: xr.Dataset) -> list[float]:
+def stops_of(result: xr.Dataset) -> list[float]:
+    """Return the positions of the stops, of a driving body that carries them relative to it."""
     names = ("barrier_upper", "barrier_lower")
     return [float(result.attrs[name]) for name in names if name in result.attrs]
 
