@@ -103,6 +103,7 @@ CASES = (
     Case("basin_woven", "drive.ratio", (5.1, 5.3), (1, 2), product=lambda w: (0.01, 0.95, TAU / w)),
     Case("basin_pair_backlash", "drive.frequency", (10.5, 11.5), (4, 5)),
     Case("sweep_pair_kappa", "body.friction", (0.3, 0.9), (1, 2)),
+    Case("own_equation", "force.shaker.f1", (2.0, 6.0), (1, 2)),
 )
 # Examples with a sweep, and its range.
 SWEEPS = ("sweep_coulomb", "sweep_viscous", "sweep_stribeck")
@@ -129,7 +130,6 @@ REFUSED = {
     "measured_positioning": "body.mass",
     "contact_hunt_crossley": "body.mass",
     "contact_kelvin_voigt": "body.mass",
-    "own_equation": "restoring.k",
 }
 
 

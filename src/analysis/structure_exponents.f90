@@ -9,7 +9,7 @@ module structure_exponents
   use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
-  use turn_exponents, only: exponents_of_turns
+  use turn_exponents, only: exponents_from_point, exponents_of_turns
   use multibody, only: joint_contact, joint_soft
   use multibody_section, only: multibody_point, lay_out
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
@@ -84,13 +84,18 @@ contains
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
     type(multibody_state_t) :: multibody
+    real(wp) :: from(size(point))
     logical :: ok
     select type (machine => machines%centre)
     type is (structure_t)
       call start_of_structure(machine, point, multibody, ok)
       if (ok) call exponents_of_structure(machines, machine, multibody, transient, sections, spectrum, series)
-    class default
+    type is (one_body_t)
       call exponents_of_machine(machines, [point, 0.0_wp], transient, sections, spectrum, series)
+    class default
+      from = point
+      call exponents_from_point(machines, from, transient, sections, spectrum, series)
+      call look_at_section(machines, series, spectrum)
     end select
   end subroutine exponents_from_section
 

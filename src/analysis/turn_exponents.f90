@@ -1,8 +1,8 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Lyapunov spectrum of a machine with a motor, by orthogonal directions carried from turn to turn of the crank. The trivial
-!> exponent 0 is left out.
+!> Lyapunov spectrum of a machine with a motor, or by expressions, by orthogonal directions carried from section to section.
+!> Without a clock the trivial exponent 0 is left out.
 module turn_exponents
   use direction_frame, only: log_of, orthogonalise
   use exponents, only: batches, decay_of, error_of, spectrum_t
@@ -15,7 +15,7 @@ module turn_exponents
   implicit none
   private
 
-  public :: exponents_of_turns
+  public :: exponents_of_turns, exponents_from_point
 
   !> A direction that shrinks to less than this share of the longest in a turn is rounding.
   real(wp), parameter :: digits_of_directions = 1e-13_wp
@@ -31,19 +31,32 @@ contains
     type(spectrum_t), intent(out) :: spectrum
     real(wp), intent(out) :: series(:)
     type(event_t), allocatable :: events(:)
-    real(wp), dimension(machines%centre%n) :: point, growth
-    real(wp) :: frame(machines%centre%n, machines%centre%n), batch(batches, machines%centre%n), duration
+    real(wp) :: point(machines%centre%n)
     logical :: ok
-    integer :: i, left, part
+    series = 0
+    call machines%centre%fly_to_section(start, point, events, ok)
+    if (.not. ok) spectrum%reason = reason_step_failed
+    if (ok) call exponents_from_point(machines, point, transient, turns, spectrum, series)
+  end subroutine exponents_of_turns
+
+  !> The same of the motion from a point of the section, which is moved on.
+  subroutine exponents_from_point(machines, point, transient, turns, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(inout) :: point(:)
+    integer, intent(in) :: transient, turns
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp), intent(out) :: series(:)
+    type(event_t), allocatable :: events(:)
+    real(wp) :: growth(size(point)), frame(size(point), size(point)), batch(batches, size(point)), duration
+    integer :: i, left, part, directions
     series = 0
     batch = 0
     duration = 0
-    left = size(point) - 1
+    directions = size(point) - merge(0, 1, machines%centre%has_clock)
+    left = directions
     call begin_frame(frame)
-    call machines%centre%fly_to_section(start, point, events, ok)
-    if (.not. ok) spectrum%reason = reason_step_failed
     do i = 1 - transient, turns
-      if (spectrum%reason == 0) call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
+      call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
       if (spectrum%reason == reason_not_smooth .and. i < 1) then
         ! What a transient meets does not matter: the directions begin anew.
         call begin_frame(frame)
@@ -51,9 +64,13 @@ contains
       end if
       if (spectrum%reason /= 0) return
       ! Nor what it loses.
-      if (i < 1) left = size(point) - 1
+      if (i < 1) left = directions
       if (i < 1) cycle
-      duration = duration + events(size(events))%time
+      if (machines%centre%has_clock) then
+        duration = duration + machines%centre%period
+      else
+        duration = duration + events(size(events))%time
+      end if
       part = 1 + int((int(i - 1, int64)*batches)/turns)
       batch(part, :) = batch(part, :) + log_of(growth)
       spectrum%impacts = spectrum%impacts + count(events%kind == event_impact_upper .or. events%kind == event_impact_lower)
@@ -64,20 +81,25 @@ contains
     spectrum%periods = turns
     spectrum%passed = transient + turns
     spectrum%mean_period = duration/turns
-    call conclude(batch*batches/duration, left, spectrum)
-  end subroutine exponents_of_turns
+    call conclude(batch(:, :directions)*batches/duration, left, spectrum)
+  end subroutine exponents_from_point
 
-  !> Directions along the coordinates.
+  !> Orthonormal directions, each of which has a part along every coordinate: those of coordinates that do not act on others would
+  !> stay so, in whatever order they grow.
   pure subroutine begin_frame(frame)
     real(wp), intent(out) :: frame(:, :)
+    real(wp), parameter :: golden = 0.6180339887498949_wp
+    real(wp) :: normal(size(frame, 1))
     integer :: k
-    frame = 0
-    do k = 1, size(frame, 1)
-      frame(k, k) = 1
+    normal = [(0.5_wp + modulo(k*golden, 1.0_wp), k=1, size(normal))]
+    normal = normal/norm2(normal)
+    frame = -2*spread(normal, 2, size(normal))*spread(normal, 1, size(normal))
+    do k = 1, size(normal)
+      frame(k, k) = frame(k, k) + 1
     end do
   end subroutine begin_frame
 
-  !> One turn without directions.
+  !> One section without directions.
   subroutine pass_turn(machines, point, reason)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(inout) :: point(:)
@@ -92,7 +114,7 @@ contains
     point = image
   end subroutine pass_turn
 
-  !> One turn, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions that
+  !> One section, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions that
   !> the motion leaves of its start.
   subroutine advance_frame(machines, point, frame, growth, events, left, reason)
     type(neighbourhood_t), intent(in) :: machines
@@ -117,7 +139,7 @@ contains
         by_start(:, k) = by_start(:, k)*machine%size_of(k)/machine%size_of
       end do
       do k = 1, size(events)
-        if (machine%rests(events(k)%after)) left = min(left, size(point) - 2)
+        if (machine%rests(events(k)%after)) left = min(left, size(point) - merge(1, 2, machine%has_clock))
       end do
       frame = matmul(by_start, frame)
       call orthogonalise(frame, growth)
@@ -133,7 +155,7 @@ contains
     integer, intent(in) :: left
     type(spectrum_t), intent(inout) :: spectrum
     integer :: k, n
-    n = size(batch, 2) - 1
+    n = size(batch, 2)
     allocate (spectrum%exponents(n), spectrum%errors(n))
     do k = 1, n
       spectrum%exponents(k) = sum(batch(:, k))/batches

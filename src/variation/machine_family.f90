@@ -11,6 +11,8 @@ module machine_family
   use motor_body, only: motor_body_t
   use motor_family, only: motor_body_of_family
   use one_body, only: one_body_t
+  use own_body, only: own_body_t
+  use own_family, only: own_body_of_family
   use status, only: exit_bad_case
   use structure, only: structure_t
   use structure_family, only: structure_of_family
@@ -36,6 +38,7 @@ contains
     type(one_body_t) :: body
     type(structure_t) :: structure
     type(motor_body_t) :: driven
+    type(own_body_t) :: own
     if (allocated(machine)) deallocate (machine)
     select case (kind_of(family%laws))
     case (kind_motor)
@@ -44,8 +47,10 @@ contains
     case (kind_bodies)
       call structure_of_family(family, value, structure, error)
       if (.not. allocated(error)) allocate (machine, source=structure)
-    case (kind_body, kind_own)
-      ! The second is refused with the keys that it has.
+    case (kind_own)
+      call own_body_of_family(family, value, own, error)
+      if (.not. allocated(error)) allocate (machine, source=own)
+    case (kind_body)
       call body_of_family(family, value, body, error)
       if (.not. allocated(error)) allocate (machine, source=body)
     case default

@@ -8,13 +8,12 @@ module motor_flow
   use motor_pieces, only: motor_piece_t, piece_of, set_parameters, stop_at_piece, value_of
   use motor_system, only: motor_system_t, w_at, y_at
   use motor_torque, only: motor_control_t
-  use operations, only: op_add, op_multiply
   use series_flight, only: series_order
-  use tape, only: constant, tape_t, variable
-  use tape_algebra, only: binary
+  use tape, only: tape_t
   use tape_derivative, only: differentiate
   use tape_series, only: expand, prepare_series, series_t
   use tape_value, only: evaluate
+  use tape_variation, only: add_variations
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
@@ -22,7 +21,7 @@ module motor_flow
   !> Steps after which a flight is given up: a turn takes some twenty.
   integer, parameter :: most_steps = 20000
 
-  public :: add_slopes, fly_on, new_flow, rates_at, with_piece
+  public :: add_slopes, fly_on, new_flow, rates_at, step_of, with_piece
 
   !> A system z' = f(z) on its own tape, and that of z and of its derivatives by the start, one column after the other.
   type, public :: motor_flow_t
@@ -43,31 +42,11 @@ contains
     type(motor_system_t), intent(in) :: system
     integer, intent(in) :: mode
     type(motor_flow_t), intent(out) :: flow
-    integer :: slopes(system%variables, system%variables), i, j, k, n, term, sum_of, rate
-    n = system%variables
-    flow%n = n
+    flow%n = system%variables
     flow%control = system%control
     flow%tape = system%sheet%tape
     flow%plain = system%sheet%tape
-    allocate (flow%states(n + n**2), flow%rates(n + n**2))
-    do i = 1, size(flow%states)
-      call variable(flow%tape, i, flow%states(i))
-    end do
-    flow%rates(:n) = system%flights(mode, 0)%rates
-    do k = 1, n
-      call differentiate(flow%tape, flow%rates(:n), flow%states(k), slopes(:, k))
-    end do
-    do j = 1, n
-      do i = 1, n
-        call constant(flow%tape, 0.0_wp, rate)
-        do k = 1, n
-          call binary(flow%tape, op_multiply, slopes(i, k), flow%states(n*j + k), term)
-          call binary(flow%tape, op_add, rate, term, sum_of)
-          rate = sum_of
-        end do
-        flow%rates(n*j + i) = rate
-      end do
-    end do
+    call add_variations(flow%tape, system%flights(mode, 0)%rates(:flow%n), 1, flow%states, flow%rates)
   end subroutine new_flow
 
   !> Derivatives of a node by the variables, as nodes.

@@ -7,7 +7,7 @@ import math
 import h5py
 import numpy as np
 import pytest
-from program import run, succeed
+from program import succeed
 
 ON_STOP = """
 [body]
@@ -85,15 +85,3 @@ def test_a_body_that_starts_on_a_stop_hits_it_if_it_moves_towards_it(
 )
 def test_the_time_of_a_rate_goes_on(separatrix, tmp_path, rate, x):
     assert motion(separatrix, tmp_path, IN_TIME.format(rate=rate))["x"] == pytest.approx(x, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    "command", [("stability",), ("branches", "--parameter", "drive.frequency", "--from", "0.5", "--to", "1")]
-)
-def test_commands_with_derivatives_refuse_an_expression_by_its_key(
-    separatrix, source_dir, tmp_path, command: tuple[str, ...]
-) -> None:
-    name, *options = command
-    refused = run(separatrix, name, source_dir / "examples" / "own_equation.toml", *options, folder=tmp_path)
-    assert refused.code == 65
-    assert 'restoring.law: found "expression", allowed in the commands trajectory, basin' in refused.err

@@ -1,0 +1,250 @@
+! SPDX-FileCopyrightText: The Separatrix developers
+! SPDX-License-Identifier: GPL-3.0-or-later
+
+!> Flights of a body by expressions between its events, forwards or back, with their derivatives by the start: Taylor series of the
+!> equations and of their variational equations on one tape. The branches of switching functions change within a flight; where the
+!> rates jump, so do the derivatives (Aizerman and Gantmakher 1958).
+module own_flow
+  use kinds, only: wp
+  use motor_flow, only: step_of
+  use motor_pieces, only: value_of
+  use motor_system, only: motor_system_t, v_at, x_at
+  use series_flight, only: flight_t, series_order
+  use switch_branches, only: choose_branches
+  use tape, only: tape_t
+  use tape_derivative, only: differentiate
+  use tape_series, only: expand, prepare_series, series_t
+  use tape_value, only: evaluate
+  use tape_variation, only: add_variations
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  implicit none
+  private
+
+  !> Steps after which a flight is given up.
+  integer, parameter :: most_steps = 20000
+  !> Parts of a step at whose ends it is looked whether a switching function has crossed zero.
+  integer, parameter :: parts = 16
+  !> Changes of rates at a switch that are rounding, as a share of the rates.
+  real(wp), parameter :: rounding = 1e-13_wp
+
+  public :: add_slope_nodes, fly_own, new_own_flow, rates_in, values_in
+
+  !> A system z' = f(z) of the variables time, phase, x, v and states, with its derivatives by those from x on.
+  type, public :: own_flow_t
+    type(tape_t) :: tape
+    !> The same without derivatives: it has the first nodes.
+    type(flight_t) :: plain
+    integer :: n = 0, varied = 0
+    !> Nodes of variables and of their rates.
+    integer, allocatable :: states(:), rates(:)
+    !> Derivatives of the switching functions by x, v and the states.
+    integer, allocatable :: switch_slopes(:, :)
+  end type own_flow_t
+
+contains
+
+  !> The equations of a mode (`motor_equations`), with their variational equations.
+  pure subroutine new_own_flow(system, mode, flow)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: mode
+    type(own_flow_t), intent(out) :: flow
+    integer :: k
+    flow%plain = system%flights(mode, 0)
+    flow%tape = flow%plain%tape
+    flow%n = system%variables
+    flow%varied = flow%n - x_at + 1
+    call add_variations(flow%tape, flow%plain%rates(:flow%n), x_at, flow%states, flow%rates)
+    allocate (flow%switch_slopes(flow%varied, size(flow%tape%switches)))
+    do k = 1, size(flow%tape%switches)
+      call add_slope_nodes(flow, flow%tape%switches(k)%argument, x_at, flow%switch_slopes(:, k))
+    end do
+  end subroutine new_own_flow
+
+  !> Derivatives of a node by the variables from `first` on, as nodes.
+  pure subroutine add_slope_nodes(flow, node, first, slopes)
+    type(own_flow_t), intent(inout) :: flow
+    integer, intent(in) :: node, first
+    integer, intent(out) :: slopes(:)
+    integer :: k
+    do k = first, flow%n
+      call differentiate(flow%tape, [node], flow%states(k), slopes(k - first + 1:k - first + 1))
+    end do
+  end subroutine add_slope_nodes
+
+  !> Values of all nodes; those that are not defined are no number.
+  pure function values_in(flow, z, parameters) result(value)
+    type(own_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: value(flow%tape%count)
+    real(wp) :: all(size(flow%states))
+    integer :: fault(flow%tape%count)
+    all = 0
+    all(:flow%n) = z
+    call evaluate(flow%tape, all, parameters, value, fault, branches_at(flow, z, parameters, 1))
+    where (fault > 0) value = ieee_value(1.0_wp, ieee_quiet_nan)
+  end function values_in
+
+  !> Rates of the variables.
+  pure function rates_in(flow, z, parameters) result(rates)
+    type(own_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: rates(flow%n), value(flow%tape%count)
+    value = values_in(flow, z, parameters)
+    rates = value(flow%rates(:flow%n))
+  end function rates_in
+
+  !> Signs of the switching functions of a motion that leaves `z` in a direction of time, 1 or -1.
+  pure function branches_at(flow, z, parameters, direction) result(branches)
+    type(own_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    integer, intent(in) :: direction
+    integer :: branches(size(flow%tape%switches)), zeros(size(branches))
+    logical :: fits
+    call choose_branches(flow%plain, z, parameters, branches, zeros, fits)
+    ! Back in time a zero of odd order is left to the other side.
+    if (direction < 0) where (zeros > 0 .and. modulo(zeros, 2) == 1) branches = -branches
+  end function branches_at
+
+  !> Moves the variables by a `duration` [s] of either sign; `sizes` set how small an error is. With `slopes` their derivatives by
+  !> the start, too. Where the equations are not defined nothing comes out that is a number.
+  pure subroutine fly_own(flow, parameters, sizes, duration, z, slopes)
+    type(own_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: parameters(:), sizes(:), duration
+    real(wp), intent(inout) :: z(:)
+    real(wp), intent(out), optional :: slopes(:, :)
+    real(wp) :: all(size(flow%states)), scales(size(flow%states))
+    integer :: i, n, m
+    n = flow%n
+    m = flow%varied
+    if (.not. present(slopes)) then
+      call take_steps(flow, flow%plain%tape, n, parameters, sizes, duration, z)
+      return
+    end if
+    all = 0
+    all(:n) = z
+    scales(:n) = sizes
+    do i = 1, m
+      all(n + m*(i - 1) + i) = 1
+      scales(n + m*(i - 1) + 1:n + m*i) = sizes(x_at:)/sizes(x_at - 1 + i)
+    end do
+    call take_steps(flow, flow%tape, size(all), parameters, scales, duration, all)
+    z = all(:n)
+    slopes = reshape(all(n + 1:), [m, m])
+  end subroutine fly_own
+
+  !> Steps of the series of a tape, that of a flow with or without derivatives, for its first `count` variables.
+  pure subroutine take_steps(flow, tape, count, parameters, scales, duration, z)
+    type(own_flow_t), intent(in) :: flow
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: count
+    real(wp), intent(in) :: parameters(:), scales(:), duration
+    real(wp), intent(inout) :: z(:)
+    type(series_t) :: series
+    real(wp) :: left, step, before(flow%n), crossing(size(tape%switches))
+    integer :: fault, i, k
+    logical :: crossed(size(tape%switches))
+    associate (arguments => tape%switches%argument)
+      left = duration
+      if (.not. abs(left) > 0) return
+      call prepare_series(tape, series_order, flow%rates(:count), arguments, &
+                          branches_at(flow, z(:flow%n), parameters, merge(1, -1, left > 0)), series)
+      do i = 1, most_steps
+        if (.not. abs(left) > 0) return
+        call expand(tape, z, parameters, series, fault)
+        if (fault /= 0) exit
+        step = sign(min(step_of(series%c(:, flow%states(:count)), max(scales, abs(z(:count)))), abs(left)), left)
+        call stop_at_switch(series, arguments, step, crossed)
+        do k = 1, flow%n
+          before(k) = slope_of(series%c(:, flow%states(k)), step)
+        end do
+        do k = 1, size(arguments)
+          crossing(k) = slope_of(series%c(:, arguments(k)), step)
+        end do
+        do k = 1, count
+          z(k) = value_of(series%c(:, flow%states(k)), step)
+        end do
+        left = left - step
+        if (.not. any(crossed)) cycle
+        where (crossed) series%branches = -series%branches
+        call prepare_series(tape, series_order, flow%rates(:count), arguments, [series%branches], series)
+        if (count > flow%n) call pass_switch(flow, parameters, before, crossed, crossing, series, z)
+      end do
+    end associate
+    if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
+  end subroutine take_steps
+
+  !> Shortens a step to where the first switching functions leave the side of their branches.
+  pure subroutine stop_at_switch(series, arguments, step, crossed)
+    type(series_t), intent(in) :: series
+    integer, intent(in) :: arguments(:)
+    real(wp), intent(inout) :: step
+    logical, intent(out) :: crossed(:)
+    real(wp) :: inside, beyond, middle
+    integer :: i
+    crossed = .false.
+    do i = 1, parts
+      if (.not. any(left_at(step*i/parts))) cycle
+      inside = step*(i - 1)/parts
+      beyond = step*i/parts
+      do
+        middle = (inside + beyond)/2
+        if (.not. (abs(middle - inside) > 0 .and. abs(middle - beyond) > 0)) exit
+        if (any(left_at(middle))) then
+          beyond = middle
+        else
+          inside = middle
+        end if
+      end do
+      crossed = left_at(beyond)
+      step = beyond
+      return
+    end do
+
+  contains
+
+    pure function left_at(t) result(is_left)
+      real(wp), intent(in) :: t
+      logical :: is_left(size(arguments))
+      integer :: k
+      do k = 1, size(arguments)
+        is_left(k) = series%is_used(arguments(k)) .and. series%branches(k)*value_of(series%c(:, arguments(k)), t) < 0
+      end do
+    end function left_at
+
+  end subroutine stop_at_switch
+
+  !> The derivatives where branches change: dz+ = dz- - (f- - f+) g_z dz-/(g_z f- + g_t). `before`: the rates f-; `crossing`: the
+  !> rates of the switching functions g.
+  pure subroutine pass_switch(flow, parameters, before, crossed, crossing, series, z)
+    type(own_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: parameters(:), before(:), crossing(:)
+    logical, intent(in) :: crossed(:)
+    type(series_t), intent(in) :: series
+    real(wp), intent(inout) :: z(:)
+    real(wp) :: value(flow%tape%count), jump(flow%varied), change(flow%varied, flow%varied)
+    integer :: fault(flow%tape%count), k
+    associate (n => flow%n, m => flow%varied)
+      call evaluate(flow%tape, z, parameters, value, fault, series%branches)
+      jump = before(x_at:) - value(flow%rates(x_at:n))
+      where (abs(jump) <= rounding*(abs(before(x_at:)) + abs(value(flow%rates(x_at:n))))) jump = 0
+      if (.not. any(abs(jump) > 0)) return
+      ! Two jumps at one instant: which comes first of a neighbour is not known.
+      k = findloc(crossed, .true., dim=1)
+      change = reshape(z(n + 1:), [m, m])
+      change = change - spread(jump, 2, m)*spread(matmul(value(flow%switch_slopes(:, k)), change)/crossing(k), 1, m)
+      if (count(crossed) > 1) change = ieee_value(1.0_wp, ieee_quiet_nan)
+      z(n + 1:) = reshape(change, [m*m])
+    end associate
+  end subroutine pass_switch
+
+  !> Derivative of a series.
+  pure real(wp) function slope_of(c, t) result(slope)
+    real(wp), intent(in) :: c(0:), t
+    integer :: k
+    slope = 0
+    do k = ubound(c, 1), 1, -1
+      slope = slope*t + k*c(k)
+    end do
+  end function slope_of
+
+end module own_flow
