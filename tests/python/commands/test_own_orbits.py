@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Orbits and exponents of a body by expressions: by matrices, laws of the catalogue, differences of motions."""
+"""Orbits and exponents of a body by expressions: by matrices, catalogue laws, differences of motions."""
 
 import math
 from pathlib import Path
