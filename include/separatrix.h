@@ -307,6 +307,13 @@ int separatrix_model_with_effect(const separatrix_model *model, const char *effe
                                  const char *const *keys, const double *values, separatrix_model **extended,
                                  char *message, size_t message_size);
 
+/* The model of a friction or backlash pair with its bodies "driving" and "driven", the joints between them
+ * and the drive in tables of their own; without axes, sweep and derived quantities. Code 64 if the case has
+ * no pair, 65 if its driving body moves on at a constant velocity, which no such table has. To be freed like
+ * any other. */
+int separatrix_model_written_out(const separatrix_model *model, separatrix_model **longer, char *message,
+                                 size_t message_size);
+
 #ifdef __cplusplus
 }
 #endif

@@ -13,7 +13,7 @@ from separatrix.cases import Case, as_case
 from separatrix.cores import cores
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures.parts import several_bodies
-from separatrix.maps import Values, axis_numbers
+from separatrix.map_axes import Values, axis_numbers
 from separatrix.motions import trajectory
 from separatrix.orbits import Stability, stability_by, stability_command
 from separatrix.progress import Progress, Report

@@ -148,6 +148,12 @@ class Model:
         call("separatrix_model_with_effect", *arguments)
         return Model(handle)
 
+    def written_out(self) -> "Model":
+        """Return the model of a friction or backlash pair body by body and joint by joint."""
+        handle = ctypes.c_void_p()
+        call("separatrix_model_written_out", self._handle, ctypes.byref(handle))
+        return Model(handle)
+
     def segments(
         self,
         active: list[str],

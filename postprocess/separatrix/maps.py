@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`basin`, `sweep` and `points`: computations of the program, with their results as Datasets."""
 
-import re
 import tempfile
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from separatrix.cases import Case, as_case, linspace, quantity
+from separatrix.cases import Case, as_case
 from separatrix.cores import cores
 from separatrix.errors import (
     GIVEN_UP,
@@ -21,34 +19,20 @@ from separatrix.errors import (
     GivenUpError,
     Interrupted,
     SeparatrixError,
-    SeparatrixWarning,
 )
-from separatrix.labelling import Labelling, SecondLookError, axis_values, can_label
+from separatrix.labelling import Labelling, SecondLookError, can_label
+from separatrix.map_axes import Values, axis_keys, evenly_spaced, size_of_axis, with_axes
+from separatrix.map_starts import table_of_starts
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.runner import StoppedError, run
 
 __all__ = ["basin", "points", "sweep"]
 
-Values = (
-    linspace
-    | tuple[float | str, float | str, int]
-    | Sequence[float | str]
-    | np.ndarray
-    | int
-    | float
-    | str
-    | None
-)
-
 # Below this number of points, starting a second process takes longer than it saves.
 _FEW_POINTS = 50_000
 # The largest number of points of a result that is kept in memory, without a file.
 _MOST_IN_MEMORY = 50_000_000
-_STARTS = ("x0", "v0", "crank_angle")
-# Columns of a table of initial conditions, and other names of the drive ratio.
-_COLUMNS = ("x0", "v0", "ratio")
-_RATIO = {"drive.ratio": "ratio", "drive_ratio": "ratio", "drive__ratio": "ratio"}
 
 
 @dataclass
@@ -195,7 +179,7 @@ def basin(
     2              impact   0.65
     """
     case = with_axes(as_case(case), {**(axes or {}), **_paths(more)})
-    sizes = [_size(axis) for axis in case.resolved.get("axis", [])]
+    sizes = [size_of_axis(axis) for axis in case.resolved.get("axis", [])]
     number = int(np.prod(sizes)) if sizes else 0
     if output is None and number > _MOST_IN_MEMORY:
         raise SeparatrixError(f"{number} points are kept in a file: give output=FILE", USAGE)
@@ -270,7 +254,7 @@ def sweep(
     if values is not None:
         table = {key: value for key, value in table.items() if key not in ("from", "to", "count", "values")}
         swept = table["parameter"]
-        table |= _even(case, swept, _axis_values(swept, values, None))
+        table |= evenly_spaced(case, swept, axis_keys(swept, values, None))
     given = {
         "directions": directions, "starts": starts, "x0": x0, "v0": v0, "samples": samples,
         "limit_tolerance": limit_tolerance,
@@ -308,7 +292,7 @@ def points(
     ['non_impact', 'impact']
     """
     case = as_case(case)
-    table = _starts(case, starts, columns)
+    table = table_of_starts(case, starts, columns)
 
     def listed(folder: Path) -> list[str]:
         path = folder / "starts.csv"
@@ -333,77 +317,6 @@ def kept_in_memory(result: xr.Dataset) -> xr.Dataset:
     return kept
 
 
-def with_axes(case: Case, asked: Mapping[str, Values]) -> Case:
-    """Return the case with other axes."""
-    if not asked:
-        return case
-    old = {str(axis["name"]): dict(axis) for axis in case.resolved.get("axis", [])}
-    asked = {"drive.ratio" if name == "ratio" else name: values for name, values in asked.items()}
-    # Initial conditions are the fastest axes; new axes over parameters come first.
-    names = [name for name in asked if name not in old and name not in _STARTS]
-    names += [*old, *(name for name in asked if name not in old and name in _STARTS)]
-    axes = []
-    for name in names:
-        if name not in asked:
-            axes.append(old[name])
-        elif asked[name] is not None:
-            axes.append({"name": name} | _axis_values(name, asked[name], old.get(name)))
-    try:
-        return case.with_({"axis": axes})
-    except CaseError as error:
-        # "axis=[...]: key 'axis[1]': found ..."
-        text = re.sub(r"^axis(=\[.*\])?: ", "", str(error), flags=re.MULTILINE)
-        text = re.sub(
-            r"key 'axis\[(\d+)\](?:\.name)?", lambda found: f"axis '{axes[int(found[1]) - 1]['name']}", text
-        )
-        raise CaseError(f"{case.name}: {text}", error.code) from None
-
-
-def _axis_values(name: str, values: Values, old: Mapping[str, object] | None) -> dict[str, object]:
-    """Return the keys of an axis."""
-    if isinstance(values, int | np.integer) and not isinstance(values, bool):
-        if old is None:
-            raise CaseError(
-                f"axis {name}: found a count alone, allowed where the case has such an axis", USAGE
-            )
-        first, last = (old["from"], old["to"]) if "from" in old else (old["values"][0], old["values"][-1])
-        return {"from": first, "to": last, "count": int(values)}
-    if isinstance(values, float | np.floating | str):
-        return {"values": [quantity(name, values)]}
-    if isinstance(values, tuple) and len(values) == 3 and isinstance(values[2], int | np.integer):
-        values = linspace(*values)
-    if isinstance(values, linspace):
-        return {"from": values.first, "to": values.last, "count": values.count}
-    array = np.asarray(values)
-    array = array if array.dtype.kind in "iuf" else np.asarray(values, object)
-    if array.ndim != 1 or array.size == 0:
-        raise CaseError(f"axis {name}: found shape {array.shape}, allowed a list of numbers", USAGE)
-    return {"values": [quantity(name, value) for value in array]}
-
-
-def _even(case: Case, parameter: str, axis: dict[str, object]) -> dict[str, object]:
-    """Return the first, the last and the number of values that must be evenly spaced."""
-    if "values" not in axis:
-        return axis
-    values = np.array([case.in_si(parameter, value) for value in axis["values"]])
-    even = {"from": float(values[0]), "to": float(values[-1]), "count": values.size}
-    if not np.allclose(axis_values(even), values, rtol=1e-12, atol=1e-12 * np.abs(values).max()):
-        raise CaseError("values: found unevenly spaced ones, allowed for a sweep is sx.linspace(...)", USAGE)
-    return even
-
-
-def axis_numbers(case: Case, name: str, values: Values) -> np.ndarray:
-    """Return the values of an axis over a parameter in SI units."""
-    axis = _axis_values(name, values, None)
-    if "values" in axis:
-        return np.array([case.in_si(name, value) for value in axis["values"]])
-    return axis_values({**axis, **{end: case.in_si(name, axis[end]) for end in ("from", "to")}})
-
-
-def _size(axis: Mapping[str, object]) -> int:
-    return int(axis["count"]) if "count" in axis else len(axis["values"])
-
-
 def _paths(keywords: Mapping[str, Values]) -> dict[str, Values]:
     return {name.replace("__", "."): values for name, values in keywords.items()}
 
@@ -424,63 +337,3 @@ def _workers(workers: int | None, ranks: int | None, number: int, name: str = "w
     if workers < 1:
         raise SeparatrixError(f"{name}: found {workers}, allowed 1 or more", USAGE)
     return int(workers)
-
-
-def _starts(case: Case, starts: object, columns: Mapping[str, object]) -> dict[str, np.ndarray]:
-    """Return the columns of a table of starts, equally long."""
-    if starts is None:
-        given = {_RATIO.get(name, name): values for name, values in columns.items()}
-    elif hasattr(starts, "keys"):
-        # a table may have further columns, a mapping is written for this
-        further = hasattr(starts, "to_dict")
-        named = [(_RATIO.get(str(key), str(key)), key) for key in starts.keys()]  # noqa: SIM118
-        if [name for name, _ in named].count("ratio") > 1:
-            raise SeparatrixError("starts: found two columns of the drive ratio, allowed one", USAGE)
-        given = {name: starts[key] for name, key in named if not further or name in _COLUMNS}
-        if further:
-            _warn_of_unused(case, starts, [str(key) for name, key in named if name not in _COLUMNS])
-    else:
-        array = np.asarray(starts)
-        if array.dtype.kind not in "iuf":
-            raise SeparatrixError("starts: found an array of texts or objects, allowed one of numbers", USAGE)
-        if array.ndim != 2 or array.shape[1] not in (2, 3):
-            raise SeparatrixError(f"starts: found shape {array.shape}, allowed (n, 2) or (n, 3)", USAGE)
-        given = dict(zip(("x0", "v0", "ratio"), array.T, strict=False))
-    unknown = set(given) - set(_COLUMNS)
-    if unknown or not {"x0", "v0"} <= set(given):
-        raise SeparatrixError(
-            f"starts: found the columns {', '.join(given) or 'none'}, allowed x0, v0 and optionally ratio",
-            USAGE,
-        )
-    columns = {name: np.atleast_1d(_column(case, name, value)) for name, value in given.items()}
-    try:
-        arrays = np.broadcast_arrays(*columns.values())
-    except ValueError:
-        sizes = ", ".join(f"{name} {column.size}" for name, column in columns.items())
-        raise SeparatrixError(f"starts: found {sizes} values, allowed equally many", USAGE) from None
-    if arrays[0].ndim != 1:
-        raise SeparatrixError(f"starts: found columns of shape {arrays[0].shape}, allowed lists", USAGE)
-    return dict(zip(given, arrays, strict=True))
-
-
-def _warn_of_unused(case: Case, starts: object, names: list[str]) -> None:
-    """Warn of columns that are not used: all of a table, of a Dataset those that are a parameter."""
-    if isinstance(starts, xr.Dataset):
-        parameters = {path.replace(".", "_") for path in case.parameters}
-        names = [name for name in names if name.replace(".", "_") in parameters]
-    if names:
-        warnings.warn(
-            f"starts: the columns {', '.join(names)} are not used; used are x0, v0 and ratio",
-            SeparatrixWarning,
-            stacklevel=4,
-        )
-
-
-def _column(case: Case, name: str, values: object) -> np.ndarray:
-    """Return a column of starts in SI units."""
-    column = np.asarray(values)
-    if column.dtype.kind in "iuf":
-        return column.astype(float)
-    path = "drive.ratio" if name == "ratio" else f"start.{name}"
-    numbers = [case.in_si(path, value) for value in np.asarray(values, object).ravel()]
-    return np.array(numbers, float).reshape(column.shape)

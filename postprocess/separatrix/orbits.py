@@ -13,7 +13,8 @@ import xarray as xr
 from separatrix.boundaries import file_of_map
 from separatrix.cases import Case, as_case, linspace, quantity, toml
 from separatrix.errors import CANNOT_CREATE, INTERNAL, USAGE, SeparatrixError
-from separatrix.maps import kept_in_memory, with_axes
+from separatrix.map_axes import with_axes
+from separatrix.maps import kept_in_memory
 from separatrix.open import open_result
 from separatrix.progress import Progress, Report
 from separatrix.runner import run_at_once

@@ -38,7 +38,6 @@ run = {{ duration = 120, window = 20 }}
 MOTOR = "[motor]\n{law}inertia = 0.05\nbearing_damping = 0.002\n"
 WITHOUT_INDUCTANCE = 'law = "dc"\nvoltage = 7\ntorque_constant = 0.5\nresistance = 5\n'
 VALUE = {"P": "motor.no_load_speed"}
-NATURAL = 3 * np.pi
 # the difference that their digits or their method allow
 BAR, OF_MULTIPLIERS, OF_LIMITS, OF_PASSING = 1e-9, 1e-9, 1e-8, 1e-7
 

@@ -4,7 +4,7 @@
 !> The margins of orbits of one body: of its events, the barriers that it misses, its slowest slip, and the reserves of friction
 !> while it sticks. See module `orbit_margins`.
 module body_margins
-  use body_flight, only: pressed_side
+  use slip_force, only: pressed_side
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &

@@ -20,7 +20,8 @@ module branch
   use orbit_margins, only: margin_t, of_impact
   use orbit_sections, only: rotate_to_section, section_points
   use orbit_motion, only: is_admissible, orbit_of_motion
-  use periodic_orbit, only: closing_time, correct_orbit, direct, move_along, orbit_t, scales_of_orbit
+  use periodic_orbit, only: closing_time, correct_orbit, move_along, orbit_t, scales_of_orbit
+  use orbit_directions, only: direct
   use search_watch, only: search_watch_t
   implicit none
   private

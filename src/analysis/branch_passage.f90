@@ -15,7 +15,8 @@ module branch_passage
     of_turning, same_meaning
   use other_sequence, only: change_sequence
   use orbit_motion, only: is_admissible
-  use periodic_orbit, only: correct_orbit, direct, orbit_t
+  use periodic_orbit, only: correct_orbit, orbit_t
+  use orbit_directions, only: direct
   use short_slip, only: has_slip_in_stick, stays_stuck, sticks_apart, with_slip
   use secant_bracket, only: bracket_t, narrow, next_trial
   use soft_graze, only: enter_apart, is_touch, touches_apart, touching, vanishing_touch

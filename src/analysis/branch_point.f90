@@ -11,7 +11,8 @@ module branch_point
   use machine_family, only: machine_neighbourhood, machine_of_family
   use multipliers, only: nearly_neutral
   use orbit_margins, only: margins_t
-  use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit, tangent_of
+  use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit
+  use orbit_directions, only: tangent_of
   use variations, only: neighbourhood_t
   implicit none
   private

@@ -20,8 +20,8 @@ module branch_search
   use orbit_symmetry, only: mark_symmetry
   use part_of_branch, only: lies_on
   use orbit_motion, only: is_admissible, orbit_of_motion, same_sequence
-  use periodic_orbit, only: correct_orbit, crossing_direction, direct, move_along, orbit_t, &
-    scales_of_orbit
+  use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit
+  use orbit_directions, only: crossing_direction, direct
   use search_jobs, only: trace
   use search_state, only: search_t
   use variations, only: neighbourhood_t

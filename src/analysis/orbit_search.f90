@@ -12,7 +12,8 @@ module orbit_search
   use multipliers, only: is_neutral
   use orbit_sections, only: section_points
   use orbit_motion, only: is_admissible, orbit_of_motion
-  use periodic_orbit, only: correct_orbit, direct, orbit_t, same_orbit
+  use periodic_orbit, only: correct_orbit, orbit_t, same_orbit
+  use orbit_directions, only: direct
   use search_watch, only: search_watch_t
   use variations, only: neighbourhood_t
   implicit none

@@ -11,7 +11,8 @@ module rest_family
   use multibody_state, only: joint_motion, turning_at
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
-  use structure, only: count_joints, mode_number, structure_t
+  use structure, only: structure_t
+  use structure_modes, only: count_joints, mode_number
   use text, only: join
   use variations, only: neighbourhood_t
   implicit none

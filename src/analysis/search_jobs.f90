@@ -11,7 +11,8 @@ module search_jobs
   use machine_family, only: machine_neighbourhood
   use orbit_numbers, only: numbers_t
   use orbit_search, only: find_orbits, found_t
-  use periodic_orbit, only: depends_on_parameter, orbit_t
+  use periodic_orbit, only: orbit_t
+  use orbit_directions, only: depends_on_parameter
   use search_state, only: search_t, traced_t
   use variations, only: neighbourhood_t
   implicit none

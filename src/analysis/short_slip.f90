@@ -13,7 +13,8 @@ module short_slip
   use motion_state, only: event_release, event_stick, event_turning_point, mode_slip_minus, mode_slip_plus
   use orbit_margins, only: margin_t, margins_t, of_hold, of_slip, of_stick
   use periodic_orbit, only: orbit_t
-  use structure, only: mode_number, phases_in, structure_t
+  use structure, only: structure_t
+  use structure_modes, only: mode_number, phases_in
   implicit none
   private
 

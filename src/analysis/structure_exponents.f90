@@ -19,7 +19,8 @@ module structure_exponents
     event_touch_upper, event_turning_point, state_t, tally_t
   use one_body, only: one_body_t
   use status, only: reason_not_smooth
-  use structure, only: coordinates_of, mode_number, state_in, structure_t
+  use structure, only: coordinates_of, state_in, structure_t
+  use structure_modes, only: mode_number
   use structure_family, only: least_dimension, state_at_start, vary_section
   use structure_walk, only: advance_section, start_of_structure
   use variations, only: neighbourhood_t

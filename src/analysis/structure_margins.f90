@@ -17,7 +17,8 @@ module structure_margins
     of_slip, of_stick, of_turning, orbit_flight_t
   use periodic_orbit, only: orbit_t
   use secant_bracket, only: bracket_t, narrow, next_trial
-  use structure, only: mode_number, phases_in, state_in, structure_t
+  use structure, only: state_in, structure_t
+  use structure_modes, only: mode_number, phases_in
   use structure_flight, only: flow_of
   implicit none
   private

@@ -13,7 +13,8 @@ module structure_sequence
     event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point
   use orbit_margins, only: margin_t, of_gap, of_hold, of_impact, of_order, of_slip, of_stick, of_turning
   use periodic_orbit, only: orbit_t
-  use structure, only: mode_number, phases_in, structure_t
+  use structure, only: structure_t
+  use structure_modes, only: mode_number, phases_in
   implicit none
   private
 

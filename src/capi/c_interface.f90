@@ -11,7 +11,8 @@ module c_interface
   use kinds, only: wp
   use law_table, only: law_choice_t
   use machine_type, only: machine_t
-  use model_type, only: check_values, find_parameter, model_from_text, model_options, model_t, read_model, text_with
+  use model_type, only: check_values, find_parameter, model_from_text, model_options, model_t, model_written_out, &
+    read_model, text_with
   use parameter_list, only: put_values
   use status, only: exit_usage
   use text, only: to_text
@@ -19,7 +20,8 @@ module c_interface
   private
 
   public :: separatrix_model_read, separatrix_model_from_text, separatrix_model_free, separatrix_parameter_count, &
-    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_model_text
+    separatrix_parameter, separatrix_find_parameter, separatrix_drive_frequency, separatrix_model_text, &
+    separatrix_model_written_out
 
 contains
 
@@ -50,6 +52,21 @@ contains
     call hand_out(new, model, error)
     code = answer(error, message, message_size)
   end function separatrix_model_from_text
+
+  integer(c_int) function separatrix_model_written_out(model, longer, message, message_size) bind(c) result(code)
+    type(c_ptr), value :: model
+    type(c_ptr), intent(out) :: longer
+    character(kind=c_char), intent(inout) :: message(*)
+    integer(c_size_t), value :: message_size
+    type(model_t), pointer :: self, new
+    type(error_t), allocatable :: error
+    call enter()
+    call c_f_pointer(model, self)
+    allocate (new)
+    call model_written_out(self, new, error)
+    call hand_out(new, longer, error)
+    code = answer(error, message, message_size)
+  end function separatrix_model_written_out
 
   subroutine hand_out(new, model, error)
     type(model_t), pointer, intent(inout) :: new

@@ -4,7 +4,7 @@
 !> The function of include/separatrix.h that has the force of a joint.
 module c_joints
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_ptr, c_size_t
-  use build_multibody, only: joint_alone
+  use build_joints, only: joint_alone
   use c_text, only: answer, enter, from_c
   use errors, only: error_t, fail
   use kinds, only: wp

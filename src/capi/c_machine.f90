@@ -15,7 +15,7 @@ module c_machine
   use model_type, only: check_values, model_t
   use parameter_list, only: put_values
   use span_check, only: check_periods
-  use trajectories, only: describe_all, describe_regime, ensemble_t
+  use trajectory_slots, only: describe_all, describe_regime, ensemble_t
   use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none

@@ -3,6 +3,7 @@
 
 !> What a handle of the C interface stands for: a case and the list of its numbers.
 module model_type
+  use build_pair, only: is_pair, parts_of_pair
   use case_echo, only: echo_case
   use case_parameters, only: canonical_name
   use case_reader, only: load_case, load_case_text
@@ -21,7 +22,7 @@ module model_type
   private
 
   public :: read_model, model_from_text, find_parameter, check_values, laws_with_force, model_options, text_with, &
-    model_with_effect
+    model_with_effect, model_written_out
 
   type, public :: model_t
     type(case_t) :: the_case
@@ -185,6 +186,39 @@ contains
     call load_case_text(echo_case(changed), model%the_case%path, no_overrides, extended%the_case, error)
     if (.not. allocated(error)) extended%parameters = list_parameters(extended%the_case%laws)
   end subroutine model_with_effect
+
+  !> The model of a pair with its bodies, joints and drive in tables of their own, without axes, sweep and derived quantities,
+  !> which name keys of the short form. Code 64 without a pair, 65 where the driving body moves on at a constant velocity: no
+  !> table has that.
+  subroutine model_written_out(model, longer, error)
+    type(model_t), intent(in) :: model
+    type(model_t), intent(out) :: longer
+    type(error_t), allocatable, intent(out) :: error
+    type(case_t) :: changed
+    character(len=1) :: no_overrides(0)
+    associate (laws => model%the_case%laws)
+      if (.not. is_pair(laws)) then
+        call fail(error, exit_usage, model%the_case%path//': body.law: found "'//trim(laws(1)%name)// &
+                  '", allowed friction_pair, backlash_pair')
+        return
+      else if (laws(drive_law)%name == 'velocity' .or. laws(drive_law)%name == 'pid_velocity') then
+        call fail(error, exit_bad_case, model%the_case%path//': drive.law: found "'//trim(laws(drive_law)%name)// &
+                  '", allowed where a pair is written out none, force, sine, pid_sine')
+        return
+      end if
+    end associate
+    changed = model%the_case
+    changed%laws = parts_of_pair(model%the_case%laws)
+    if (allocated(changed%axes)) deallocate (changed%axes)
+    allocate (changed%axes(0))
+    if (allocated(changed%sample%names)) deallocate (changed%sample%names)
+    allocate (changed%sample%names(0))
+    changed%sweep%present = .false.
+    changed%refine%active = .false.
+    if (allocated(changed%derived)) deallocate (changed%derived)
+    call load_case_text(echo_case(changed), model%the_case%path, no_overrides, longer%the_case, error, needs_sweep=.false.)
+    if (.not. allocated(error)) longer%parameters = list_parameters(longer%the_case%laws)
+  end subroutine model_written_out
 
   !> Name of a parameter without its index in a list: 'change' of 'change[2]'. Items are given in their order.
   pure elemental function name_of(key) result(name)

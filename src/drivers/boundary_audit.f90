@@ -22,7 +22,7 @@ module boundary_audit
   use status, only: exit_io, reason_left_domain
   use stored_map, only: restore_catalogues
   use text, only: to_text
-  use trajectories, only: describe_regime, ensemble_t
+  use trajectory_slots, only: describe_regime, ensemble_t
   implicit none
   private
 

@@ -31,7 +31,7 @@ module boundary_driver
   use status, only: exit_bad_case, exit_done
   use stored_map, only: open_map_session, read_labels, restore_catalogues
   use text, only: replace_all, to_text
-  use trajectories, only: describe_regime
+  use trajectory_slots, only: describe_regime
   use written_check, only: check_written
   implicit none
   private

@@ -11,7 +11,7 @@ module boundary_search
   use grid, only: grid_t, point_start
   use kinds, only: int64, wp
   use session, only: session_t
-  use trajectories, only: ensemble_t
+  use trajectory_slots, only: ensemble_t
   implicit none
   private
 

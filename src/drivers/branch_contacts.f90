@@ -10,7 +10,8 @@ module branch_contacts
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use machine_family, only: machine_neighbourhood
-  use periodic_orbit, only: correct_orbit, direct
+  use periodic_orbit, only: correct_orbit
+  use orbit_directions, only: direct
   use session, only: session_t
   use text, only: to_text
   use variations, only: neighbourhood_t

@@ -14,7 +14,8 @@ module branch_equilibria
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int8
   use hybrid_machine, only: hybrid_t
   use session, only: session_t
-  use structure, only: phases_in, structure_t
+  use structure, only: structure_t
+  use structure_modes, only: phases_in
   use text, only: join, replace_all, to_text
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none

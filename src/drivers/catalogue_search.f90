@@ -20,7 +20,7 @@ module catalogue_search
   use stop_check, only: check_stop
   use team, only: team_t
   use text, only: to_text
-  use trajectories, only: describe_regime, ensemble_t
+  use trajectory_slots, only: describe_regime, ensemble_t
   use single_trajectory, only: span_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   implicit none

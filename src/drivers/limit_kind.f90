@@ -14,7 +14,8 @@ module limit_kind
   use machine_family, only: machine_neighbourhood
   use motor_body, only: motor_body_t, point_of_crank
   use orbit_motion, only: orbit_of_motion
-  use periodic_orbit, only: correct_orbit, direct, orbit_t
+  use periodic_orbit, only: correct_orbit, orbit_t
+  use orbit_directions, only: direct
   use settling, only: settled_t
   use variations, only: neighbourhood_t
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value

@@ -19,7 +19,8 @@ module list_audit
   use span_check, only: check_periods
   use status, only: exit_io
   use text, only: to_text
-  use trajectories, only: ensemble_t, run_trajectories
+  use trajectories, only: run_trajectories
+  use trajectory_slots, only: ensemble_t
   use single_trajectory, only: outcome_t
   implicit none
   private

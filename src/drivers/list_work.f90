@@ -25,7 +25,7 @@ module list_work
   use text, only: to_text
   use text_table, only: table_t
   use tiled_run, only: finish_tiles, point_work_t
-  use trajectories, only: describe_regime, ensemble_t
+  use trajectory_slots, only: describe_regime, ensemble_t
   use work_watch, only: watch_t
   implicit none
   private

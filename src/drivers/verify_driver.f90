@@ -32,7 +32,8 @@ module verify_driver
   use status, only: exit_io, exit_uncertain, reason_code, reason_settled
   use stored_map, only: restore_catalogues
   use text, only: to_text
-  use trajectories, only: ensemble_t, run_trajectories
+  use trajectories, only: run_trajectories
+  use trajectory_slots, only: ensemble_t
   use single_trajectory, only: outcome_t
   use, intrinsic :: iso_fortran_env, only: output_unit
   implicit none

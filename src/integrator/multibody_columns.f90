@@ -1,18 +1,19 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Columns of the log of several bodies: the driving body, all coordinates of a structure, the joint of each event.
+!> Columns of the log of several bodies: the driving body, all coordinates of a structure, the joint of each event. What the samples
+!> show.
 module multibody_columns
   use angle_units, only: unit_of
   use kinds, only: wp
   use machine_columns, only: machine_column_t, set_column
   use motion_state, only: log_t
-  use multibody, only: joint_section, multibody_t
+  use multibody, only: integral_of, joint_section, multibody_t
   use text, only: replace_all
   implicit none
   private
 
-  public :: coordinate_columns, driver_columns, joint_columns
+  public :: coordinate_columns, driver_columns, energies_of_motion, is_still, joint_columns
 
 contains
 
@@ -94,5 +95,34 @@ contains
     integer :: i
     joins_angles = any([(is_angle(machine, i) .and. abs(machine%joints(j)%row(i)) > 0, i=1, machine%n)])
   end function joins_angles
+
+  !> Kinetic energy [J] at every sample; the integral of a controller has none.
+  pure function energies_of_motion(machine, log) result(values)
+    type(multibody_t), intent(in) :: machine
+    type(log_t), intent(in) :: log
+    real(wp) :: values(log%samples)
+    real(wp), allocatable :: velocity(:)
+    integer :: i
+    do i = 1, log%samples
+      velocity = log%sample_coordinates(machine%n + 1:, i)
+      if (integral_of(machine) > 0) velocity(integral_of(machine)) = 0
+      values(i) = 0.5_wp*sum(velocity*matmul(machine%mass, velocity))
+    end do
+  end function energies_of_motion
+
+  !> Whether all velocities are rounding at the samples from `since` [s] on, and the `amplitude` [m] is.
+  pure logical function is_still(machine, amplitude, since, log)
+    type(multibody_t), intent(in) :: machine
+    real(wp), intent(in) :: amplitude, since
+    type(log_t), intent(in) :: log
+    integer :: i
+    is_still = .false.
+    if (amplitude > machine%negligible_speed*machine%period) return
+    do i = log%samples, 1, -1
+      if (log%sample_data(1, i) < since) exit
+      if (any(abs(log%sample_coordinates(machine%n + 1:, i)) > machine%negligible_speed)) return
+    end do
+    is_still = .true.
+  end function is_still
 
 end module multibody_columns

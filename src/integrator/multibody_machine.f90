@@ -1,25 +1,24 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The machine of several bodies with joints on its section. What moves is that of the watched body, or of two bodies the driven
-!> one.
+!> The machine of several bodies with joints on its section. What moves is the watched body, of a pair the driven one.
 module multibody_machine
   use contact_law, only: contact_at_speed, force_on_body
-  use eigen, only: undamped_modes
   use kinds, only: wp
   use machine_columns, only: machine_column_t
   use machine_type, only: machine_t, section_state_t
   use motion_state, only: flight_adaptive, log_t, options_t, tally_t
-  use multibody, only: integral_of, is_stop, multibody_t
-  use multibody_columns, only: coordinate_columns, driver_columns, joint_columns
+  use multibody, only: is_stop, multibody_t
+  use multibody_columns, only: coordinate_columns, driver_columns, energies_of_motion, is_still, joint_columns
   use multibody_flows, only: multibody_motion_t, prepare_multibody
-  use multibody_log, only: energy_of_multibody, log_sample, watched_state
+  use multibody_energy, only: energy_of_multibody
+  use multibody_log, only: log_sample, watched_state
   use multibody_motion, only: advance_multibody, advance_multibody_period, start_multibody
-  use multibody_section, only: coordinates_of_multibody, fits_section, free_multibody, keeps_clear, multibody_at, multibody_point, &
-    scales_of_multibody, start_of_multibody
+  use multibody_section, only: coordinates_of_multibody, fits_section, fixes_column, free_multibody, has_known_mode, &
+    keeps_clear, multibody_at, multibody_point, scales_of_multibody, start_of_multibody
   use multibody_state, only: acts_as_spring, multibody_state_t
   use section_size, only: most_coordinates
-  use text, only: replace_all, to_text
+  use text, only: to_text
   use timed_actions, only: acts_on_time
   use touching_row, only: names_in_row
   use turn_section, only: advance_multibody_to_turn, coordinates_at_turn, multibody_at_turn, multibody_turn_point, scales_at_turn
@@ -197,23 +196,10 @@ contains
     end if
   end function point_of
 
-  !> Of a body or coordinate its position, or its velocity: whether its direction is one of those of the section.
   pure logical function fixes(self, column)
     class(multibody_machine_t), intent(in) :: self
     character(len=*), intent(in) :: column
-    real(wp), parameter :: rounding = 1e-9_wp
-    character(len=:), allocatable :: name
-    integer :: i
-    fixes = .true.
-    do i = 1, self%bodies%machine%n
-      name = replace_all(trim(self%bodies%machine%names(i)), '.', '_')
-      if (column == name//'_x' .or. (column == 'x' .and. i == self%bodies%machine%watched)) then
-        fixes = norm2(self%bodies%directions(i, :)) > 1 - rounding
-      else if (column == name//'_v' .or. (column == 'v' .and. i == self%bodies%machine%watched)) then
-        fixes = norm2(self%bodies%speeds(i, :)) > 1 - rounding
-      end if
-      if (.not. fixes) return
-    end do
+    fixes = fixes_column(self%bodies, column)
   end function fixes
 
   pure function turn_point(self, section) result(point)
@@ -311,7 +297,6 @@ contains
     clear = keeps_clear(self%bodies, section%multibody, periods, distance)
   end function stays_clear
 
-  !> Those of the driving body, or of every coordinate.
   pure function sample_columns(self, crank_angle, log) result(columns)
     class(multibody_machine_t), intent(in) :: self
     real(wp), intent(in) :: crank_angle
@@ -353,44 +338,20 @@ contains
     class(multibody_machine_t), intent(in) :: self
     type(log_t), intent(in) :: log
     real(wp) :: values(log%samples)
-    real(wp), allocatable :: velocity(:)
-    integer :: i
-    associate (machine => self%bodies%machine)
-      do i = 1, log%samples
-        velocity = log%sample_coordinates(machine%n + 1:, i)
-        if (integral_of(machine) > 0) velocity(integral_of(machine)) = 0
-        values(i) = 0.5_wp*sum(velocity*matmul(machine%mass, velocity))
-      end do
-    end associate
+    values = energies_of_motion(self%bodies%machine, log)
   end function kinetic_energies
 
-  !> All velocities are rounding.
   pure logical function rests_at_end(self, amplitude, since, log) result(rests)
     class(multibody_machine_t), intent(in) :: self
     real(wp), intent(in) :: amplitude, since
     type(log_t), intent(in) :: log
-    integer :: i
     rests = .false.
-    if (self%has_drive_period .or. self%has_driver) return
-    associate (machine => self%bodies%machine)
-      if (amplitude > machine%negligible_speed*machine%period) return
-      do i = log%samples, 1, -1
-        if (log%sample_data(1, i) < since) exit
-        if (any(abs(log%sample_coordinates(machine%n + 1:, i)) > machine%negligible_speed)) return
-      end do
-    end associate
-    rests = .true.
+    if (.not. (self%has_drive_period .or. self%has_driver)) rests = is_still(self%bodies%machine, amplitude, since, log)
   end function rests_at_end
 
-  !> Springs that are not in the stiffness matrix may make modes that nobody has computed.
   pure logical function has_mode(self) result(fact)
     class(multibody_machine_t), intent(in) :: self
-    real(wp), allocatable :: squares(:), shapes(:, :)
-    associate (machine => self%bodies%machine)
-      allocate (squares(machine%n), shapes(machine%n, machine%n))
-      call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
-      fact = squares(machine%n) > 0 .and. all(.not. (abs(machine%joints%moment) > 0 .or. abs(machine%joints%attraction) > 0))
-    end associate
+    fact = has_known_mode(self%bodies%machine)
   end function has_mode
 
   pure function driver(self, section) result(motion)

@@ -4,21 +4,22 @@
 !> A multibody structure on the stroboscopic section: the positions and the velocities on which anything depends, and the extension
 !> of the springs of elastic friction.
 module multibody_section
-  use multibody, only: is_stop, joint_contact, joint_elastic
+  use eigen, only: undamped_modes
+  use multibody, only: is_stop, joint_contact, joint_elastic, multibody_t
   use multibody_flows, only: without_contacts
   use multibody_motion, only: advance_multibody_period, multibody_motion_t, prepare_multibody, start_multibody
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use motion_state, only: tally_t
   use section_size, only: most_coordinates
+  use text, only: replace_all
   use timed_actions, only: acts_on_time
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   implicit none
   private
 
   public :: coordinates_of_multibody, fits_section, start_of_multibody, lay_out, multibody_at, multibody_point, &
-    scales_of_multibody, &
-    watched_speed, free_multibody, keeps_clear
+    fixes_column, free_multibody, has_known_mode, keeps_clear, scales_of_multibody, watched_speed
 
   !> Sums of the elements of orthonormal directions that are rounding.
   real(wp), parameter :: nothing = 1e-9_wp
@@ -214,5 +215,32 @@ contains
     scales = length
     scales(positions + 1:positions + speeds) = length*moving%machine%frequency
   end function scales_of_multibody
+
+  !> Whether the position or velocity that a column of samples shows is determined by the section alone.
+  pure logical function fixes_column(moving, column)
+    type(multibody_motion_t), intent(in) :: moving
+    character(len=*), intent(in) :: column
+    real(wp), parameter :: rounding = 1e-9_wp
+    character(len=:), allocatable :: name
+    integer :: i
+    fixes_column = .true.
+    do i = 1, moving%machine%n
+      name = replace_all(trim(moving%machine%names(i)), '.', '_')
+      if (column == name//'_x' .or. (column == 'x' .and. i == moving%machine%watched)) then
+        fixes_column = norm2(moving%directions(i, :)) > 1 - rounding
+      else if (column == name//'_v' .or. (column == 'v' .and. i == moving%machine%watched)) then
+        fixes_column = norm2(moving%speeds(i, :)) > 1 - rounding
+      end if
+      if (.not. fixes_column) return
+    end do
+  end function fixes_column
+
+  !> Whether the slowest mode of a machine is known: springs that are not in the stiffness matrix may make others.
+  pure logical function has_known_mode(machine) result(fact)
+    type(multibody_t), intent(in) :: machine
+    real(wp) :: squares(machine%n), shapes(machine%n, machine%n)
+    call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
+    fact = squares(machine%n) > 0 .and. all(.not. (abs(machine%joints%moment) > 0 .or. abs(machine%joints%attraction) > 0))
+  end function has_known_mode
 
 end module multibody_section

@@ -5,17 +5,15 @@
 module map_reader
   use byte_file, only: byte_file_t
   use errors, only: error_t, fail
-  use guard, only: end_guard
-  use h5, only: h5_close, h5_close_dataset, h5_dataset_t, h5_exists, h5_file_t, h5_open, &
-    h5_open_dataset, h5_read
-  use h5_attributes, only: h5_get_numbers, h5_get_text, h5_has_attribute, h5_read_strings
+  use h5, only: h5_close_dataset, h5_dataset_t, h5_open, h5_open_dataset, h5_read
+  use h5_attributes, only: h5_get_numbers, h5_has_attribute, h5_read_strings
   use h5_records, only: h5_records_extent
   use h5_stored, only: h5_check_stored
   use h5_list, only: h5_children
-  use h5_trap, only: trap
   use kinds, only: int64, int8, real64
   use map_layout, only: path_of
   use map_schema, only: format_version, oldest_version
+  use open_file, only: open_file_t
   use slabs, only: slab, slab_count
   use status, only: exit_bad_case, exit_io, exit_no_input
   use files, only: file_exists, is_text
@@ -35,13 +33,9 @@ module map_reader
     integer(int64), allocatable :: lengths(:)
   end type variable_info_t
 
-  type, public :: reader_t
-    character(len=:), allocatable :: path
-    type(h5_file_t), private :: file
+  type, extends(open_file_t), public :: reader_t
   contains
     procedure :: variables
-    procedure :: children
-    procedure :: has
     procedure :: count_tiles
     procedure :: lengths
     procedure :: read_values
@@ -50,10 +44,6 @@ module map_reader
     procedure :: count_codes
     procedure :: read_strings
     procedure :: read_text
-    procedure :: has_attribute
-    procedure :: text_attribute
-    procedure :: number_attribute
-    procedure :: close => close_reader
   end type reader_t
 
 contains
@@ -103,16 +93,6 @@ contains
     if (allocated(error)) return
     call h5_open(path, reader%file, error)
   end subroutine open_reader
-
-  !> The names in a group, and which are groups.
-  subroutine children(self, group, names, are_groups, error)
-    class(reader_t), intent(in) :: self
-    character(len=*), intent(in) :: group
-    character(len=:), allocatable, intent(out) :: names(:)
-    logical, allocatable, intent(out) :: are_groups(:)
-    type(error_t), allocatable, intent(out) :: error
-    call h5_children(self%file, group, names, are_groups, error)
-  end subroutine children
 
   !> The variables of the root and of its groups in the order of the file, without dimensions that have
   !> no coordinates.
@@ -181,13 +161,6 @@ contains
     if (is_bare_dimension) is_bare_dimension = .not. h5_has_attribute(self%file, path, 'checksum')
     if (is_bare_dimension) is_bare_dimension = .not. h5_has_attribute(self%file, path, 'units')
   end function is_bare_dimension
-
-  !> Whether there is an object of this path ('/regime', '/catalogue/x').
-  logical function has(self, path)
-    class(reader_t), intent(in) :: self
-    character(len=*), intent(in) :: path
-    has = h5_exists(self%file, path)
-  end function has
 
   !> How many of a working file's tiles are done. Code 74.
   subroutine count_tiles(self, done, tiles, error)
@@ -394,47 +367,5 @@ contains
     end if
     text = strings(1)
   end subroutine read_text
-
-  !> Whether an object ('/', '/provenance', '/regime') has an attribute.
-  logical function has_attribute(self, object, name)
-    class(reader_t), intent(in) :: self
-    character(len=*), intent(in) :: object, name
-    has_attribute = h5_has_attribute(self%file, object, name)
-  end function has_attribute
-
-  !> The value of a text attribute.
-  subroutine text_attribute(self, object, name, text, error)
-    class(reader_t), intent(in) :: self
-    character(len=*), intent(in) :: object, name
-    character(len=:), allocatable, intent(out) :: text
-    type(error_t), allocatable, intent(out) :: error
-    call h5_get_text(self%file, object, name, text, error)
-  end subroutine text_attribute
-
-  !> The first value of a numeric attribute.
-  subroutine number_attribute(self, object, name, value, error)
-    class(reader_t), intent(in) :: self
-    character(len=*), intent(in) :: object, name
-    real(real64), intent(out) :: value
-    type(error_t), allocatable, intent(out) :: error
-    real(real64), allocatable :: values(:)
-    value = 0
-    call h5_get_numbers(self%file, object, name, values, error)
-    if (allocated(error)) return
-    if (size(values) /= 1) then
-      call fail(error, exit_io, 'attribute '''//name//''' of '''//object//''' in '''//self%path//''' is not one number')
-      return
-    end if
-    value = values(1)
-  end subroutine number_attribute
-
-  !> Closes the file.
-  subroutine close_reader(self, error)
-    class(reader_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
-    call trap('its end', self%path, endless=.true.)
-    call h5_close(self%file, error)
-    call end_guard()
-  end subroutine close_reader
 
 end module map_reader

@@ -222,11 +222,11 @@ contains
     name = trim(law(index(law, ':') + 1:))
   end function part_law
 
-  !> Whether a row is set by names of bodies, not by a number.
+  !> Whether a row has no key: it is set by names of bodies, or by the short form of a pair.
   pure logical function is_hidden(row)
     type(parameter_row_t), intent(in) :: row
     is_hidden = row%family == part_family .and. (index(row%law, 'point:') == 1 .or. &
-                                                 any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body']))
+                                                 any(row%name == [character(len=10) :: 'first_end', 'second_end', 'body', 'rate']))
   end function is_hidden
 
   !> Whether a path names how a motor, a state, a body of several, or a coordinate of a structure starts: 'motor.crank_speed',

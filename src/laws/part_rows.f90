@@ -189,6 +189,8 @@ module part_rows
     (parameter_row_t('part', drives(i), 'frequency', 'rad/s', not_negative, &
                      'angular frequency; that of the first drive if absent', optional=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'mean', drive_unit(i), any_value, 'mean', optional=.true.), i=1, 3), &
+    (parameter_row_t('part', drives(i), 'rate', 'm/s', any_value, 'constant velocity of a driving body', &
+                     optional=.true.), i=2, 3), &
     (parameter_row_t('part', drives(i), 'amplitude', drive_unit(i), any_value, 'amplitude', optional=.true.), i=1, 3), &
     (parameter_row_t('part', drives(i), 'angle', 'rad', range_t(-1e4_wp, 1e4_wp), &
                      'added to the angle phi of the drive', optional=.true.), i=1, 3), &

@@ -60,9 +60,7 @@ contains
     end if
     do i = 1, size(choices)
       if (choices(i)%name /= 'drive:motion') cycle
-      if (.not. machine%frequency > 0) call fail(error, exit_bad_case, path_of(choices(i))// &
-                                                 '.frequency: missing, allowed more than 0 rad/s')
-      if (.not. allocated(error)) call check_given(choices, i, watched, error)
+      call check_given(choices, i, watched, error)
       if (allocated(error)) return
       k = reference_point_of(choices(i))
       if (coordinate(k) == 0) call make_coordinate(machine, rows, k, reference_point_name(choices, k), taken, coordinate(k))

@@ -17,7 +17,8 @@ module basin
   use span_check, only: check_periods
   use status, only: exit_bad_case
   use text, only: to_text
-  use trajectories, only: block_size, describe_all, ensemble_t
+  use trajectories, only: block_size
+  use trajectory_slots, only: describe_all, ensemble_t
   use work_watch, only: watch_t
   use single_trajectory, only: fit_window, outcome_t, run_trajectory, span_t
   implicit none

@@ -7,7 +7,8 @@ module bisection
   use attractors, only: attractor_t
   use kinds, only: wp
   use start_label, only: label_not_known, label_of
-  use trajectories, only: ensemble_t, run_trajectories
+  use trajectories, only: run_trajectories
+  use trajectory_slots, only: ensemble_t
   use single_trajectory, only: outcome_t
   implicit none
   private

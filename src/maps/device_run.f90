@@ -12,7 +12,8 @@ module device_run
   use single_trajectory, only: outcome_t
   use spread_order, only: new_spread_order, spread_order_t
   use system, only: monotonic_seconds
-  use trajectories, only: batches_for, ensemble_t, processor_block, run_on_gpu, run_trajectories
+  use trajectories, only: batches_for, processor_block, run_on_gpu, run_trajectories
+  use trajectory_slots, only: ensemble_t
   use work_watch, only: watch_t
   implicit none
   private

@@ -8,7 +8,8 @@ module known_starts
   use lane_types, only: lane_count
   use single_trajectory, only: outcome_t
   use status, only: reason_settled
-  use trajectories, only: ensemble_t, run_trajectories
+  use trajectories, only: run_trajectories
+  use trajectory_slots, only: ensemble_t
   implicit none
   private
 

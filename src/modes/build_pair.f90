@@ -1,25 +1,28 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> From the laws of two bodies that dry friction couples to the multibody structure that they are. The driving body m1 has spring,
-!> viscous damping and drive; the driven body m2 feels the interface and a stop:
+!> Two bodies that dry friction couples, in the short form of a case: the parts that they are, and the multibody structure of
+!> these. The driving body m1 has spring, viscous damping and drive; the driven body m2 feels the interface and a stop:
 !>   m1 v1' = u - a1 v1 + a2 (l0 - x1) - f,   m2 v2' = f - F_c,   f in b Sgn(v1 - v2).
 !> The stop bounds x2 (fixed to the ground) or x2 - x1 (carried by m1: backlash).
 module build_pair
-  use assembly, only: add_body, add_force, add_joint, add_link, finish, give_motion, index_of, &
-    set_sizes
+  use assembly, only: index_of, set_sizes
+  use build_multibody, only: complete, join_parts, joined_t
   use constants, only: two_pi, unreachable
   use contact_law, only: barrier_positions, contact_of, contact_t
-  use control, only: add_controller, add_impulse
   use errors, only: error_t, fail
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice, law_choice_t, table_of, value_of
-  use multibody, only: controller_t, impulse_t, joint_contact, joint_friction, joint_soft, joint_t, multibody_t, wave_t
+  use law_table, only: effect_family, families, law_choice, law_choice_t, parameter_row_t, parameters_of, part_family, &
+    set_value, table_of, value_of
+  use multibody, only: joint_friction, multibody_t
   use status, only: exit_bad_case
   implicit none
   private
 
-  public :: is_pair, pair_of
+  public :: is_pair, pair_of, parts_of_pair
+
+  !> Numbers of the bodies among the reference points.
+  integer, parameter :: ground = 0, driving = 1, driven = 2
 
 contains
 
@@ -39,36 +42,74 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     type(multibody_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    type(law_choice_t) :: body, contact, damper, drive, spring
-    type(wave_t) :: wave
+    type(law_choice_t), allocatable :: parts(:)
+    type(joined_t) :: joined
+    integer :: i
     call refuse_others(choices, error)
     if (allocated(error)) return
-    body = law_of(choices, 'body')
-    contact = law_of(choices, 'contact')
-    damper = law_of(choices, 'friction')
-    drive = law_of(choices, 'drive')
-    spring = law_of(choices, 'restoring')
-    wave = wave_of_pair(drive)
-    machine%frequency = frequency_of(drive)
-    machine%section_time = section_time_of(body, drive, spring)
-    call add_body(machine, 'driving', value_of(body, 'mass'), 0.0_wp)
-    call add_body(machine, 'driven', value_of(body, 'driven_mass'), 0.0_wp)
-    machine%watched = 2
-    call add_joints(body, contact, is_given(drive), machine)
-    if (is_given(drive)) then
-      call give_motion(machine, 'driving', wave)
-    else
-      call add_frame(spring, damper, machine)
-      call add_drive(drive, wave, machine, error)
-      if (allocated(error)) return
-    end if
-    call finish(machine, error)
+    parts = parts_of_pair(choices)
+    call join_parts(parts, machine, joined, error)
     if (allocated(error)) return
-    call name_driver(body, drive, wave, machine)
-    if (.not. abs(value_of(body, 'impulse')) > 0) return
-    call add_impulse(machine, impulse_t(row=merge(1.0_wp, 0.0_wp, machine%names == 'driven'), &
-                                        amount=value_of(body, 'impulse'), time=value_of(body, 'impulse_time')))
+    machine%section_time = section_time_of(law_of(choices, 'body'), law_of(choices, 'drive'), law_of(choices, 'restoring'))
+    do i = 1, size(machine%joints)
+      associate (joint => machine%joints(i))
+        ! Messages name the keys of the short form.
+        joint%name = merge('body.friction', 'contact      ', joint%kind == joint_friction)
+        ! A tie of forces sticks.
+        joint%friction%break_away = joint%friction%kinetic*(1 + 32*epsilon(1.0_wp))
+      end associate
+    end do
+    call complete(parts, joined, machine, error)
+    if (.not. allocated(error)) call describe_driver(choices, machine)
   end subroutine pair_of
+
+  !> The laws of a pair as those of a case with [body.NAME]: its bodies, joints and drive, in the order of such a case.
+  pure function parts_of_pair(choices) result(parts)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(law_choice_t), allocatable :: parts(:)
+    type(law_choice_t) :: body, part
+    integer :: i
+    body = law_of(choices, 'body')
+    allocate (parts(size(families)))
+    parts(1) = law_choice('body', 'structure')
+    do i = 2, size(families)
+      parts(i) = law_choice(families(i), 'none')
+    end do
+    part = part_of('body:mass', 'driving')
+    call set_value(part, 'mass', [value_of(body, 'mass')])
+    if (.not. is_given(law_of(choices, 'drive'))) then
+      call set_value(part, 'x0', [value_of(body, 'driver_x0')])
+      call set_value(part, 'v0', [value_of(body, 'driver_v0')])
+    end if
+    parts = [parts, part]
+    part = part_of('body:watched', 'driven')
+    call set_value(part, 'mass', [value_of(body, 'driven_mass')])
+    parts = [parts, part]
+    call add_frame(choices, parts)
+    call add_joints(body, law_of(choices, 'contact'), parts)
+    call add_drive(law_of(choices, 'drive'), parts)
+    if (.not. abs(value_of(body, 'impulse')) > 0) return
+    part = part_of('drive:impulse', 'hammer')
+    call set_value(part, 'body', [real(driven, wp)])
+    call set_value(part, 'impulse', [value_of(body, 'impulse')])
+    call set_value(part, 'time', [value_of(body, 'impulse_time')])
+    parts = [parts, part]
+  end function parts_of_pair
+
+  pure type(law_choice_t) function part_of(law, label) result(part)
+    character(len=*), intent(in) :: law, label
+    part = law_choice(part_family, law)
+    part%label = label
+  end function part_of
+
+  !> A joint between two reference points.
+  pure type(law_choice_t) function joint_of(law, label, first, second) result(part)
+    character(len=*), intent(in) :: law, label
+    integer, intent(in) :: first, second
+    part = part_of(law, label)
+    call set_value(part, 'first_end', [real(first, wp)])
+    call set_value(part, 'second_end', [real(second, wp)])
+  end function joint_of
 
   !> Refuses laws of machines of one body, and effects.
   pure subroutine refuse_others(choices, error)
@@ -118,29 +159,17 @@ contains
     is_controller = drive%name == 'pid_velocity' .or. drive%name == 'pid_sine'
   end function is_controller
 
+  !> Whether the motion of the driving body, or what the controller follows, has a constant velocity.
+  pure logical function moves_on(drive)
+    type(law_choice_t), intent(in) :: drive
+    moves_on = drive%name == 'velocity' .or. drive%name == 'pid_velocity'
+  end function moves_on
+
   !> The stops are carried by the driving body.
   pure logical function is_carried(body)
     type(law_choice_t), intent(in) :: body
     is_carried = body%name == 'backlash_pair'
   end function is_carried
-
-  !> Force [N], motion [m] or reference [m].
-  pure type(wave_t) function wave_of_pair(drive) result(wave)
-    type(law_choice_t), intent(in) :: drive
-    real(wp) :: cosine, sine
-    cosine = 0
-    sine = 0
-    select case (drive%name)
-    case ('force')
-      wave%mean = value_of(drive, 'mean')
-      cosine = value_of(drive, 'amplitude')
-    case ('velocity', 'pid_velocity')
-      wave%rate = value_of(drive, 'velocity')
-    case ('sine', 'pid_sine')
-      sine = value_of(drive, 'amplitude')
-    end select
-    wave%harmonic = [cmplx(cosine, -sine, wp)]
-  end function wave_of_pair
 
   pure real(wp) function frequency_of(drive) result(frequency)
     type(law_choice_t), intent(in) :: drive
@@ -160,99 +189,104 @@ contains
     end if
   end function section_time_of
 
-  !> Spring and damper between the ground and the driving body.
-  pure subroutine add_frame(spring, damper, machine)
-    type(law_choice_t), intent(in) :: spring, damper
-    type(multibody_t), intent(inout) :: machine
-    real(wp) :: stiffness, free_length, damping
-    stiffness = 0
-    free_length = 0
-    damping = 0
-    if (spring%name == 'linear') then
-      stiffness = value_of(spring, 'stiffness')
-      free_length = value_of(spring, 'free_length')
-    end if
-    if (damper%name == 'viscous') damping = value_of(damper, 'damping')
-    call add_link(machine, [1.0_wp, 0.0_wp], stiffness, damping, free_length)
+  !> Spring and damper between the ground and the driving body, where that is free.
+  pure subroutine add_frame(choices, parts)
+    type(law_choice_t), intent(in) :: choices(:)
+    type(law_choice_t), allocatable, intent(inout) :: parts(:)
+    type(law_choice_t) :: spring, damper, part
+    spring = law_of(choices, 'restoring')
+    damper = law_of(choices, 'friction')
+    if (is_given(law_of(choices, 'drive')) .or. (spring%name /= 'linear' .and. damper%name /= 'viscous')) return
+    part = joint_of('spring:linear', 'frame', ground, driving)
+    if (spring%name == 'linear') call set_value(part, 'stiffness', [value_of(spring, 'stiffness')])
+    if (spring%name == 'linear') call set_value(part, 'free_length', [value_of(spring, 'free_length')])
+    if (damper%name == 'viscous') call set_value(part, 'damping', [value_of(damper, 'damping')])
+    parts = [parts, part]
   end subroutine add_frame
 
-  !> The force on the driving body, or the controller that moves it.
-  pure subroutine add_drive(drive, wave, machine, error)
-    type(law_choice_t), intent(in) :: drive
-    type(wave_t), intent(in) :: wave
-    type(multibody_t), intent(inout) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    type(controller_t) :: controller
-    if (is_controller(drive)) then
-      controller = controller_t(row=[1.0_wp, 0.0_wp], reference=wave, proportional=value_of(drive, 'proportional'), &
-                                integral=value_of(drive, 'integral'), derivative=value_of(drive, 'derivative'), &
-                                sample_time=value_of(drive, 'sample_time'))
-      call add_controller(machine, controller, 'integral.1', error)
-    else
-      call add_force(machine, [1.0_wp, 0.0_wp], wave%mean, wave%harmonic)
+  !> Friction between the bodies, and stops of the driven one on the ground or on the other.
+  pure subroutine add_joints(body, stop, parts)
+    type(law_choice_t), intent(in) :: body, stop
+    type(law_choice_t), allocatable, intent(inout) :: parts(:)
+    type(law_choice_t) :: part
+    type(contact_t) :: contact
+    type(parameter_row_t), allocatable :: rows(:)
+    real(wp) :: positions(2), force
+    integer :: i
+    contact = contact_of(stop, mass=1.0_wp)
+    positions = barrier_positions(contact)
+    force = value_of(body, 'friction')
+    ! Stops without room leave friction along them nothing to do.
+    if (force > 0 .and. .not. (is_carried(body) .and. .not. contact%soft .and. .not. positions(1) > positions(2))) then
+      part = joint_of('friction:coulomb', 'interface', driving, driven)
+      call set_value(part, 'force', [force])
+      call set_value(part, 'static_force', [force])
+      parts = [parts, part]
     end if
+    if (positions(1) >= unreachable .and. positions(2) <= -unreachable) return
+    part = joint_of('contact:'//trim(stop%name), 'stop', merge(driving, ground, is_carried(body)), driven)
+    rows = parameters_of(stop%family, stop%name)
+    do i = 1, size(rows)
+      call set_value(part, trim(rows(i)%name), [value_of(stop, trim(rows(i)%name))])
+    end do
+    parts = [parts, part]
+  end subroutine add_joints
+
+  !> The force on the driving body, its given motion, or the controller that moves it.
+  pure subroutine add_drive(drive, parts)
+    type(law_choice_t), intent(in) :: drive
+    type(law_choice_t), allocatable, intent(inout) :: parts(:)
+    character(len=12), parameter :: gains(4) = [character(len=12) :: 'proportional', 'integral', 'derivative', 'sample_time']
+    type(law_choice_t) :: part
+    integer :: i
+    select case (drive%name)
+    case ('force')
+      part = part_of('drive:force', 'force')
+      call set_value(part, 'mean', [value_of(drive, 'mean')])
+      call set_value(part, 'amplitude', [value_of(drive, 'amplitude')])
+    case ('velocity', 'sine')
+      part = part_of('drive:motion', 'motion')
+    case ('pid_velocity', 'pid_sine')
+      part = part_of('drive:controller', 'integral')
+      do i = 1, size(gains)
+        call set_value(part, trim(gains(i)), [value_of(drive, trim(gains(i)))])
+      end do
+    case default
+      return
+    end select
+    call set_value(part, 'body', [real(driving, wp)])
+    if (drive%name == 'sine' .or. drive%name == 'pid_sine') call set_value(part, 'sine', [value_of(drive, 'amplitude')])
+    if (frequency_of(drive) > 0) call set_value(part, 'frequency', [frequency_of(drive)])
+    if (moves_on(drive)) call set_value(part, 'rate', [value_of(drive, 'velocity')])
+    parts = [parts, part]
   end subroutine add_drive
 
-  !> What is reported of the driving body, and where it starts.
-  pure subroutine name_driver(body, drive, wave, machine)
-    type(law_choice_t), intent(in) :: body, drive
-    type(wave_t), intent(in) :: wave
+  !> What is reported of the driving body.
+  pure subroutine describe_driver(choices, machine)
+    type(law_choice_t), intent(in) :: choices(:)
     type(multibody_t), intent(inout) :: machine
+    type(law_choice_t) :: body, drive
+    body = law_of(choices, 'body')
+    drive = law_of(choices, 'drive')
     allocate (machine%driver)
     associate (driver => machine%driver)
       driver%at = index_of(machine, 'driving')
       driver%carries = is_carried(body)
       allocate (driver%running(machine%n), driver%push(machine%n), source=0.0_wp)
       if (driver%at == 0) then
-        driver%motion = wave
-        if (driver%carries) driver%stops_run = wave%rate
-        call set_sizes(machine, value_of(body, 'driven_mass')*(abs(real(wave%harmonic(1))) + abs(aimag(wave%harmonic(1))))* &
-                       machine%frequency**2)
-        return
+        driver%motion = machine%given(1)
+        associate (wave => driver%motion)
+          if (driver%carries) driver%stops_run = wave%rate
+          call set_sizes(machine, value_of(body, 'driven_mass')*(abs(real(wave%harmonic(1))) + abs(aimag(wave%harmonic(1))))* &
+                         machine%frequency**2)
+        end associate
+      else if (is_controller(drive)) then
+        driver%running(driver%at) = machine%controller%reference%rate
+        if (driver%carries) driver%running(machine%watched) = machine%controller%reference%rate
+      else if (drive%name == 'force') then
+        driver%push(driver%at) = value_of(drive, 'mean')
       end if
-      machine%start(:, driver%at) = [value_of(body, 'driver_x0'), value_of(body, 'driver_v0')]
-      if (.not. is_controller(drive)) then
-        driver%push(driver%at) = wave%mean
-        return
-      end if
-      driver%running(driver%at) = wave%rate
-      if (driver%carries) driver%running(machine%watched) = wave%rate
     end associate
-  end subroutine name_driver
-
-  !> Friction between the bodies, and stops of the driven one on the ground or on the other; `given`: the other has a given motion.
-  pure subroutine add_joints(body, stop, given, machine)
-    type(law_choice_t), intent(in) :: body, stop
-    logical, intent(in) :: given
-    type(multibody_t), intent(inout) :: machine
-    real(wp), parameter :: relative(2) = [-1.0_wp, 1.0_wp], driven(2) = [0.0_wp, 1.0_wp]
-    type(joint_t) :: friction, contact
-    real(wp) :: positions(2), mass
-    logical :: carried
-    carried = is_carried(body)
-    ! The mass that an impact between the two bodies sees, or of m2 with the ground or with a given motion.
-    mass = machine%mass(2, 2)
-    if (carried .and. .not. given) mass = machine%mass(1, 1)*machine%mass(2, 2)/(machine%mass(1, 1) + machine%mass(2, 2))
-    contact%contact = contact_of(stop, mass)
-    positions = barrier_positions(contact%contact)
-    friction%friction%kinetic = value_of(body, 'friction')
-    ! Stops without room leave friction along them nothing to do.
-    if (friction%friction%kinetic > 0 .and. &
-        .not. (carried .and. .not. contact%contact%soft .and. .not. positions(1) > positions(2))) then
-      friction%name = 'body.friction'
-      friction%kind = joint_friction
-      friction%row = relative
-      ! A tie of forces sticks.
-      friction%friction%break_away = friction%friction%kinetic*(1 + 32*epsilon(1.0_wp))
-      call add_joint(machine, friction)
-    end if
-    if (positions(1) >= unreachable .and. positions(2) <= -unreachable) return
-    contact%name = 'contact'
-    contact%kind = merge(joint_soft, joint_contact, contact%contact%soft)
-    contact%row = merge(relative, driven, carried)
-    if (positions(1) < unreachable) contact%upper = positions(1)
-    if (positions(2) > -unreachable) contact%lower = positions(2)
-    call add_joint(machine, contact)
-  end subroutine add_joints
+  end subroutine describe_driver
 
 end module build_pair

@@ -3,22 +3,18 @@
 
 !> What is written down of the motion of a multibody structure when asked: samples, events, and where the energy went.
 module multibody_log
-  use control, only: active_force, bodies_of
-  use contact_law, only: contact_at_speed, contact_force, contact_t
   use flight_path, only: path_at, path_t
-  use multibody, only: joint_bristle, joint_contact, joint_elastic, joint_soft, joint_spring, joint_t, multibody_t, most_joints, &
-    wave_value
-  use multibody_state, only: free_force, is_held, joint_energy, joint_force, joint_motion, multibody_state_t, &
-    factor_now, turning_at
+  use multibody, only: joint_elastic, joint_soft, multibody_t
+  use multibody_energy, only: energy_of_multibody, powers, work_of_stops
+  use multibody_state, only: is_held, joint_force, joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
-  use matrices, only: solve
   use mode_flow, only: harmonics_of, mode_flow_t
   use motion_state, only: log_t, mode_slip_minus, mode_slip_plus, mode_stick, put_column, put_in_order, record_event, &
     record_sample, sample_due, sample_time, state_t
   use two_bodies, only: contact_at, driver_now, mode_of_two
   implicit none
   private
-  public :: energy_of_multibody, watched_state, log_flight, log_event, log_sample, record_change, balance_change
+  public :: watched_state, log_flight, log_event, log_sample, record_change, balance_change
 
   !> Gauss-Legendre nodes on (0, 1) and weights.
   real(wp), parameter :: node(4) = [0.069431844202973712388026755553595_wp, 0.33000947820757186759866712044838_wp, &
@@ -29,43 +25,6 @@ module multibody_log
   real(wp), parameter :: gone = merge(70, 140, epsilon(1.0_wp) > 1e-20_wp)
 
 contains
-
-  !> Energy of the bodies, the springs and the springs of the joints [J]; a constant force has that of its weight. Of two bodies
-  !> (`driver_t`) what presses a stop and the drive have none.
-  pure real(wp) function energy_of_multibody(machine, state) result(energy)
-    type(multibody_t), intent(in) :: machine
-    type(multibody_state_t), intent(in) :: state
-    complex(wp) :: turning(harmonics_of(machine))
-    type(multibody_state_t) :: bodies
-    real(wp) :: s, u
-    integer :: j
-    turning = turning_at(machine%frequency, state%time, size(turning))
-    bodies = bodies_of(machine, state)
-    associate (q => bodies%q(:machine%n), v => bodies%v(:machine%n))
-      energy = 0.5_wp*sum(v*matmul(machine%mass, v)) + 0.5_wp*sum(q*matmul(machine%stiffness, q)) - sum(machine%load*q)
-      if (has_continuous_control(machine)) then
-        associate (controller => machine%controller)
-          energy = energy - 0.5_wp*sum(q*matmul(controller%stiffness, q)) + sum(controller%load*q)
-        end associate
-      end if
-    end associate
-    energy = energy + machine%rest_energy
-    if (allocated(machine%driver)) then
-      energy = energy + sum(machine%driver%push*state%q(:machine%n))
-      return
-    end if
-    do j = 1, size(machine%joints)
-      call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-      energy = energy + joint_energy(machine%joints(j), state%phase(j), state%slider(j), s)
-    end do
-  end function energy_of_multibody
-
-  !> Whether the matrices of a machine have a controller in them.
-  pure logical function has_continuous_control(machine)
-    type(multibody_t), intent(in) :: machine
-    has_continuous_control = .false.
-    if (allocated(machine%controller)) has_continuous_control = .not. machine%controller%sample_time > 0
-  end function has_continuous_control
 
   !> The watched coordinate as that of one body.
   pure type(state_t) function watched_state(machine, state) result(body)
@@ -250,78 +209,6 @@ contains
     panels = max(1, ceiling(3*fastest*(until - first)))
   end subroutine next_interval
 
-  !> Powers lost to friction, dampers and contacts, and put in by forces and moving surfaces [W].
-  pure subroutine powers(machine, flow, state, friction, damping, contact, work)
-    type(multibody_t), intent(in) :: machine
-    type(mode_flow_t), intent(in) :: flow
-    type(multibody_state_t), intent(in) :: state
-    real(wp), intent(out) :: friction, damping, contact, work
-    complex(wp) :: turning(harmonics_of(machine))
-    real(wp) :: force(machine%n), held(most_joints), curvature(most_joints), s, u, r, value, rate, &
-      factor(0:2)
-    type(multibody_state_t) :: bodies
-    integer :: i, j, m
-    turning = turning_at(machine%frequency, state%time, size(turning))
-    bodies = bodies_of(machine, state)
-    associate (v => bodies%v(:machine%n))
-      damping = sum(v*matmul(machine%damping, v))
-      work = 0
-      if (has_continuous_control(machine)) damping = damping - sum(v*matmul(machine%controller%damping, v))
-      if (allocated(machine%controller)) work = sum(v*active_force(machine, state))
-      if (allocated(machine%driver)) work = work + sum(v*machine%driver%push)
-      do m = 1, size(machine%force, 2)
-        work = work + sum(v*real(machine%force(:, m)*turning(m)))
-      end do
-    end associate
-    friction = 0
-    contact = 0
-    call free_force(machine, state, turning, force)
-    do i = 1, size(flow%held)
-      call wave_value(machine%joints(flow%held(i))%offset, machine%frequency, state%time, turning, value, rate, curvature(i))
-    end do
-    associate (h => size(flow%held))
-      held(:h) = -matmul(flow%reaction, force) - matmul(flow%hold, curvature(:h))
-    end associate
-    do j = 1, size(machine%joints)
-      associate (joint => machine%joints(j))
-        call wave_value(joint%offset, machine%frequency, state%time, turning, value, rate)
-        if (is_held(joint, state%phase(j))) then
-          i = findloc(flow%held, j, 1)
-          if (i > 0) work = work - held(i)*rate
-          cycle
-        end if
-        call joint_motion(machine, j, state%q, state%v, state%time, turning, s, u)
-        call factor_now(machine, j, state, turning, factor)
-        call joint_force(joint, state%phase(j), state%slider(j), state%touch_speed(j), s, u, factor(0), r)
-        work = work - r*rate
-        if (allocated(joint%strength) .or. (joint%kind == joint_spring .and. allocated(joint%load))) work = work + r*u
-        if (joint%kind == joint_bristle) then
-          friction = friction - r*merge(s, u, joint%memory%on_deflection)
-        else if (joint%kind == joint_soft) then
-          if (allocated(machine%driver)) then
-            contact = contact - r*u
-          else if (abs(state%phase(j)) == 1) then
-            contact = contact + damping_of_contact(joint, state%phase(j), state%touch_speed(j), s, u)
-          end if
-        else if (state%phase(j) /= 0 .and. joint%kind /= joint_spring) then
-          friction = friction - r*u
-        end if
-      end associate
-    end do
-  end subroutine powers
-
-  !> Power lost in a pressed contact [W].
-  pure real(wp) function damping_of_contact(joint, phase, touch_speed, s, u) result(power)
-    type(joint_t), intent(in) :: joint
-    integer, intent(in) :: phase
-    real(wp), intent(in) :: touch_speed, s, u
-    type(contact_t) :: law
-    real(wp) :: p
-    law = contact_at_speed(joint%contact, touch_speed)
-    p = merge(s - joint%upper, joint%lower - s, phase > 0)
-    power = (contact_force(law, p, phase*u) - contact_force(law, p, 0.0_wp))*phase*u
-  end function damping_of_contact
-
   !> What a transition took from the energy: of contacts, but for sliders that let go. A stop that moves does work.
   pure subroutine balance_change(machine, before, after, log)
     type(multibody_t), intent(in) :: machine
@@ -339,39 +226,6 @@ contains
       log%balance%work = log%balance%work + work
     end if
   end subroutine balance_change
-
-  !> Work that stops which move have done in an impact [J]: the impulses of all contacts at their stops give the change of the
-  !> speeds.
-  pure real(wp) function work_of_stops(machine, before, after) result(work)
-    type(multibody_t), intent(in) :: machine
-    type(multibody_state_t), intent(in) :: before, after
-    complex(wp) :: turning(harmonics_of(machine))
-    real(wp), dimension(machine%n, most_joints) :: row, kick
-    real(wp), dimension(most_joints) :: rate, impulse
-    real(wp) :: value, s, u, near
-    integer :: j, k
-    logical :: found
-    work = 0
-    k = 0
-    turning = turning_at(machine%frequency, before%time, size(turning))
-    associate (n => machine%n)
-      do j = 1, size(machine%joints)
-        associate (joint => machine%joints(j))
-          if (joint%kind /= joint_contact) cycle
-          call joint_motion(machine, j, before%q, before%v, before%time, turning, s, u)
-          near = 1e-9_wp*max(machine%length_scale, sum(abs(joint%row*before%q(:n))))
-          if (s < joint%upper - near .and. s > joint%lower + near) cycle
-          k = k + 1
-          row(:, k) = joint%row
-          kick(:, k) = matmul(machine%mobility, joint%row)
-          call wave_value(joint%offset, machine%frequency, before%time, turning, value, rate(k))
-        end associate
-      end do
-      if (.not. any(abs(rate(:k)) > 0)) return
-      call solve(matmul(transpose(row(:, :k)), kick(:, :k)), matmul(after%v(:n) - before%v(:n), row(:, :k)), impulse(:k), found)
-      if (found) work = -sum(rate(:k)*impulse(:k))
-    end associate
-  end function work_of_stops
 
   !> Writes an event of a joint down: the watched coordinate before and after it, and the joint's own; its time is that of
   !> the state before it, or `at` [s].

@@ -7,7 +7,8 @@ module timed_actions
   use control, only: error_of
   use multibody, only: joint_contact, joint_friction, joint_section, multibody_t, most_joints, reads_clock
   use multibody_flows, only: multibody_motion_t
-  use multibody_log, only: balance_change, energy_of_multibody, record_change
+  use multibody_log, only: balance_change, record_change
+  use multibody_energy, only: energy_of_multibody
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use multibody_transition, only: assess_friction, settle
   use kinds, only: wp

@@ -14,12 +14,13 @@ module waves
 
 contains
 
-  !> mean + amplitude cos(phi + angle) + sum a_n cos(n phi) + b_n sin(n phi).
+  !> mean + rate t + amplitude cos(phi + angle) + sum a_n cos(n phi) + b_n sin(n phi); forces have no rate.
   pure function wave_of(choice) result(wave)
     type(law_choice_t), intent(in) :: choice
     type(wave_t) :: wave
     real(wp) :: sine, cosine
     wave%mean = value_of(choice, 'mean')
+    if (choice%name /= 'drive:force') wave%rate = value_of(choice, 'rate')
     call add_series(list_of(choice, 'cosine'), list_of(choice, 'sine'), wave)
     call sine_cosine(value_of(choice, 'angle'), sine, cosine)
     wave%harmonic(1) = wave%harmonic(1) + value_of(choice, 'amplitude')*cmplx(cosine, sine, wp)

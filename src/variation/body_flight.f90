@@ -4,28 +4,27 @@
 !> A slip of one body over a given time, and its derivative by its start: on the closed form where that exists, also between
 !> passages of a Stribeck layer, else on the equations of motion and of their variation. Modes are those of module `one_body`.
 module body_flight
-  use contact_law, only: contact_force, contact_force_slopes, contact_margin
+  use contact_law, only: contact_force_slopes, contact_margin
   use drive_law, only: foot_motion
   use effect_law, only: slip_memory_t
   use elementary, only: exponential, sine_cosine
   use exact_flight, only: flight_speed_reached, fly_exact
   use exact_flow, only: begin_segment, evaluate, flow_t, kinematics_t, segment_t
-  use friction_law, only: sliding_friction, sliding_slope
+  use friction_law, only: sliding_slope
   use guarded_march, only: begin_march, guard_t, march_failed, march_t, march_time_over, take_step, watched_system_t
   use kinds, only: wp
   use layer_transit, only: cross_layer
   use motion, only: motion_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus, state_t, tally_t
-  use oscillator, only: extra_force, oscillator_t
-  use restoring_law, only: restoring_force, restoring_stiffness
+  use motion_state, only: state_t, tally_t
+  use oscillator, only: oscillator_t
+  use restoring_law, only: restoring_stiffness
+  use slip_force, only: direction_in, pressed_side, pushes, quarter, slip_acceleration, surface_of
   use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above
   implicit none
   private
 
-  public :: fly_slip, slip_acceleration, slips_in, direction_in, pressed_side, surface_of, pushes, quarter
+  public :: fly_slip
 
-  !> Added to a slip's mode while the body presses the upper or the lower soft barrier.
-  integer, parameter, public :: on_upper = 10, on_lower = 20
   !> A Stribeck layer is marched through from its edge, and left at this multiple of it.
   real(wp), parameter :: layer_exit = 1.25_wp
   integer, parameter :: most_steps = 100000
@@ -51,28 +50,6 @@ module body_flight
   end type slip_t
 
 contains
-
-  !> Whether the body slips in a mode.
-  pure elemental logical function slips_in(mode)
-    integer, intent(in) :: mode
-    slips_in = modulo(mode, 10) == mode_slip_plus .or. modulo(mode, 10) == mode_slip_minus
-  end function slips_in
-
-  !> Direction of the slip, 0 at rest.
-  pure elemental integer function direction_in(mode)
-    integer, intent(in) :: mode
-    direction_in = 0
-    if (modulo(mode, 10) == mode_slip_plus) direction_in = 1
-    if (modulo(mode, 10) == mode_slip_minus) direction_in = -1
-  end function direction_in
-
-  !> Side of the soft barrier that is pressed in a mode, 0 without.
-  pure elemental integer function pressed_side(mode)
-    integer, intent(in) :: mode
-    pressed_side = 0
-    if (mode > on_upper .and. mode < on_lower) pressed_side = 1
-    if (mode > on_lower) pressed_side = -1
-  end function pressed_side
 
   !> The state `y1` that a slip brings `y0` at `t0` to at `t1` [s], and its derivative by `y0`. `sizes` are those of x and v,
   !> `steps` of the differences of laws.
@@ -279,18 +256,6 @@ contains
     system%mode = mode
   end subroutine march
 
-  !> Whether the force of a soft barrier that may not pull is there: not on a flight off it, and not where it would pull.
-  pure logical function pushes(machine, mode, y)
-    type(oscillator_t), intent(in) :: machine
-    integer, intent(in) :: mode
-    real(wp), intent(in) :: y(2)
-    integer :: side
-    side = pressed_side(mode)
-    pushes = side /= 0
-    if (.not. pushes .or. machine%contact%tension) return
-    pushes = sum(contact_margin(machine%contact)*[1.0_wp, side*(y(1) - surface_of(machine, side)), side*y(2)]) >= 0
-  end function pushes
-
   !> What cuts a march from the state `y` on at `time`; never, where there is no such thing. Keeps the slip to the pieces of the
   !> tables that it is in there.
   pure subroutine list_cuts(system, mode, exit, time, y, cut, count_cuts)
@@ -393,40 +358,5 @@ contains
     end function free_at
 
   end function acceleration_slopes
-
-  !> Difference of fourth order of the values two and one steps back, one and two further: derivative times the step.
-  pure real(wp) function quarter(far_back, back, further, far) result(change)
-    real(wp), intent(in) :: far_back, back, further, far
-    change = (8*(further - back) - (far - far_back))/12
-  end function quarter
-
-  !> Acceleration [m/s^2] in a slip; `pushing`: a soft barrier acts; by these `pieces` of tables, without them by those it is in.
-  pure real(wp) function slip_acceleration(machine, mode, pushing, t, x, v, pieces) result(a)
-    type(oscillator_t), intent(in) :: machine
-    integer, intent(in) :: mode
-    logical, intent(in) :: pushing
-    real(wp), intent(in) :: t, x, v
-    type(slip_memory_t), intent(in), optional :: pieces
-    type(slip_memory_t) :: slip
-    real(wp) :: foot, extension, direction
-    integer :: side
-    direction = direction_in(mode)
-    if (present(pieces)) slip = pieces
-    slip%direction = direction
-    slip%x = x
-    call foot_motion(machine%drive, machine%drive_frequency*t, foot)
-    extension = machine%restoring%free_length + foot - x
-    a = restoring_force(machine%restoring, extension) + sliding_friction(machine%friction, v, direction)
-    if (machine%extra) a = a + extra_force(machine, slip, t, x, v, extension)
-    side = pressed_side(mode)
-    if (side /= 0 .and. pushing) a = a - side*contact_force(machine%contact, side*(x - surface_of(machine, side)), side*v)
-    a = a/machine%mass
-  end function slip_acceleration
-
-  pure real(wp) function surface_of(machine, side) result(surface)
-    type(oscillator_t), intent(in) :: machine
-    integer, intent(in) :: side
-    surface = merge(machine%contact%soft_upper, machine%contact%soft_lower, side > 0)
-  end function surface_of
 
 end module body_flight

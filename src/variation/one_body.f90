@@ -4,7 +4,8 @@
 !> One body as a hybrid machine, its state being x [m] and v [m/s]: slips, impacts, turning points, sticking, release, soft
 !> contact, completed chatter.
 module one_body
-  use body_flight, only: direction_in, fly_slip, on_lower, on_upper, pushes, quarter, slip_acceleration, slips_in, surface_of
+  use body_flight, only: fly_slip
+  use slip_force, only: direction_in, on_lower, on_upper, pushes, quarter, slip_acceleration, slips_in, surface_of
   use contact_flight, only: contact_side
   use contact_law, only: contact_force_slopes, force_on_body, velocity_after_impact
   use effect_law, only: break_away_level

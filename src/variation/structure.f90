@@ -8,7 +8,7 @@ module structure
   use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
   use machine_type, only: section_state_t
   use motion_state, only: tally_t
-  use multibody, only: joint_contact, joint_elastic, joint_section, multibody_t, most_joints
+  use multibody, only: joint_contact, joint_elastic, most_joints
   use multibody_flows, only: multibody_motion_t
   use multibody_section, only: lay_out
   use multibody_state, only: free_force, joint_motion, multibody_state_t, turning_at
@@ -17,10 +17,11 @@ module structure
   use structure_flight, only: flow_of, fly_mode, force_slopes, frame_t, put_state, rates, surface_jerk
   use structure_impact, only: carried_by, apply_impact_with_slopes
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use structure_modes, only: phases_in, sliding_extension
   implicit none
   private
 
-  public :: structure_of, mode_number, phases_in, state_in, coordinates_of, settle, count_joints
+  public :: structure_of, state_in, coordinates_of, settle
 
   type, extends(hybrid_t), public :: structure_t
     type(frame_t) :: frame
@@ -37,9 +38,6 @@ module structure
     procedure :: map => map_of_structure
     procedure :: starts_of_section => starts_of_structure
   end type structure_t
-
-  !> Phases run from -2 to 2: digits of the number of a mode.
-  integer, parameter :: digits_of_phase = 5
 
   ! In the submodule `structure_sections`: it uses modules that use this one.
   interface
@@ -104,7 +102,7 @@ pure function structure_of(moving, sizes) result(structure)
   real(wp), intent(in) :: sizes(2)
   type(structure_t) :: structure
   real(wp) :: q(moving%machine%n), v(moving%machine%n)
-  integer :: positions, speeds, j
+  integer :: positions, speeds, j, k
   associate (machine => moving%machine)
     structure%frame%moving = moving
     structure%frame%directions = moving%directions
@@ -123,48 +121,11 @@ pure function structure_of(moving, sizes) result(structure)
     structure%size_of(positions + 1:positions + speeds) = sizes(2)
     allocate (structure%watched(2, structure%n), source=0.0_wp)
     do j = 1, positions + speeds
-      call lay_out(moving, unit_vector(positions + speeds, j), q, v)
+      call lay_out(moving, [(merge(1.0_wp, 0.0_wp, k == j), k=1, positions + speeds)], q, v)
       structure%watched(:, j) = [q(machine%watched), v(machine%watched)]
     end do
   end associate
 end function structure_of
-
-pure function unit_vector(n, k)
-  integer, intent(in) :: n, k
-  real(wp) :: unit_vector(n)
-  unit_vector = 0
-  unit_vector(k) = 1
-end function unit_vector
-
- !> Number of joints without the section.
-pure integer function count_joints(machine) result(joints)
-  type(multibody_t), intent(in) :: machine
-  joints = count(machine%joints%kind /= joint_section)
-end function count_joints
-
- !> The number of a mode by the phases of its joints.
-pure integer function mode_number(machine, phase) result(mode)
-  type(multibody_t), intent(in) :: machine
-  integer, intent(in) :: phase(:)
-  integer :: j
-  mode = 0
-  do j = count_joints(machine), 1, -1
-    mode = digits_of_phase*mode + phase(j) + 2
-  end do
-end function mode_number
-
- !> The phases of the joints in a mode.
-pure function phases_in(machine, mode) result(phase)
-  type(multibody_t), intent(in) :: machine
-  integer, intent(in) :: mode
-  integer :: phase(most_joints), rest, j
-  phase = 0
-  rest = mode
-  do j = 1, count_joints(machine)
-    phase(j) = modulo(rest, digits_of_phase) - 2
-    rest = rest/digits_of_phase
-  end do
-end function phases_in
 
  !> The state of the event loop at `t` [s].
 pure type(multibody_state_t) function state_in(self, mode, t, y) result(state)
@@ -195,13 +156,6 @@ pure function coordinates_of(self, state) result(y)
     end do
   end associate
 end function coordinates_of
-
- !> Extension of the spring of elastic friction that slides [m].
-pure real(wp) function sliding_extension(machine, j, phase)
-  type(multibody_t), intent(in) :: machine
-  integer, intent(in) :: j, phase
-  sliding_extension = phase*machine%joints(j)%friction%kinetic/machine%joints(j)%stiffness
-end function sliding_extension
 
  !> Whether the joints that are held leave no coordinate free.
 pure logical function structure_rests(self, mode)

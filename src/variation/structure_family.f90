@@ -20,7 +20,8 @@ module structure_family
   use multibody_machine, only: multibody_machine_t
   use motion_state, only: flight_adaptive, tally_t
   use status, only: exit_bad_case
-  use structure, only: count_joints, phases_in, structure_of, structure_t
+  use structure, only: structure_of, structure_t
+  use structure_modes, only: count_joints, phases_in
   use structure_walk, only: fly_structure_on
   use timed_actions, only: acts_on_time
   use variations, only: neighbourhood_t, period_slope, vary

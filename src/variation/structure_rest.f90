@@ -10,7 +10,8 @@ module structure_rest
   use multibody_state, only: joint_motion, multibody_state_t, turning_at
   use kinds, only: wp
   use mode_flow, only: mode_flow_t
-  use structure, only: count_joints, mode_number, state_in, structure_t
+  use structure, only: state_in, structure_t
+  use structure_modes, only: count_joints, mode_number
   use structure_flight, only: flow_of, rate_slopes, rates
   implicit none
   private

@@ -13,7 +13,8 @@ module structure_walk
   use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
     event_impact_upper, event_release, event_separation, event_stick, event_touch_lower, event_touch_upper, event_turning_point, &
     reset_tally, state_t, tally_t
-  use structure, only: coordinates_of, count_joints, mode_number, settle, state_in, structure_t
+  use structure, only: coordinates_of, settle, state_in, structure_t
+  use structure_modes, only: count_joints, mode_number
   use transition_list, only: transition_t, transitions_t
   use turn_section, only: longest_return
   implicit none

@@ -13,7 +13,8 @@ import xarray as xr
 
 from separatrix.cases import Case, as_case
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
-from separatrix.maps import Values, basin
+from separatrix.map_axes import Values
+from separatrix.maps import basin
 from separatrix.measuring.api import NAMES, measures
 from separatrix.measuring.maps import indices_of
 from separatrix.open import open_result

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two bodies coupled by friction, by their short form and part by part: two programs, one physics."""
+"""Two bodies coupled by friction, by their short form and part by part, as an author would write it."""
 
 from pathlib import Path
 

@@ -21,10 +21,10 @@ from separatrix.discovery.decision.scoring import (
 )
 from separatrix.discovery.decision.verdict import _hump, _of_accepted
 from separatrix.discovery.fitting.ceiling import Ceiling, Family
+from separatrix.discovery.fitting.function_part import Part
 from separatrix.discovery.fitting.machine import drive_nuisances
 from separatrix.discovery.fitting.members import MEMBERS
 from separatrix.discovery.fitting.one_body import BodyInMotion
-from separatrix.discovery.fitting.smooth import Part
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded

@@ -22,6 +22,7 @@ from separatrix.discovery.fitting.curves import (
 )
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.function_part import Part, misfit_rows, series_part
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.refit import Fitted, gain_over
@@ -30,27 +31,6 @@ from separatrix.discovery.fitting.spline import roughness, smoothed
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 from separatrix.library import effects
-
-
-@dataclass
-class Part:
-    """A function by its values at knots, with their covariance, and the information of the records alone.
-
-    `information` and `gradient` are of a quadratic misfit about `centre`: d^T information d - 2 d^T gradient.
-    """
-
-    name: str
-    at: np.ndarray
-    value: np.ndarray
-    covariance: np.ndarray
-    information: np.ndarray
-    gradient: np.ndarray
-    centre: np.ndarray
-
-    @property
-    def error(self) -> np.ndarray:
-        """Standard errors of the values."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0))
 
 
 @dataclass
@@ -74,7 +54,7 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
         return None
     if not member.knots:
         # a series is its own function
-        return Function(member, [_series(fitted, member)], {}) if member.effect in fitted.names else None
+        return Function(member, [series_part(fitted, member)], {}) if member.effect in fitted.names else None
     if any(effects()[name].family == member.family for name in base.names):
         # another effect of the family contains a part of it
         return None
@@ -90,7 +70,7 @@ def function_of(data: Data, base: Fitted, fitted: Fitted) -> Function | None:
     if settled is None:
         return None
     parts, gain, freedom = settled
-    whole = [closed_forms(member.effect, one.at, one.value, *_alone(one)) for one in parts]
+    whole = [closed_forms(member.effect, one.at, one.value, *misfit_rows(one)) for one in parts]
     # with two directions a form must fit both; a constant beside an anchor is the machine without the effect
     forms = {
         name: one | {"fits": all(name in other and other[name]["fits"] for other in whole)}
@@ -392,32 +372,3 @@ class _Known:
     def promised(self, moved: np.ndarray) -> float:
         """Change of the squares where the function moves by so much."""
         return float(moved @ self.information @ moved - 2 * moved @ self.gradient) - self.alone
-
-
-def _alone(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of residuals whose squares are the misfit of a function to the records, and their zero.
-
-    Directions that the records do not determine are left out.
-    """
-    size = np.sqrt(np.maximum(np.diag(part.information), 1e-300))
-    values, vectors = np.linalg.eigh(part.information / np.outer(size, size))
-    kept = values > FIT.function_unknown * values[-1]
-    rows = (np.sqrt(values[kept])[:, None] * vectors[:, kept].T) * size
-    offset = (vectors[:, kept].T @ (part.gradient / size)) / np.sqrt(values[kept])
-    return rows, rows @ part.centre + offset
-
-
-def _series(fitted: Fitted, member: Member) -> Part:
-    """A series of harmonics by its values over a turn."""
-    at = np.linspace(0, 2 * np.pi, FIT.series_points)
-    paths = [one.path for one in fitted.problem.free]
-    columns, indices = [], []
-    for key, wave in zip(member.values, (np.cos, np.sin), strict=True):
-        for index, path in enumerate(paths):
-            if path.startswith(f"effect.{member.effect}.{key}["):
-                indices.append(index)
-                columns.append(wave(int(path.split("[")[1][:-1]) * at))
-    basis = np.column_stack(columns)
-    covariance = basis @ fitted.covariance[np.ix_(indices, indices)] @ basis.T
-    none = np.zeros((at.size, at.size))
-    return Part("", at, basis @ fitted.fit.values[indices], covariance, none, none[0], 0 * at)

@@ -24,7 +24,6 @@ BODY, CRANK = CRANKED = "body", "crank"
 """Coordinates of a machine with a motor."""
 # tables of a case that a base machine does not need
 _OF_RUNS = ("axis", "sweep", "record", "grid", "refine")
-_PAIR = "driving", "driven"
 
 
 @dataclass(frozen=True)
@@ -181,40 +180,12 @@ def _model(case: dict) -> Model:
 
 
 def pair_as_structure(model: Model) -> Model:
-    """A frictional pair written down joint by joint: bodies `driving` and `driven`."""
+    """Return a frictional pair as bodies and joints; one that no base machine can be is refused."""
     case = tomllib.loads(model.to_text({}))
-    body, drive, contact = case["body"], case["drive"], case["contact"]
-    driving, driven = _PAIR
-    if drive["law"] not in ("none", "force", "sine") or body.get("impulse"):
+    law, impulse = case["drive"]["law"], case["body"].get("impulse")
+    if law not in ("none", "force", "sine") or impulse:
         raise SeparatrixError(
-            f"drive.law: found {drive['law']}{' with an impulse' if body.get('impulse') else ''}, allowed "
-            "for a pair as "
+            f"drive.law: found {law}{' with an impulse' if impulse else ''}, allowed for a pair as "
             "base machine none, force, sine, without an impulse"
         )
-    made = {key: case[key] for key in ("title", "run", "integrator") if key in case}
-    made["body"] = {
-        driving: {"mass": body["mass"]},
-        driven: {"mass": body["driven_mass"]},
-    }
-    made["watch"] = {"body": driven}
-    made["start"] = case["start"]
-    if body["friction"]:
-        made["friction"] = {"interface": {"between": list(_PAIR), "force": body["friction"]}}
-    spring = {}
-    if case["restoring"]["law"] != "none":
-        spring = {key: case["restoring"][key] for key in ("stiffness", "free_length")}
-    if "damping" in case["friction"]:
-        spring["damping"] = case["friction"]["damping"]
-    if spring:
-        made["spring"] = {"frame": {"between": [driving], **spring}}
-    if contact["law"] != "none":
-        carried = body["law"] == "backlash_pair"
-        made["contact"] = {"stop": {"between": list(_PAIR) if carried else [driven], **contact}}
-    if drive["law"] == "force":
-        made["drive"] = {"force": {**drive, "law": "force", "body": driving}}
-    elif drive["law"] == "sine":
-        shaken = {"law": "motion", "body": driving, "frequency": drive["frequency"]}
-        made["drive"] = {"motion": {**shaken, "mean": drive.get("mean", 0.0), "sine": [drive["amplitude"]]}}
-    else:
-        made["body"][driving] |= {"x0": body["driver_x0"], "v0": body["driver_v0"]}
-    return _model(made)
+    return model.written_out()

@@ -5,6 +5,7 @@
 from separatrix.discovery.decision.stages.in_part import NEAREST
 from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.options import Options
+from separatrix.discovery.report.next_experiment import next_experiment
 from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.wording import (
     at_knot,
@@ -54,7 +55,7 @@ def sections(verdict: dict) -> list[Section]:
         Section("held-out", "On records that the fit never saw", [_held_out(verdict)]),
         _parameters(verdict),
         _detectable(verdict),
-        _experiment(verdict),
+        next_experiment(verdict),
         Section("motion", "What it means for the motion", []),
     ]
 
@@ -373,34 +374,3 @@ def _detectable(verdict: dict) -> Section:
         "What could not have been seen",
         [text, Table(["effect", "parameter", "smallest size", "why not known"], rows)],
     )
-
-
-def _experiment(verdict: dict) -> Section:
-    if verdict["separating_experiment"]:
-        faster = any(one["rate"] is not None for one in verdict["experiments"])
-        key = "rate" if faster else "drive_ratio"
-        rows = [
-            [
-                "-" if one[key] is None else number(one[key], 3),
-                number(one["scale"], 3),
-                number(one["d_prime"], 3),
-            ]
-            for one in verdict["experiments"]
-        ]
-        text = f"To separate what remains: {verdict['separating_experiment']}."
-        header = (
-            ["times as fast", "amplitude over that of the first record", "standard errors apart"]
-            if faster
-            else ["drive ratio", "drive (or start) over that of the first record", "standard errors apart"]
-        )
-        return Section("next", "What to measure next", [text, *([Table(header, rows)] if rows else [])])
-    elif verdict["outcome"] == "ambiguous":
-        text = (
-            "No experiment was found that would separate the candidates. Experiments are worked out for "
-            "one body, driven or free, without a force that must be measured."
-        )
-    elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
-        text = "The maps above show where to look for a law that the catalogue lacks."
-    else:
-        text = "Nothing stays ambiguous."
-    return Section("next", "What to measure next", [text])
