@@ -80,6 +80,15 @@ contains
     has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%name == 'friction:coulomb_load'
   end function has_load
 
+  !> The key of the expression that a law must have.
+  pure function text_key(choice) result(key)
+    type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: key
+    key = force_key(choice)
+    if (choice%family == 'contact') key = 'restitution'
+    if (choice%family == state_family) key = 'rate'
+  end function text_key
+
   !> The key of the expression of a force.
   pure function force_key(choice) result(key)
     type(law_choice_t), intent(in) :: choice
@@ -168,7 +177,7 @@ contains
       if (name == 'law' .or. any(choice%texts%key == name) .or. any(rows%name == name)) cycle
       if (any(choice%own%name == name) .or. (choice%family == 'drive' .and. (name == 'period' .or. name == 'position'))) cycle
       ! A text that should be there and is not one has been reported.
-      if (any(name == [character(len=11) :: 'force', 'load', 'rate', 'restitution']) .and. choice%family /= 'drive') cycle
+      if (name == text_key(choice) .and. choice%family /= 'drive') cycle
       if (scan(name, '.["') > 0 .or. name == 'between') cycle
       call read_parameter(source, i, name, choice)
     end do

@@ -85,7 +85,11 @@ module part_rows
     parameter_row_t('body', 'structure', 'in_sequence', '1', zero_to_one, &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other', &
                     optional=.true.), &
-    (parameter_row_t('part', bodies(i), 'mass', 'kg', positive, 'mass'), i=1, 2), &
+    (parameter_row_t('part', bodies(i), 'mass', 'kg', positive, 'mass; required, unless there is an inertia', &
+                     optional=.true., default=none_above), i=1, 2), &
+    (parameter_row_t('part', bodies(i), 'inertia', 'kg m^2', positive, &
+                     'moment of inertia of a body that turns: its positions are angles', optional=.true., &
+                     default=none_above), i=1, 2), &
     (parameter_row_t('part', bodies(i), 'load', 'N', any_value, 'constant force, a weight for instance', &
                      optional=.true.), i=1, 2), &
     parameter_row_t('part', bodies(2), 'x0', 'm', any_value, 'position at the start', optional=.true.), &

@@ -16,7 +16,7 @@ module build_multibody
   use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
     path_of, set_value, value_of
   use matrices, only: solve
-  use part_angles, only: names_of_angles
+  use part_angles, only: mass_of, names_of_angles
   use reference_points, only: add_structures, body_name, is_reference_point, name_coordinates, number, reference_point_of, row_of
   use status, only: exit_bad_case
   use waves, only: modulation_of, wave_of
@@ -131,7 +131,7 @@ contains
     integer :: i
     do i = 1, size(choices)
       if (index(choices(i)%name, 'body:') /= 1) cycle
-      call add_body(machine, body_name(choices(i), machine%n + 1), value_of(choices(i), 'mass'), value_of(choices(i), 'load'))
+      call add_body(machine, body_name(choices(i), machine%n + 1), mass_of(choices(i)), value_of(choices(i), 'load'))
       if (choices(i)%name == 'body:watched') then
         machine%watched = machine%n
       else
@@ -249,7 +249,7 @@ contains
     do k = 1, size(choices)
       if (index(choices(k)%name, 'body:') /= 1) cycle
       body = body + 1
-      row = row + value_of(choices(k), 'mass')*rows(:, body)
+      row = row + mass_of(choices(k))*rows(:, body)
     end do
     call add_own_force(machine, choices, i, row, rows, error)
   end subroutine add_base
