@@ -71,6 +71,7 @@ contains
     end select
     call read_parameters(source, choice)
     if (has_load(choice) .or. choice%family == part_family) call refuse_unnamed(source, choice)
+    if (choice%name == 'drive:motion') call refuse_series(source, choice)
     if (choice%family == state_family .and. all(choice%own%name /= 'start')) call add_own(choice, 'start', '1', 0.0_wp)
   end subroutine read_own_law
 
@@ -95,8 +96,21 @@ contains
     character(len=:), allocatable :: key
     key = 'force'
     if (has_load(choice)) key = 'load'
-    if (choice%name == 'drive:base') key = 'position'
+    if (choice%name == 'drive:base' .or. choice%name == 'drive:motion') key = 'position'
   end function force_key
+
+  !> A motion is an expression or a series.
+  subroutine refuse_series(source, choice)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), parameter :: keys(6) = [character(len=9) :: 'mean', 'amplitude', 'angle', 'cosine', 'sine', 'record']
+    character(len=:), allocatable :: path
+    integer :: i
+    do i = 1, size(keys)
+      path = path_of(choice)//'.'//trim(keys(i))
+      if (find(source, path) > 0) call report(source, path, 'found beside a position, allowed one or the other')
+    end do
+  end subroutine refuse_series
 
   !> Beside keys of the catalogue a parameter that no expression names is a misspelt key.
   subroutine refuse_unnamed(source, choice)

@@ -206,7 +206,8 @@ contains
       call read_own_law(source, choice)
       if (value_of(choice, 'static_coefficient') < 0) call set_value(choice, 'static_coefficient', &
                                                                       [value_of(choice, 'kinetic_coefficient')])
-    else if (part_law(choice%name) == own_law .or. choice%name == 'drive:base') then
+    else if (part_law(choice%name) == own_law .or. choice%name == 'drive:base' .or. &
+             (choice%name == 'drive:motion' .and. find(source, path//'.position') > 0)) then
       call read_own_law(source, choice)
     else if (part_kind(choice%name) == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.

@@ -73,7 +73,7 @@ module part_rows
               'Monjaraz-Tec, Gross, Krack, J. Vib. Acoust. 144 (2022)'), &
     (law_row_t('part', 'contact:'//other_contacts(i)%name, other_contacts(i)%meaning, other_contacts(i)%source), i=1, 12), &
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
-    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
+    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + series, or any `position`', ''), &
     law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
     law_row_t('part', drives(4), 'impulse on a body at a time after the start', ''), &
     law_row_t('part', drives(5), 'any force on a body, an expression `force` [N] of t, phase, x, v, NAME.x', ''), &

@@ -55,16 +55,17 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(names_t) :: names
     character(len=:), allocatable :: key, text, wanted
-    logical :: is_load, is_base
+    logical :: is_load, is_base, of_time
     integer :: node
     is_load = index(choices(i)%name, 'friction:') == 1
     is_base = choices(i)%name == 'drive:base'
+    of_time = is_base .or. choices(i)%name == 'drive:motion'
     text = 'force'
     if (is_load) text = 'load'
-    if (is_base) text = 'position'
+    if (of_time) text = 'position'
     key = path_of(choices(i))//'.'//text
     text = text_of(choices(i), text)
-    wanted = unit_of('N', is_of_angle(choices, i))
+    wanted = unit_of(merge('m', 'N', of_time), is_of_angle(choices, i))
     if (is_base) wanted = unit_of('m', size(machine%angles) > 0)
     allocate (joint%load)
     associate (load => joint%load)
@@ -72,11 +73,11 @@ contains
       allocate (names%names(0), names%nodes(0), names%of_variables(0), names%of_parameters(0), load%sources(0), load%parameters(0))
       allocate (load%rates(0))
       call add_clock(machine, load, names)
-      if (.not. (is_load .or. is_base)) call add_own_coordinate(joint%row, is_of_angle(choices, i), load, names)
-      if (.not. is_base) call add_coordinates(choices, text, rows, load, names)
+      if (.not. (is_load .or. of_time)) call add_own_coordinate(joint%row, is_of_angle(choices, i), load, names)
+      if (.not. of_time) call add_coordinates(choices, text, rows, load, names)
       call add_parameters(choices, i, load, names)
-      if (.not. is_base) call add_springs(choices, text, rows, load, names)
-      if (.not. is_base) call add_contacts(choices, text, rows, load, names, error)
+      if (.not. of_time) call add_springs(choices, text, rows, load, names)
+      if (.not. of_time) call add_contacts(choices, text, rows, load, names, error)
       if (allocated(error)) then
         error%message = key//': '//error%message
         return

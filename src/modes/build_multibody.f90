@@ -14,12 +14,12 @@ module build_multibody
     together_newton, together_sequence, wave_t
   use kinds, only: real64, wp
   use law_table, only: effect_family, law_choice, law_choice_t, list_of, parameter_row_t, parameters_of, part_family, part_law, &
-    path_of, set_value, value_of
+    path_of, set_value, text_of, value_of
   use matrices, only: solve
   use part_angles, only: mass_of, names_of_angles
   use reference_points, only: add_structures, body_name, is_reference_point, name_coordinates, number, reference_point_of, row_of
   use status, only: exit_bad_case
-  use waves, only: modulation_of, wave_of
+  use waves, only: modulation_of, wave_of, wave_of_load
   implicit none
   private
 
@@ -80,7 +80,9 @@ contains
     end do
     do i = 1, size(choices)
       if (choices(i)%name /= 'drive:motion') cycle
-      call give_motion(machine, trim(machine%names(coordinate(reference_point_of(choices(i))))), wave_of(choices(i)))
+      call find_motion(machine, choices, i, rows, wave, error)
+      if (allocated(error)) return
+      call give_motion(machine, trim(machine%names(coordinate(reference_point_of(choices(i))))), wave)
     end do
     associate (given => given_of(choices, coordinate))
       call add_controllers(choices, rows, given, machine, error)
@@ -169,7 +171,8 @@ contains
   !> Whether a drive is more than its mean.
   pure logical function varies(choice)
     type(law_choice_t), intent(in) :: choice
-    varies = .false.
+    varies = choice%name == 'drive:motion' .and. len(text_of(choice, 'position')) > 0
+    if (varies) return
     if (any(choice%name == [character(len=16) :: 'drive:expression', 'drive:base'])) return
     varies = abs(value_of(choice, 'amplitude')) > 0 .or. size(list_of(choice, 'cosine')) + size(list_of(choice, 'sine')) > 0
   end function varies
@@ -253,6 +256,31 @@ contains
     end do
     call add_own_force(machine, choices, i, row, rows, error)
   end subroutine add_base
+
+  !> The given motion of choice number `i`, a series or an expression.
+  pure subroutine find_motion(machine, choices, i, rows, wave, error)
+    type(multibody_t), intent(in) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: rows(:, :)
+    type(wave_t), intent(out) :: wave
+    type(error_t), allocatable, intent(out) :: error
+    type(joint_t) :: joint
+    character(len=:), allocatable :: problem
+    if (len(text_of(choices(i), 'position')) == 0) then
+      wave = wave_of(choices(i))
+      return
+    end if
+    call set_expression(choices, i, rows, machine, joint, error)
+    if (allocated(error)) return
+    if (joint%load%by_clock) then
+      problem = 'found a motion that does not repeat with the period of the drive, allowed one that does; that of the ground '// &
+                '(law = "base") may be any'
+    else
+      call wave_of_load(joint%load, machine%frequency, wave, problem)
+    end if
+    if (allocated(problem)) call fail(error, exit_bad_case, path_of(choices(i))//'.position: '//problem)
+  end subroutine find_motion
 
   !> Friction of any law: dry, with a normal force of its own, or with memory.
   pure subroutine add_any_friction(machine, choices, i, rows, error)
