@@ -120,7 +120,11 @@ contains
       if (.not. found) return
       rows = rows_of(laws(law))
       if (laws(law)%family == part_family) then
-        bounds = row_bounds(rows(row), is_of_angle(laws, law))
+        if (is_of_position(rows(row))) then
+          bounds = row_bounds(rows(row), is_of_angle(laws, law))
+        else
+          bounds = row_bounds(rows(row), is_of_angle(laws, law, by_inertia=.true.))
+        end if
       else
         bounds = row_bounds(rows(row), position_is_angle(laws))
       end if

@@ -97,7 +97,7 @@ contains
     do i = 1, size(choices)
       if (choices(i)%family /= part_family .or. .not. any(kinds_of_parts == part_kind(choices(i)%name))) cycle
       if (is_joint(choices(i))) call refuse_unlike(source, choices, i)
-      call read_values(source, bodies, is_of_angle(choices, i), choices(i))
+      call read_values(source, bodies, is_of_angle(choices, i), is_of_angle(choices, i, .true.), choices(i))
     end do
   end subroutine read_parts
 
@@ -183,11 +183,11 @@ contains
     choices = [choices, choice]
   end subroutine add_part
 
-  !> The values of a part, in units of an angle if it turns.
-  subroutine read_values(source, bodies, is_angle, choice)
+  !> The values of a part; its positions are angles, and it turns, or not.
+  subroutine read_values(source, bodies, is_angle, turning, choice)
     type(case_source_t), intent(inout) :: source
     type(bodies_t), intent(in) :: bodies
-    logical, intent(in) :: is_angle
+    logical, intent(in) :: is_angle, turning
     type(law_choice_t), intent(inout) :: choice
     type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: path, unit
@@ -200,7 +200,7 @@ contains
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
       if (is_hidden(rows(i)) .or. (from_record .and. .not. is_of_position(rows(i)))) cycle
-      call take_row(source, path, rows(i), is_angle, choice%parameters(i)%values)
+      call take_row(source, path, rows(i), merge(is_angle, turning, is_of_position(rows(i))), choice%parameters(i)%values)
     end do
     if (choice%name == 'friction:coulomb_load') then
       call read_own_law(source, choice)
@@ -212,7 +212,7 @@ contains
     else if (part_kind(choice%name) == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.
       if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then
-        unit = unit_of('N', is_angle)
+        unit = unit_of('N', turning)
         call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))//' '//unit// &
                     ', allowed at least the force')
       end if

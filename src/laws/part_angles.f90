@@ -14,9 +14,11 @@ module part_angles
 
 contains
 
-  !> For each reference point, bodies and points of structures in the order of the choices, whether its position is an angle.
-  pure function are_angles(choices) result(angles)
+  !> For each reference point, bodies and points of structures in the order of the choices, whether its position is an angle;
+  !> `by_inertia`: that of a body with an inertia, or joined to one.
+  pure function are_angles(choices, by_inertia) result(angles)
     type(law_choice_t), intent(in) :: choices(:)
+    logical, intent(in), optional :: by_inertia
     logical, allocatable :: angles(:), before(:)
     integer :: ends(2), i, round
     allocate (angles(0))
@@ -29,7 +31,7 @@ contains
         if (.not. is_joint(choices(i))) cycle
         ends = nint([value_of(choices(i), 'first_end'), value_of(choices(i), 'second_end')])
         if (any(ends > size(angles))) cycle
-        if (choices(i)%name == 'spring:pendulum') then
+        if (choices(i)%name == 'spring:pendulum' .and. .not. present(by_inertia)) then
           angles(pack(ends, ends > 0)) = .true.
         else if (all(ends > 0)) then
           angles(ends) = any(angles(ends))
@@ -48,13 +50,15 @@ contains
     names = pack(names, are_angles(choices))
   end function names_of_angles
 
-  !> Whether the positions that a part (number `part` of the choices) has or acts on are angles.
-  pure logical function is_of_angle(choices, part)
+  !> Whether the positions that a part (number `part` of the choices) has or acts on are angles. With `by_inertia`, whether all its
+  !> units are those of rotation: beside a pendulum masses may stand for inertias.
+  pure logical function is_of_angle(choices, part, by_inertia)
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: part
+    logical, intent(in), optional :: by_inertia
     logical, allocatable :: angles(:)
     integer :: ends(2), i
-    angles = are_angles(choices)
+    angles = are_angles(choices, by_inertia)
     ends = 0
     if (is_reference_point(choices(part))) then
       ends(1) = count([(is_reference_point(choices(i)), i=1, part)])
