@@ -10,7 +10,7 @@ module case_echo
   use grid, only: sample_axis
   use kinds, only: wp
   use law_table, only: effect_family, is_hidden, label_length, law_choice_t, list_of, parameter_row_t, rows_of, part_family, &
-    part_kind, part_law, path_of, value_of
+    part_kind, part_law, path_of, text_of, value_of
   use refinement, only: refine_t
   use motor_choices, only: has_motor
   use text, only: to_text
@@ -153,6 +153,9 @@ contains
     do i = 1, size(rows)
       if (law%family == part_family .and. is_hidden(rows(i))) cycle
       if (rows(i)%name == 'ratio' .and. has_motor(laws)) cycle
+      ! A motion by an expression has no series.
+      if (law%name == 'drive:motion' .and. len(text_of(law, 'position')) > 0 .and. &
+          any(rows(i)%name == [character(len=9) :: 'mean', 'amplitude', 'angle'])) cycle
       associate (values => law%parameters(i)%values)
         if (rows(i)%list) then
           if (size(values) > 0 .or. law%family /= part_family) text = text//line(trim(rows(i)%name), reals(values))

@@ -12,7 +12,7 @@ module case_parameters
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, rows_of, &
     part_family, path_of, split_element
   use motor_choices, only: has_motor
-  use part_angles, only: is_of_angle
+  use part_angles, only: is_of_angle, turns
   use restoring_law, only: position_is_angle
   use status, only: exit_bad_case
   use text, only: to_text
@@ -65,12 +65,17 @@ contains
     end do
   end subroutine find_parameter
 
-  !> Whether law number `i` goes without the parameter: a drive has a ratio or a frequency, and a motor sets the speed of its crank.
+  !> Whether law number `i` goes without the parameter: a body has a mass or an inertia, a drive a ratio or a frequency, and a motor
+  !> sets the speed of its crank.
   pure logical function is_left_out(laws, i, name)
     type(law_choice_t), intent(in) :: laws(:)
     integer, intent(in) :: i
     character(len=*), intent(in) :: name
     is_left_out = .false.
+    if (any(laws(i)%name == [character(len=12) :: 'body:watched', 'body:mass'])) then
+      is_left_out = name == trim(merge('mass   ', 'inertia', turns(laws(i))))
+      return
+    end if
     if (.not. (moves_foot(laws(i)%name) .and. is_speed(name))) return
     ! Neither is given where the value of one of them is refused.
     is_left_out = has_motor(laws)
@@ -84,7 +89,7 @@ contains
     type(parameter_row_t), intent(in) :: row
     logical, intent(in) :: is_angle
     row_bounds = bounds_t(lower=row%range%lower, upper=row%range%upper, lower_open=row%range%lower_open, unit=row%unit)
-    if (is_of_position(row)) row_bounds%unit = unit_of(row%unit, is_angle)
+    if (is_of_position(row) .or. row%family == part_family) row_bounds%unit = unit_of(row%unit, is_angle)
   end function row_bounds
 
   !> Whether a parameter is a position or a velocity.
@@ -115,7 +120,11 @@ contains
       if (.not. found) return
       rows = rows_of(laws(law))
       if (laws(law)%family == part_family) then
-        bounds = row_bounds(rows(row), is_of_angle(laws, law))
+        if (is_of_position(rows(row))) then
+          bounds = row_bounds(rows(row), is_of_angle(laws, law))
+        else
+          bounds = row_bounds(rows(row), is_of_angle(laws, law, by_inertia=.true.))
+        end if
       else
         bounds = row_bounds(rows(row), position_is_angle(laws))
       end if

@@ -14,7 +14,7 @@ module law_reader
   use part_reader, only: has_parts, read_parts
   use law_row, only: law_length
   use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, motor_family, own_law, &
-    parameter_row_t, parameters_of, set_value, table_of
+    parameter_row_t, parameters_of, part_family, set_value, table_of
   use pair_rows, only: pair_laws
   use restoring_law, only: position_is_angle
   use row_reader, only: take_row
@@ -122,7 +122,7 @@ contains
       call report(source, family//'.law', 'missing, allowed '//names)
       call know_all_below(source, family)
     else if (find_law(family, name) == 0) then
-      call report(source, family//'.law', 'found "'//name//'"'//hint(family, name)//', allowed '//names)
+      call report(source, family//'.law', 'found "'//name//'"'//hint(family, name)//', allowed '//names//of_parts(family, name))
       call know_all_below(source, family)
     else if (.not. goes_with(family, name, body)) then
       ! Before its keys, which would be in vain.
@@ -165,6 +165,14 @@ contains
       goes_with = law == 'linear'
     end if
   end function goes_with
+
+  !> Where a law that one body does not have is allowed: between parts.
+  pure function of_parts(family, name) result(text)
+    character(len=*), intent(in) :: family, name
+    character(len=:), allocatable :: text
+    text = ''
+    if (find_law(part_family, family//':'//name) > 0) text = '; '//name//' in ['//family//'.NAME] beside [body.NAME]'
+  end function of_parts
 
   !> The laws of a family that a body can have, for messages.
   pure function laws_beside(family, body) result(names)

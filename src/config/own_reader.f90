@@ -71,6 +71,7 @@ contains
     end select
     call read_parameters(source, choice)
     if (has_load(choice) .or. choice%family == part_family) call refuse_unnamed(source, choice)
+    if (choice%name == 'drive:motion') call refuse_series(source, choice)
     if (choice%family == state_family .and. all(choice%own%name /= 'start')) call add_own(choice, 'start', '1', 0.0_wp)
   end subroutine read_own_law
 
@@ -80,14 +81,36 @@ contains
     has_load = (choice%family == 'friction' .and. choice%name /= own_law) .or. choice%name == 'friction:coulomb_load'
   end function has_load
 
+  !> The key of the expression that a law must have.
+  pure function text_key(choice) result(key)
+    type(law_choice_t), intent(in) :: choice
+    character(len=:), allocatable :: key
+    key = force_key(choice)
+    if (choice%family == 'contact') key = 'restitution'
+    if (choice%family == state_family) key = 'rate'
+  end function text_key
+
   !> The key of the expression of a force.
   pure function force_key(choice) result(key)
     type(law_choice_t), intent(in) :: choice
     character(len=:), allocatable :: key
     key = 'force'
     if (has_load(choice)) key = 'load'
-    if (choice%name == 'drive:base') key = 'position'
+    if (choice%name == 'drive:base' .or. choice%name == 'drive:motion') key = 'position'
   end function force_key
+
+  !> A motion is an expression or a series.
+  subroutine refuse_series(source, choice)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), parameter :: keys(6) = [character(len=9) :: 'mean', 'amplitude', 'angle', 'cosine', 'sine', 'record']
+    character(len=:), allocatable :: path
+    integer :: i
+    do i = 1, size(keys)
+      path = path_of(choice)//'.'//trim(keys(i))
+      if (find(source, path) > 0) call report(source, path, 'found beside a position, allowed one or the other')
+    end do
+  end subroutine refuse_series
 
   !> Beside keys of the catalogue a parameter that no expression names is a misspelt key.
   subroutine refuse_unnamed(source, choice)
@@ -168,7 +191,7 @@ contains
       if (name == 'law' .or. any(choice%texts%key == name) .or. any(rows%name == name)) cycle
       if (any(choice%own%name == name) .or. (choice%family == 'drive' .and. (name == 'period' .or. name == 'position'))) cycle
       ! A text that should be there and is not one has been reported.
-      if (any(name == [character(len=11) :: 'force', 'load', 'rate', 'restitution']) .and. choice%family /= 'drive') cycle
+      if (name == text_key(choice) .and. choice%family /= 'drive') cycle
       if (scan(name, '.["') > 0 .or. name == 'between') cycle
       call read_parameter(source, i, name, choice)
     end do

@@ -4,6 +4,7 @@
 !> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME],
 !> [contact.NAME], [drive.NAME] and [watch].
 module part_reader
+  use angle_units, only: unit_of
   use case_parameters, only: is_of_position
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_text
@@ -11,7 +12,7 @@ module part_reader
   use kinds, only: wp
   use law_table, only: find_law, is_hidden, label_length, law_choice, law_choice_t, laws, own_law, parameter_row_t, parameters, &
     parameters_of, part_family, part_kind, part_law, path_of, set_value, value_of
-  use part_angles, only: is_of_angle
+  use part_angles, only: is_joint, is_of_angle, turns
   use own_reader, only: read_own_law
   use part_names, only: check_columns, check_names, ground, names_of
   use row_reader, only: take_row
@@ -36,7 +37,7 @@ module part_reader
 
 contains
 
-  !> Whether a case has tables [body.NAME] or [structure.NAME]. A body may have the name of a key of [body]: it has a mass.
+  !> Whether a case has tables [body.NAME] or [structure.NAME]. A body may have the name of a key of [body]: it has a mass or an inertia.
   pure logical function has_parts(source)
     type(case_source_t), intent(in) :: source
     character(len=label_length), allocatable :: names(:)
@@ -45,6 +46,7 @@ contains
     names = names_of(source, 'body')
     do i = 1, size(names)
       has_parts = has_parts .or. find(source, 'body.'//trim(names(i))//'.mass') > 0
+      has_parts = has_parts .or. find(source, 'body.'//trim(names(i))//'.inertia') > 0
       if (.not. any(parameters%family == 'body' .and. parameters%name == names(i))) has_parts = .true.
     end do
     if (size(names_of(source, 'structure')) > 0) has_parts = .true.
@@ -84,7 +86,7 @@ contains
       if (i > 1) call refuse_keys(source, trim(kinds_of_parts(i)))
       if (i > 1) call check_names(source, trim(kinds_of_parts(i)), names)
       do k = 1, size(names)
-        call read_part(source, trim(kinds_of_parts(i)), trim(default_law(i)), trim(names(k)), watched, bodies, choices)
+        call add_part(source, trim(kinds_of_parts(i)), trim(default_law(i)), trim(names(k)), watched, bodies, choices)
       end do
       if (i > 1) cycle
       do k = 1, size(structures)
@@ -92,26 +94,12 @@ contains
       end do
       choices = [choices, structures]
     end do
-    call read_reference_points(source, choices)
-  end subroutine read_parts
-
-  !> Positions and velocities of the parts, once all joints determine which of them are angles.
-  subroutine read_reference_points(source, choices)
-    type(case_source_t), intent(inout) :: source
-    type(law_choice_t), intent(inout) :: choices(:)
-    type(parameter_row_t), allocatable :: rows(:)
-    logical :: is_angle
-    integer :: i, k
     do i = 1, size(choices)
       if (choices(i)%family /= part_family .or. .not. any(kinds_of_parts == part_kind(choices(i)%name))) cycle
-      rows = parameters_of(choices(i)%family, choices(i)%name)
-      is_angle = is_of_angle(choices, i)
-      do k = 1, size(rows)
-        if (is_hidden(rows(k)) .or. .not. is_of_position(rows(k))) cycle
-        call take_row(source, path_of(choices(i)), rows(k), is_angle, choices(i)%parameters(k)%values)
-      end do
+      if (is_joint(choices(i))) call refuse_unlike(source, choices, i)
+      call read_values(source, bodies, is_of_angle(choices, i), is_of_angle(choices, i, .true.), choices(i))
     end do
-  end subroutine read_reference_points
+  end subroutine read_parts
 
   !> Keys of a table without the name of a part, as one body has them.
   subroutine refuse_keys(source, kind)
@@ -160,16 +148,15 @@ contains
     if (len(meant) > 0) text = ' (did you mean "'//meant//'"?)'
   end function hint
 
-  subroutine read_part(source, kind, default, name, watched, bodies, choices)
+  !> Appends a part with the bodies it acts on. Its values are read once all joints determine what turns.
+  subroutine add_part(source, kind, default, name, watched, bodies, choices)
     type(case_source_t), intent(inout) :: source
     character(len=*), intent(in) :: kind, default, name, watched
     type(bodies_t), intent(in) :: bodies
     type(law_choice_t), allocatable, intent(inout) :: choices(:)
     type(law_choice_t) :: choice
-    type(parameter_row_t), allocatable :: rows(:)
     character(len=:), allocatable :: law, path
-    integer :: i
-    logical :: found, from_record
+    logical :: found
     path = kind//'.'//name
     call enter_table(source, path, found)
     law = default
@@ -191,31 +178,76 @@ contains
     choice = law_choice(part_family, kind//':'//law)
     choice%label = name
     if (kind == 'drive' .and. law /= 'base') call read_body(source, path, bodies, choice)
+    if (kind == 'body' .and. find(source, path//'.inertia') > 0) call set_value(choice, 'inertia', [1.0_wp])
+    if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
+    choices = [choices, choice]
+  end subroutine add_part
+
+  !> The values of a part; its positions are angles, and it turns, or not.
+  subroutine read_values(source, bodies, is_angle, turning, choice)
+    type(case_source_t), intent(inout) :: source
+    type(bodies_t), intent(in) :: bodies
+    logical, intent(in) :: is_angle, turning
+    type(law_choice_t), intent(inout) :: choice
+    type(parameter_row_t), allocatable :: rows(:)
+    character(len=:), allocatable :: path, unit
+    integer :: i
+    logical :: from_record
+    path = path_of(choice)
+    if (part_kind(choice%name) == 'body') call check_mass(source, path)
     from_record = .false.
     if (choice%name == 'drive:force' .or. choice%name == 'drive:motion') call read_record(source, path, choice, from_record)
-    if (kind /= 'drive' .and. kind /= 'body') call read_ends(source, path, bodies, choice)
     rows = parameters_of(choice%family, choice%name)
     do i = 1, size(rows)
-      if (is_hidden(rows(i)) .or. from_record .or. is_of_position(rows(i))) cycle
-      call take_row(source, path, rows(i), .false., choice%parameters(i)%values)
+      if (is_hidden(rows(i)) .or. (from_record .and. .not. is_of_position(rows(i)))) cycle
+      call take_row(source, path, rows(i), merge(is_angle, turning, is_of_position(rows(i))), choice%parameters(i)%values)
     end do
     if (choice%name == 'friction:coulomb_load') then
       call read_own_law(source, choice)
       if (value_of(choice, 'static_coefficient') < 0) call set_value(choice, 'static_coefficient', &
                                                                       [value_of(choice, 'kinetic_coefficient')])
-    else if (part_law(choice%name) == own_law .or. choice%name == 'drive:base') then
+    else if (part_law(choice%name) == own_law .or. choice%name == 'drive:base' .or. &
+             (choice%name == 'drive:motion' .and. find(source, path//'.position') > 0)) then
       call read_own_law(source, choice)
-    else if (kind == 'friction' .and. any(rows%name == 'static_force')) then
+    else if (part_kind(choice%name) == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.
       if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then
-        call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))// &
-                    ' N, allowed at least the force')
+        unit = unit_of('N', turning)
+        call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))//' '//unit// &
+                    ', allowed at least the force')
       end if
       if (value_of(choice, 'static_force') < 0) call set_value(choice, 'static_force', [value_of(choice, 'force')])
     end if
     if (choice%name == 'contact:massless') call set_flexibility(source, path, bodies, choice)
-    choices = [choices, choice]
-  end subroutine read_part
+  end subroutine read_values
+
+  !> A body has a mass, or an inertia if it turns.
+  subroutine check_mass(source, path)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path
+    logical :: found(2)
+    found = [find(source, path//'.mass') > 0, find(source, path//'.inertia') > 0]
+    if (all(found)) call report(source, path//'.inertia', 'found beside a mass, allowed one of them')
+    if (.not. any(found)) call report(source, path//'.mass', 'missing, allowed a mass, or an inertia of a body that turns', &
+                                      missing=.true.)
+  end subroutine check_mass
+
+  !> A joint takes the difference of two angles, or of two positions.
+  subroutine refuse_unlike(source, choices, joint)
+    type(case_source_t), intent(inout) :: source
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: joint
+    integer, allocatable :: points(:)
+    integer :: ends(2), i
+    points = pack([(i, i=1, size(choices))], index(choices%name, 'body:') == 1 .or. index(choices%name, 'point:') == 1)
+    ends = nint([value_of(choices(joint), 'first_end'), value_of(choices(joint), 'second_end')])
+    if (any(ends < 1) .or. any(ends > size(points))) return
+    associate (first => choices(points(ends(1))), second => choices(points(ends(2))))
+      if (any(index([first%name, second%name], 'body:') /= 1)) return
+      if (turns(first) .neqv. turns(second)) call report(source, path_of(choices(joint))//'.between', 'found a body with an '// &
+        'inertia and one with a mass, allowed two of a kind: an expression between each and the ground can have lever arms')
+    end associate
+  end subroutine refuse_unlike
 
   !> A matrix as the last block on the diagonal of another.
   pure subroutine append_block(matrix, block)

@@ -14,13 +14,13 @@ module units
   !> A spelling of a unit: SI value = number*multiplier/divisor. Dividing by a power of ten keeps
   !> "12.5 mm" equal to 0.0125 to the bit.
   type :: unit_row_t
-    character(len=8) :: spelling
+    character(len=10) :: spelling
     !> The SI unit that names the dimension.
-    character(len=6) :: si
+    character(len=9) :: si
     real(wp) :: multiplier, divisor
   end type unit_row_t
 
-  type(unit_row_t), parameter :: rows(56) = [ &
+  type(unit_row_t), parameter :: rows(69) = [ &
     unit_row_t('m', 'm', 1.0_wp, 1.0_wp), &
     unit_row_t('mm', 'm', 1.0_wp, 1e3_wp), &
     unit_row_t('cm', 'm', 1.0_wp, 1e2_wp), &
@@ -54,6 +54,7 @@ module units
     unit_row_t('N/mm', 'N/m', 1e3_wp, 1.0_wp), &
     unit_row_t('kN/m', 'N/m', 1e3_wp, 1.0_wp), &
     unit_row_t('mN/m', 'N/m', 1.0_wp, 1e3_wp), &
+    unit_row_t('MN/m', 'N/m', 1e6_wp, 1.0_wp), &
     unit_row_t('N s/m', 'N s/m', 1.0_wp, 1.0_wp), &
     unit_row_t('Ns/m', 'N s/m', 1.0_wp, 1.0_wp), &
     unit_row_t('N s/mm', 'N s/m', 1e3_wp, 1.0_wp), &
@@ -63,10 +64,22 @@ module units
     unit_row_t('N', 'N', 1.0_wp, 1.0_wp), &
     unit_row_t('mN', 'N', 1.0_wp, 1e3_wp), &
     unit_row_t('kN', 'N', 1e3_wp, 1.0_wp), &
+    unit_row_t('MN', 'N', 1e6_wp, 1.0_wp), &
     unit_row_t('rpm', 'rad/s', 2*pi, 60.0_wp), &
     unit_row_t('N m', 'N m', 1.0_wp, 1.0_wp), &
     unit_row_t('mN m', 'N m', 1.0_wp, 1e3_wp), &
     unit_row_t('kN m', 'N m', 1e3_wp, 1.0_wp), &
+    unit_row_t('deg/s', 'rad/s', pi, 180.0_wp), &
+    unit_row_t('mrad/s', 'rad/s', 1.0_wp, 1e3_wp), &
+    unit_row_t('N m/rad', 'N m/rad', 1.0_wp, 1.0_wp), &
+    unit_row_t('mN m/rad', 'N m/rad', 1.0_wp, 1e3_wp), &
+    unit_row_t('kN m/rad', 'N m/rad', 1e3_wp, 1.0_wp), &
+    unit_row_t('N m/deg', 'N m/rad', 180.0_wp, pi), &
+    unit_row_t('N m s/rad', 'N m s/rad', 1.0_wp, 1.0_wp), &
+    unit_row_t('kN m s/rad', 'N m s/rad', 1e3_wp, 1.0_wp), &
+    unit_row_t('N m s', 'N m s/rad', 1.0_wp, 1.0_wp), &
+    unit_row_t('N m s', 'N m s', 1.0_wp, 1.0_wp), &
+    unit_row_t('kg m^2/s', 'N m s', 1.0_wp, 1.0_wp), &
     unit_row_t('kg m^2', 'kg m^2', 1.0_wp, 1.0_wp), &
     unit_row_t('kg cm^2', 'kg m^2', 1.0_wp, 1e4_wp), &
     unit_row_t('g cm^2', 'kg m^2', 1.0_wp, 1e7_wp), &

@@ -10,8 +10,8 @@ module angle_units
 
 contains
 
-  !> The unit of a quantity of a motion, given as that of a position on a line: rad for m, rad/s for m/s and N m for N where the
-  !> position is an angle.
+  !> The unit of a quantity of a motion, given as that of a position on a line, where the position is an angle: rad for m, N m for
+  !> N, kg m^2 for kg.
   pure function unit_of(unit, is_angle) result(name)
     character(len=*), intent(in) :: unit
     logical, intent(in) :: is_angle
@@ -25,6 +25,26 @@ contains
       name = 'rad/s'
     case ('N')
       name = 'N m'
+    case ('kg')
+      name = 'kg m^2'
+    case ('N s')
+      name = 'N m s'
+    case ('N/m')
+      name = 'N m/rad'
+    case ('N/m^2')
+      name = 'N m/rad^2'
+    case ('N/m^3')
+      name = 'N m/rad^3'
+    case ('N/m^n')
+      name = 'N m/rad^n'
+    case ('N s/m')
+      name = 'N m s/rad'
+    case ('N s^2/m^2')
+      name = 'N m s^2/rad^2'
+    case ('N/(m s)')
+      name = 'N m/(rad s)'
+    case ('s/m')
+      name = 's/rad'
     end select
   end function unit_of
 

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Units composed of others by products, quotients and whole powers: 'N/m^3', 'kN s^2/m^2', '1/s'.
+!> Units composed of others by products, quotients and whole powers: 'N/m^3', 'kN s^2/m^2', '1/s'; also 'rpm'.
 module composed_units
   use constants, only: two_pi
   use kinds, only: wp
@@ -66,6 +66,11 @@ contains
     at = 1
     column = 0
     below = .false.
+    if (text == ' rpm' .or. text == 'rpm') then
+      ! Alone: a product with a quotient would be ambiguous.
+      unit = composed_unit_t('rad/s', two_pi, 60.0_wp, [0, 0, -1, 0, 0])
+      return
+    end if
     do
       do while (at <= len(text))
         if (text(at:at) /= ' ') exit

@@ -143,7 +143,7 @@ contains
     end do
   end subroutine warn_about_modes
 
-  !> Share of the upper half of the undamped modes in the mobility along a row.
+  !> Share of the upper half of the undamped modes in the mobility along a row. A rigid body has no more of its modes.
   function upper_share(machine, row) result(share)
     type(multibody_t), intent(in) :: machine
     real(wp), intent(in) :: row(:)
@@ -152,7 +152,8 @@ contains
     if (machine%n < 2) return
     call undamped_modes(machine%stiffness, machine%mass, squares, shapes)
     part = matmul(row, shapes)**2
-    share = sum(part((machine%n + 1)/2 + 1:))/sum(part)
+    where (squares <= 1e-12_wp*maxval(abs(squares))) part(:) = 0
+    share = sum(part((machine%n + 1)/2 + 1:))/max(sum(matmul(row, shapes)**2), tiny(share))
   end function upper_share
 
   !> Warns if a record of a force jumps where it begins again.

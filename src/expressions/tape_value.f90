@@ -105,6 +105,10 @@ contains
       branch_fault = max(fault(node%second), fault(node%third))
       branch_value = 0.5_wp*(value(node%second) + value(node%third))
     end if
+    ! A step that goes past the switch, as those do by which it is found, may leave where its branch is defined.
+    if (.not. present(branches) .or. branch_fault == 0 .or. side*value(argument) >= 0 .or. fault(argument) > 0) return
+    branch_fault = fault(merge(node%third, node%second, side > 0))
+    branch_value = value(merge(node%third, node%second, side > 0))
   end subroutine take_branch
 
   !> Sizes of what the nodes are sums of, for their rounding.

@@ -1,34 +1,43 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Which reference points of a machine of several bodies have an angle for a position: those that a pendulum acts on, and those
-!> joined to them, as a joint takes the difference of two positions.
+!> Which reference points of a machine of several bodies have an angle for a position: bodies with an inertia, those that
+!> a pendulum acts on, and those joined to them, as a joint takes the difference of two positions.
 module part_angles
+  use kinds, only: wp
+  use law_row, only: none_above
   use law_table, only: label_length, law_choice_t, part_family, value_of
   implicit none
   private
 
-  public :: is_of_angle, names_of_angles, watched_is_angle
+  public :: is_joint, is_of_angle, mass_of, names_of_angles, turns, watched_is_angle
 
 contains
 
-  !> For each reference point, bodies and points of structures in the order of the choices, whether its position is an angle.
-  pure function are_angles(choices) result(angles)
+  !> For each reference point, bodies and points of structures in the order of the choices, whether its position is an angle;
+  !> `by_inertia`: that of a body with an inertia, or joined to one.
+  pure function are_angles(choices, by_inertia) result(angles)
     type(law_choice_t), intent(in) :: choices(:)
-    logical, allocatable :: angles(:)
+    logical, intent(in), optional :: by_inertia
+    logical, allocatable :: angles(:), before(:)
     integer :: ends(2), i, round
-    allocate (angles(count([(is_reference_point(choices(i)), i=1, size(choices))])), source=.false.)
+    allocate (angles(0))
+    do i = 1, size(choices)
+      if (is_reference_point(choices(i))) angles = [angles, turns(choices(i))]
+    end do
     do round = 0, size(angles)
+      before = angles
       do i = 1, size(choices)
         if (.not. is_joint(choices(i))) cycle
         ends = nint([value_of(choices(i), 'first_end'), value_of(choices(i), 'second_end')])
         if (any(ends > size(angles))) cycle
-        if (choices(i)%name == 'spring:pendulum') then
+        if (choices(i)%name == 'spring:pendulum' .and. .not. present(by_inertia)) then
           angles(pack(ends, ends > 0)) = .true.
         else if (all(ends > 0)) then
           angles(ends) = any(angles(ends))
         end if
       end do
+      if (all(angles .eqv. before)) exit
     end do
   end function are_angles
 
@@ -41,13 +50,15 @@ contains
     names = pack(names, are_angles(choices))
   end function names_of_angles
 
-  !> Whether the positions that a part (number `part` of the choices) has or acts on are angles.
-  pure logical function is_of_angle(choices, part)
+  !> Whether the positions that a part (number `part` of the choices) has or acts on are angles. With `by_inertia`, whether all its
+  !> units are those of rotation: beside a pendulum masses may stand for inertias.
+  pure logical function is_of_angle(choices, part, by_inertia)
     type(law_choice_t), intent(in) :: choices(:)
     integer, intent(in) :: part
+    logical, intent(in), optional :: by_inertia
     logical, allocatable :: angles(:)
     integer :: ends(2), i
-    angles = are_angles(choices)
+    angles = are_angles(choices, by_inertia)
     ends = 0
     if (is_reference_point(choices(part))) then
       ends(1) = count([(is_reference_point(choices(i)), i=1, part)])
@@ -65,12 +76,25 @@ contains
     character(len=label_length), allocatable :: names(:)
     integer :: i
     is_angle = .false.
-    if (.not. any(choices%name == 'spring:pendulum')) return
+    if (.not. any([(choices(i)%name == 'spring:pendulum' .or. turns(choices(i)), i=1, size(choices))])) return
     names = names_of_angles(choices)
     do i = 1, size(choices)
       if (choices(i)%name == 'body:watched' .or. choices(i)%name == 'point:watched') is_angle = any(names == choices(i)%label)
     end do
   end function watched_is_angle
+
+  !> Whether a body has an inertia in place of a mass.
+  pure logical function turns(choice)
+    type(law_choice_t), intent(in) :: choice
+    turns = .false.
+    if (choice%name == 'body:watched' .or. choice%name == 'body:mass') turns = value_of(choice, 'inertia') < none_above
+  end function turns
+
+  !> Mass of a body [kg], or its moment of inertia [kg m^2].
+  pure real(wp) function mass_of(choice)
+    type(law_choice_t), intent(in) :: choice
+    mass_of = value_of(choice, trim(merge('inertia', 'mass   ', turns(choice))))
+  end function mass_of
 
   pure logical function is_reference_point(choice)
     type(law_choice_t), intent(in) :: choice

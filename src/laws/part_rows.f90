@@ -73,7 +73,7 @@ module part_rows
               'Monjaraz-Tec, Gross, Krack, J. Vib. Acoust. 144 (2022)'), &
     (law_row_t('part', 'contact:'//other_contacts(i)%name, other_contacts(i)%meaning, other_contacts(i)%source), i=1, 12), &
     law_row_t('part', drives(1), 'force on a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
-    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + Fourier series', ''), &
+    law_row_t('part', drives(2), 'given motion of a body: mean + amplitude cos(phi + angle) + series, or any `position`', ''), &
     law_row_t('part', drives(3), 'P e + I (integral of e) + D e'' on a body, e what it is short of such a motion', ''), &
     law_row_t('part', drives(4), 'impulse on a body at a time after the start', ''), &
     law_row_t('part', drives(5), 'any force on a body, an expression `force` [N] of t, phase, x, v, NAME.x', ''), &
@@ -85,7 +85,11 @@ module part_rows
     parameter_row_t('body', 'structure', 'in_sequence', '1', zero_to_one, &
                     'impacts of several contacts at once: 0 all together by one law, 1 one after the other', &
                     optional=.true.), &
-    (parameter_row_t('part', bodies(i), 'mass', 'kg', positive, 'mass'), i=1, 2), &
+    (parameter_row_t('part', bodies(i), 'mass', 'kg', positive, 'mass; required, unless there is an inertia', &
+                     optional=.true., default=none_above), i=1, 2), &
+    (parameter_row_t('part', bodies(i), 'inertia', 'kg m^2', positive, &
+                     'moment of inertia of a body that turns: its positions are angles', optional=.true., &
+                     default=none_above), i=1, 2), &
     (parameter_row_t('part', bodies(i), 'load', 'N', any_value, 'constant force, a weight for instance', &
                      optional=.true.), i=1, 2), &
     parameter_row_t('part', bodies(2), 'x0', 'm', any_value, 'position at the start', optional=.true.), &

@@ -6,16 +6,18 @@
 !> apart; contact.NAME, that of a soft contact; the parameters of its own table by their names, and those of every table by their
 !> paths.
 module build_load
+  use angle_units, only: unit_of
   use errors, only: error_t, fail
   use expression_names, only: has_name
   use expression_text, only: read_expression
   use kinds, only: wp
   use law_row, only: none_above
-  use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_kind, part_law, path_of, rows_of, text_of, &
-    value_of
+  use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_family, part_kind, part_law, &
+    path_of, rows_of, text_of, value_of
   use multibody, only: joint_t, load_t, multibody_t, source_t
   use operations, only: op_add, op_multiply, op_negative
   use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
+  use part_angles, only: is_of_angle
   use reference_points, only: is_reference_point, row_of
   use status, only: exit_bad_case
   use tape, only: constant, new_tape, parameter_node, variable
@@ -52,33 +54,36 @@ contains
     type(joint_t), intent(inout) :: joint
     type(error_t), allocatable, intent(out) :: error
     type(names_t) :: names
-    character(len=:), allocatable :: key, text
-    logical :: is_load, is_base
+    character(len=:), allocatable :: key, text, wanted
+    logical :: is_load, is_base, of_time
     integer :: node
     is_load = index(choices(i)%name, 'friction:') == 1
     is_base = choices(i)%name == 'drive:base'
+    of_time = is_base .or. choices(i)%name == 'drive:motion'
     text = 'force'
     if (is_load) text = 'load'
-    if (is_base) text = 'position'
+    if (of_time) text = 'position'
     key = path_of(choices(i))//'.'//text
     text = text_of(choices(i), text)
+    wanted = unit_of(merge('m', 'N', of_time), is_of_angle(choices, i))
+    if (is_base) wanted = unit_of('m', size(machine%angles) > 0)
     allocate (joint%load)
     associate (load => joint%load)
       call new_tape(load%tape)
       allocate (names%names(0), names%nodes(0), names%of_variables(0), names%of_parameters(0), load%sources(0), load%parameters(0))
       allocate (load%rates(0))
       call add_clock(machine, load, names)
-      if (.not. (is_load .or. is_base)) call add_own_coordinate(joint%row, load, names)
-      if (.not. is_base) call add_coordinates(choices, text, rows, load, names)
+      if (.not. (is_load .or. of_time)) call add_own_coordinate(joint%row, is_of_angle(choices, i), load, names)
+      if (.not. of_time) call add_coordinates(choices, text, rows, load, names)
       call add_parameters(choices, i, load, names)
-      if (.not. is_base) call add_springs(choices, text, rows, load, names)
-      if (.not. is_base) call add_contacts(choices, text, rows, load, names, error)
+      if (.not. of_time) call add_springs(choices, text, rows, load, names)
+      if (.not. of_time) call add_contacts(choices, text, rows, load, names, error)
       if (allocated(error)) then
         error%message = key//': '//error%message
         return
       end if
       call read_expression(text, names%names, names%nodes, load%tape, node, error)
-      if (.not. allocated(error)) call check_unit(machine, load, names, node, merge('m', 'N', is_base), error)
+      if (.not. allocated(error)) call check_unit(choices, load, names, node, wanted, error)
       if (is_base .and. .not. allocated(error)) call accelerate(machine, load, node, error)
       if (.not. allocated(error)) call check_values(is_load, load, node, error)
       if (allocated(error)) then
@@ -111,6 +116,7 @@ contains
     type(quantity_t) :: quantity
     quantity = parameter_unit(trim(unit))
     quantity%is_stated = .false.
+    if (unit == 'rad') quantity%is_known = .true.
     call variable(load%tape, size(load%rates) + 1, node)
     load%rates = [load%rates, rate]
     names%of_variables = [names%of_variables, quantity]
@@ -137,9 +143,15 @@ contains
     type(load_t), intent(inout) :: load
     type(names_t), intent(inout) :: names
     type(parameter_row_t), allocatable :: rows(:)
-    integer :: k, r, node
+    character(len=:), allocatable :: unit
+    integer :: k, r, node, count_own
+    logical :: turning
     do k = 1, size(choices)
       rows = rows_of(choices(k))
+      turning = choices(k)%family == part_family
+      if (turning) turning = is_of_angle(choices, k)
+      count_own = 0
+      if (allocated(choices(k)%own)) count_own = size(choices(k)%own)
       do r = 1, size(rows)
         if (rows(r)%list .or. is_hidden(rows(r))) cycle
         if (abs(choices(k)%parameters(r)%values(1)) >= none_above) cycle
@@ -147,7 +159,10 @@ contains
         call parameter_node(load%tape, size(load%parameters), node)
         call add_name(names, path_of(choices(k))//'.'//trim(rows(r)%name), node)
         if (k == i) call add_name(names, trim(rows(r)%name), node)
-        names%of_parameters = [names%of_parameters, parameter_unit(trim(rows(r)%unit))]
+        unit = trim(rows(r)%unit)
+        ! Those of an expression have units of their own.
+        if (r <= size(rows) - count_own) unit = unit_of(unit, turning)
+        names%of_parameters = [names%of_parameters, parameter_unit(unit)]
       end do
     end do
   end subroutine add_parameters
@@ -155,7 +170,7 @@ contains
   !> A source and its four variables; `nodes` are those of its value and rate.
   pure subroutine add_source(source, units, load, names, nodes)
     type(source_t), intent(in) :: source
-    character(len=*), intent(in) :: units(2)
+    character(len=5), intent(in) :: units(2)
     type(load_t), intent(inout) :: load
     type(names_t), intent(inout) :: names
     integer, intent(out) :: nodes(2)
@@ -164,7 +179,7 @@ contains
     call constant(load%tape, 0.0_wp, zero)
     first = size(load%rates)
     do i = 1, 4
-      call add_variable(load, names, zero, merge(units(min(i, 2)), '1  ', i <= 2), made(i))
+      call add_variable(load, names, zero, merge(units(min(i, 2)), '1    ', i <= 2), made(i))
     end do
     load%rates(first + 1:first + 3) = made(2:4)
     allocate (sources(size(load%sources) + 1))
@@ -177,17 +192,25 @@ contains
   end subroutine add_source
 
   !> The coordinate of the joint along `row`, second minus first, as x and v.
-  pure subroutine add_own_coordinate(row, load, names)
+  pure subroutine add_own_coordinate(row, is_angle, load, names)
     real(wp), intent(in) :: row(:)
+    logical, intent(in) :: is_angle
     type(load_t), intent(inout) :: load
     type(names_t), intent(inout) :: names
     type(source_t) :: source
     integer :: nodes(2)
     source%row = row
-    call add_source(source, ['m  ', 'm/s'], load, names, nodes)
+    call add_source(source, units_of_motion(is_angle), load, names, nodes)
     call add_name(names, 'x', nodes(1))
     call add_name(names, 'v', nodes(2))
   end subroutine add_own_coordinate
+
+  !> Units of a position and its velocity.
+  pure function units_of_motion(is_angle) result(units)
+    logical, intent(in) :: is_angle
+    character(len=5) :: units(2)
+    units = [character(len=5) :: unit_of('m', is_angle), unit_of('m/s', is_angle)]
+  end function units_of_motion
 
   !> Positions and velocities of the bodies and points that the text names.
   pure subroutine add_coordinates(choices, text, rows, load, names)
@@ -211,7 +234,7 @@ contains
         cycle
       end if
       source%row = rows(:, k)
-      call add_source(source, ['m  ', 'm/s'], load, names, nodes)
+      call add_source(source, units_of_motion(is_of_angle(choices, i)), load, names, nodes)
       call add_name(names, label//'.x', nodes(1))
       call add_name(names, label//'.v', nodes(2))
     end do
@@ -237,7 +260,7 @@ contains
       end if
       source%row = row_of(rows, choices(i))
       source%offset%mean = -value_of(choices(i), 'free_length')
-      call add_source(source, ['m  ', 'm/s'], load, names, at(:2))
+      call add_source(source, units_of_motion(is_of_angle(choices, i)), load, names, at(:2))
       numbers = [value_of(choices(i), 'stiffness'), 0.0_wp, 0.0_wp, value_of(choices(i), 'damping')]
       if (part_law(choices(i)%name) == 'polynomial') numbers(2:3) = [value_of(choices(i), 'quadratic'), &
                                                                      value_of(choices(i), 'cubic')]
@@ -274,14 +297,14 @@ contains
       end if
       source%row = row_of(rows, choices(i))
       source%contact = path_of(choices(i))
-      call add_source(source, ['N  ', 'N/s'], load, names, nodes)
+      call add_source(source, merge(['N m  ', 'N m/s'], ['N    ', 'N/s  '], is_of_angle(choices, i)), load, names, nodes)
       call add_name(names, path_of(choices(i)), nodes(1))
     end do
   end subroutine add_contacts
 
   !> The expression is in `unit`, if its parameters have units.
-  pure subroutine check_unit(machine, load, names, node, unit, error)
-    type(multibody_t), intent(in) :: machine
+  pure subroutine check_unit(choices, load, names, node, unit, error)
+    type(law_choice_t), intent(in) :: choices(:)
     type(load_t), intent(in) :: load
     type(names_t), intent(in) :: names
     integer, intent(in) :: node
@@ -290,7 +313,7 @@ contains
     type(quantity_t) :: quantity(load%tape%count)
     integer :: fault(load%tape%count)
     character(len=:), allocatable :: problem
-    if (size(machine%angles) > 0) return
+    if (any(choices%name == 'spring:pendulum')) return
     call quantities_of(load%tape, names%of_variables, names%of_parameters, quantity, fault)
     problem = unit_problem(load%tape, node, quantity, fault, unit)
     if (len(problem) > 0) call fail(error, exit_bad_case, problem)

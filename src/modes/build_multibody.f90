@@ -6,16 +6,17 @@ module build_multibody
   use assembly, only: add_body, add_force, finish, give_motion
   use build_control, only: add_controllers, add_impulses
   use build_joints, only: add_any_friction, add_contact, add_own_force, add_spring
+  use build_load, only: set_expression
   use build_memory, only: add_deflections
   use errors, only: error_t, fail
-  use multibody, only: is_stop, multibody_t, together_newton, together_sequence, wave_t
+  use multibody, only: is_stop, joint_t, multibody_t, together_newton, together_sequence, wave_t
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, list_of, part_family, path_of, value_of
-  use part_angles, only: names_of_angles
+  use law_table, only: effect_family, law_choice_t, list_of, part_family, path_of, text_of, value_of
+  use part_angles, only: mass_of, names_of_angles
   use reference_points, only: add_structures, body_name, is_reference_point, name_coordinates, number, reference_point_of, &
     row_of
   use status, only: exit_bad_case
-  use waves, only: wave_of
+  use waves, only: wave_of, wave_of_load
   implicit none
   private
 
@@ -57,6 +58,7 @@ contains
     type(joined_t), intent(out) :: joined
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: coordinate(:)
+    type(wave_t) :: wave
     integer :: i
     call refuse_others(choices, error)
     if (allocated(error)) return
@@ -78,7 +80,9 @@ contains
     end do
     do i = 1, size(choices)
       if (choices(i)%name /= 'drive:motion') cycle
-      call give_motion(machine, trim(machine%names(coordinate(reference_point_of(choices(i))))), wave_of(choices(i)))
+      call find_motion(machine, choices, i, joined%rows, wave, error)
+      if (allocated(error)) return
+      call give_motion(machine, trim(machine%names(coordinate(reference_point_of(choices(i))))), wave)
     end do
   end subroutine join_parts
 
@@ -166,7 +170,7 @@ contains
     integer :: i
     do i = 1, size(choices)
       if (index(choices(i)%name, 'body:') /= 1) cycle
-      call add_body(machine, body_name(choices(i), machine%n + 1), value_of(choices(i), 'mass'), value_of(choices(i), 'load'))
+      call add_body(machine, body_name(choices(i), machine%n + 1), mass_of(choices(i)), value_of(choices(i), 'load'))
       if (choices(i)%name == 'body:watched') then
         machine%watched = machine%n
       else
@@ -204,7 +208,8 @@ contains
   !> Whether a drive is more than its mean.
   pure logical function varies(choice)
     type(law_choice_t), intent(in) :: choice
-    varies = .false.
+    varies = choice%name == 'drive:motion' .and. len(text_of(choice, 'position')) > 0
+    if (varies) return
     if (any(choice%name == [character(len=16) :: 'drive:expression', 'drive:base'])) return
     varies = abs(value_of(choice, 'amplitude')) > 0 .or. size(list_of(choice, 'cosine')) + size(list_of(choice, 'sine')) > 0
   end function varies
@@ -228,10 +233,35 @@ contains
     do k = 1, size(choices)
       if (index(choices(k)%name, 'body:') /= 1) cycle
       body = body + 1
-      row = row + value_of(choices(k), 'mass')*rows(:, body)
+      row = row + mass_of(choices(k))*rows(:, body)
     end do
     call add_own_force(machine, choices, i, row, rows, error)
   end subroutine add_base
+
+  !> The given motion of choice number `i`, a series or an expression.
+  pure subroutine find_motion(machine, choices, i, rows, wave, error)
+    type(multibody_t), intent(in) :: machine
+    type(law_choice_t), intent(in) :: choices(:)
+    integer, intent(in) :: i
+    real(wp), intent(in) :: rows(:, :)
+    type(wave_t), intent(out) :: wave
+    type(error_t), allocatable, intent(out) :: error
+    type(joint_t) :: joint
+    character(len=:), allocatable :: problem
+    if (len(text_of(choices(i), 'position')) == 0) then
+      wave = wave_of(choices(i))
+      return
+    end if
+    call set_expression(choices, i, rows, machine, joint, error)
+    if (allocated(error)) return
+    if (joint%load%by_clock) then
+      problem = 'found a motion that does not repeat with the period of the drive, allowed one that does; that of the ground '// &
+                '(law = "base") may be any'
+    else
+      call wave_of_load(joint%load, machine%frequency, wave, problem)
+    end if
+    if (allocated(problem)) call fail(error, exit_bad_case, path_of(choices(i))//'.position: '//problem)
+  end subroutine find_motion
 
   !> Coordinates whose motion is given.
   pure function given_of(choices, coordinate) result(given)

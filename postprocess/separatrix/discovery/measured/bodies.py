@@ -124,7 +124,7 @@ def structure_of(model: Model) -> Structure:
         if row.any():
             name = ends[1] if ends[0] == GROUND else "-".join(ends)
             found.append(Location(name, ends, row, tuple(paths)))
-    mass = np.array([case["body"][name]["mass"] for name in names])
+    mass = np.array([case["body"][name].get("mass", case["body"][name].get("inertia")) for name in names])
     watched = case.get("watch", {}).get("body", names[0])
     drives = case.get("drive", {}).values()
     driven = tuple(dict.fromkeys(one["body"] for one in drives if isinstance(one, dict) and "body" in one))
