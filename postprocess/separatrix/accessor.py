@@ -66,8 +66,6 @@ class Accessor:
         frame["event_word"] = decode_words(catalogue["event_word"]).values
         if "crank_outcome" in catalogue:
             frame["crank_outcome"] = decode_flags(catalogue["crank_outcome"]).values
-        elif "motor" in self.case.resolved:
-            frame["crank_speed"] = 2 * np.pi * frame["period"] / frame["cycle_time"]
         # not a number where no turning point missed a barrier; files of version 1 have the largest number
         margins = frame["grazing_margin"]
         frame["grazing_margin"] = margins.where(margins < np.finfo(float).max)

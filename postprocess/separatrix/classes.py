@@ -12,7 +12,7 @@ from separatrix import style
 from separatrix.labels import flag_text, positions_are_angles, unit
 from separatrix.open import decode_word, flag_names, table
 
-CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin")
+CLASS_FIELDS = ("regime", "attractor", "reason", "period", "event_word", "origin", "crank_outcome")
 # of the largest value, below which another is 0 to rounding
 _NOTHING = 1e-12
 
@@ -29,20 +29,15 @@ class Class:
 def classes(result: xr.Dataset, field: str, counts: dict[int, int]) -> list[Class]:
     """Return the classes that occur, ascending by code; beyond ten colours the rarest are one class.
 
-    The colour of a regime is always the same. That of an attractor follows its id as long as the
-    catalogue has at most ten, so that maps of one family keep their colours.
+    The colour of a regime, and of an outcome of a crank, is always the same. That of an attractor follows
+    its id as long as the catalogue has at most ten, so that maps of one family keep their colours.
     """
     present = sorted(code for code, count in counts.items() if count > 0)
-    if field == "regime":
+    fixed = {"regime": style.REGIMES, "crank_outcome": style.CRANKS}.get(field)
+    if fixed is not None:
         names = flag_names(result[field])
-        return [
-            Class(
-                flag_text(names.get(code, str(code))),
-                style.REGIMES.get(names.get(code), style.OTHER),
-                (code,),
-            )
-            for code in present
-        ]
+        texts = {code: names.get(code, str(code)) for code in present}
+        return [Class(flag_text(text), fixed.get(text, style.OTHER), (code,)) for code, text in texts.items()]
     nothing = [Class(_text(result, field, 0), style.NOTHING, (0,))] if 0 in present else []
     coded = [code for code in present if code != 0]
     # other classes than attractors are numbered as they occur

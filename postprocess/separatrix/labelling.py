@@ -20,18 +20,16 @@ from separatrix.version import __version__
 
 # Starts of one call: enough for the lanes, few enough to be stopped soon.
 _PIECE = 1024
-# Of a motor: crank speed, and its own state, which no motor has two of.
-_OF_MOTOR = ("motor.crank_speed", "motor.start_current", "motor.start_integral")
 
 
 def can_label(case: Case) -> bool:
-    """Whether the library does it: one body on a line, all points of the grid, starts, nothing derived."""
+    """Whether the library does it: one body on a line, no motor, all points, starts, nothing derived."""
     resolved = case.resolved
-    starts = any(axis["name"] in (*STARTS, *_OF_MOTOR) for axis in resolved.get("axis", []))
+    starts = any(axis["name"] in STARTS for axis in resolved.get("axis", []))
     # a machine of several bodies has no restoring law
     line = resolved.get("restoring", {}).get("law", "pendulum") != "pendulum"
-    more = "refine" in resolved or "derived" in resolved or "driven_mass" in resolved["body"]
-    return starts and line and not more
+    more = any(name in resolved for name in ("refine", "derived", "motor"))
+    return starts and line and not (more or "driven_mass" in resolved["body"])
 
 
 class SecondLookError(Exception):
@@ -47,7 +45,7 @@ class Labelling:
         self.axes = {str(axis["name"]): axis_values(axis) for axis in case.resolved.get("axis", [])}
         if len(self.axes) < 2:
             raise CaseError(f"{case.name}: found {len(self.axes)} axes, allowed two or more", BAD_DATA)
-        self.parameters = [name for name in self.axes if name not in (*STARTS, *_OF_MOTOR)]
+        self.parameters = [name for name in self.axes if name not in STARTS]
         self.shape = tuple(len(self.axes[name]) for name in self.parameters)
         self.starts = self._starts()
         self.looks_twice = case.resolved["attractors"].get("second_look", 0) > 0
@@ -82,10 +80,7 @@ class Labelling:
         return len(self.starts) * math.prod(self.shape)
 
     def _starts(self) -> np.ndarray:
-        """The starts of a slice, the last axis fastest: x [m], v [m/s], crank angle [rad].
-
-        Where a motor's start is an axis, also crank speed [rad/s] and current [A] or integral [rad].
-        """
+        """The starts of a slice, the last axis fastest: x [m], v [m/s], crank angle [rad]."""
         fixed = self.case.resolved["start"]
         names = [name for name in self.axes if name not in self.parameters]
         grid = np.meshgrid(*(self.axes[name] for name in names), indexing="ij")
@@ -94,23 +89,7 @@ class Labelling:
         kept = [
             columns.get(name, np.full(number, float(fixed[name]))) for name in ("x0", "v0", "crank_angle")
         ]
-        for name, value in zip(self._of_motor(), self._others(), strict=False):
-            kept.append(columns.get(name, np.full(number, value)))
         return np.column_stack(kept)
-
-    def _of_motor(self) -> list[str]:
-        """What a start has of the motor where an axis is of these, in the order of the library."""
-        if not any(name in self.axes for name in _OF_MOTOR):
-            return []
-        own = [name for name in _OF_MOTOR[1:] if name in self.case.parameters]
-        return [_OF_MOTOR[0], own[0] if own else ""]
-
-    def _others(self) -> list[float]:
-        """Their values where no axis has them; 0 on an axis, as the program searches from neighbours."""
-        return [
-            0.0 if not name or name in self.axes else float(self.case.parameters[name].value)
-            for name in self._of_motor()
-        ]
 
     def _slices(self) -> list[Mapping[str, float]]:
         values = itertools.product(*(self.axes[name] for name in self.parameters))
@@ -122,8 +101,7 @@ class Labelling:
         slices = self._slices()
         with ThreadPoolExecutor(1) as helper:
             # A wait can be interrupted, a call of the library cannot.
-            more = (stop, self._others())
-            future = helper.submit(search_slices, self.case.model, slices, self.shape or (1,), *more)
+            future = helper.submit(search_slices, self.case.model, slices, self.shape or (1,), stop)
             try:
                 while not future.done():
                     wait([future], timeout=0.2)

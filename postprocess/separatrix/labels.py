@@ -60,7 +60,12 @@ def axis_label(variable: xr.DataArray) -> str:
     name = str(variable.name)
     known = variable.attrs.get("label") or _SYMBOLS.get(name)
     text = known or plain(variable.attrs.get("long_name", name.replace("_", " ")))
-    return f"{text} ({unit(variable)})" if unit(variable) else text
+    return f"{text} ({_raised(unit(variable))})" if unit(variable) else text
+
+
+def _raised(unit_text: str) -> str:
+    """Return a unit with its exponents as figures above the line."""
+    return unit_text.replace("^2", "\u00b2").replace("^3", "\u00b3")
 
 
 def symbol(variable: xr.DataArray) -> str:
@@ -75,7 +80,7 @@ def symbol(variable: xr.DataArray) -> str:
 
 def value_label(variable: xr.DataArray, value: float) -> str:
     """Return 'symbol = value unit' for the title of a panel."""
-    return f"{symbol(variable)} = {value:.5g} {unit(variable)}".rstrip()
+    return f"{symbol(variable)} = {value:.5g} {_raised(unit(variable))}".rstrip()
 
 
 def flag_text(name: str) -> str:

@@ -251,7 +251,7 @@ def _checked(
     other = [name for name in ("motor", "effect", "state", "structure") if name in resolved]
     if not one_body or other:
         found = ", ".join(other) or "several bodies"
-        raise SeparatrixError(f"noise: found {found}, allowed one body without effects", USAGE)
+        raise SeparatrixError(f"noise: found {found}, allowed one body, no motor, effects or states", USAGE)
     mass = float(resolved["body"]["mass"])
     contact = resolved.get("contact", {"law": "none"})
     if restitution and contact["law"] != "newton":

@@ -30,6 +30,16 @@ REGIMES = {
     "at_rest": ATTRACTORS[3],
     "stuck": ATTRACTORS[7],
 }
+# outcomes of the run-up of a crank
+CRANKS = {
+    "not_known": NOTHING,
+    "stalled": ATTRACTORS[4],
+    "rocking": ATTRACTORS[5],
+    "reversed": ATTRACTORS[2],
+    "turning": ATTRACTORS[3],
+    "captured": ATTRACTORS[0],
+    "passed": ATTRACTORS[1],
+}
 RUN_UP = "#D55E00"
 RUN_DOWN = "#004488"
 BOTH_RUNS = "#333333"

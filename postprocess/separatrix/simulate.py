@@ -5,7 +5,7 @@
 import contextlib
 import ctypes
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -265,16 +265,14 @@ def search_slices(
     slices: list[Mapping[str, float]],
     shape: tuple[int, ...],
     stop: StopFlag | None = None,
-    others: Sequence[float] = (),
 ) -> list[Catalogue]:
     """Find and number the attractors of all slices of a map as `basin` does.
 
-    `slices` are the values of the parameters, by path, over `shape` values of each, the last fastest. Starts
-    on the attractors of other slices have the `others`: crank speed, and current or integral of a motor.
+    `slices` are the values of the parameters, by path, over `shape` values of each, the last fastest.
     """
     catalogues = [Catalogue(model, values).search(stop=stop) for values in slices]
     if len(catalogues) > 1:
-        sections = [_sections(catalogue, others) for catalogue in catalogues]
+        sections = [_sections(catalogue) for catalogue in catalogues]
         for i, catalogue in enumerate(catalogues):
             starts = [sections[j] for j in _neighbours(i, shape)]
             catalogue.search(np.concatenate(starts), stop)
@@ -282,11 +280,11 @@ def search_slices(
     return catalogues
 
 
-def _sections(catalogue: Catalogue, others: Sequence[float]) -> np.ndarray:
+def _sections(catalogue: Catalogue) -> np.ndarray:
     """Return starts on the attractors of one body: a start has no state of the driving body of two."""
     found = [one for one in catalogue.attractors if not (one.numbers["rests"] or one.numbers["two_bodies"])]
-    rows = [(*one.points[0][:2], 0.0, *others) for one in found]
-    return np.array(rows).reshape(-1, 3 + len(others))
+    rows = [(*one.points[0][:2], 0.0) for one in found]
+    return np.array(rows).reshape(-1, 3)
 
 
 def _neighbours(position: int, shape: tuple[int, ...]) -> list[int]:

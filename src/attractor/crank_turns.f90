@@ -16,7 +16,7 @@ module crank_turns
   implicit none
   private
 
-  public :: summarize_attractor, summarize_held, summarize_turns
+  public :: summarize_attractor, summarize_held, summarize_turns, summarize_while
 
   !> Samples of a turn of mean length.
   integer, parameter :: samples = 256
@@ -40,6 +40,51 @@ contains
       call summarize_crank([law_choice_t ::], log, 1, 0, summary)
     end select
   end subroutine summarize_turns
+
+  !> Summary of the motion of a machine with a motor for `lasts` [s] from a state on: x [m], v [m/s], crank angle [rad] and speed
+  !> [rad/s], current [A] or integral [rad].
+  pure subroutine summarize_while(machine, state, lasts, summary)
+    class(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: state(5), lasts
+    type(crank_summary_t), intent(out) :: summary
+    type(log_t) :: log
+    type(section_state_t) :: from
+    select type (machine)
+    type is (motor_machine_t)
+      from%state%x = state(1)
+      from%state%v = state(2)
+      from%motor%w = state(4)
+      from%motor%own(1) = state(5)
+      call log_while(machine, machine%resume(from, state(3)), lasts, machine%period/samples, log)
+      call summarize_crank(machine%laws, log, 1, log%samples, summary)
+    end select
+  end subroutine summarize_while
+
+  !> A log of the time `lasts` [s], with samples at this interval [s]; none if the motion had to be given up.
+  pure subroutine log_while(machine, from, lasts, interval, log)
+    class(machine_t), intent(in) :: machine
+    type(section_state_t), intent(in) :: from
+    real(wp), intent(in) :: lasts, interval
+    type(log_t), intent(inout) :: log
+    type(section_state_t) :: section
+    type(tally_t) :: tally
+    real(wp) :: since, left
+    integer :: reason
+    call open_log(log, interval)
+    section = from
+    call machine%begin_tally(section, tally)
+    left = lasts
+    do while (left > 0)
+      since = section%state%time
+      log%next_sample = ceiling(since/interval)
+      call machine%advance(section, since + left, tally, reason, log)
+      if (reason /= 0) log%samples = 0
+      if (reason /= 0) return
+      if (.not. section%passed) exit
+      left = left - (section%lasted - since)
+    end do
+    call machine%sample(section, log)
+  end subroutine log_while
 
   !> A log of turns, with samples at this interval [s]; none if the motion had to be given up.
   pure subroutine log_turns(machine, start, turns, interval, log)

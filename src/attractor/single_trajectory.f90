@@ -45,6 +45,8 @@ module single_trajectory
     real(wp) :: last_impact_speed = 0
     !> Events, and steps of flights that take them, until then.
     integer(int64) :: events = 0, steps = 0
+    !> Of a motor there: crank angle [rad] and speed [rad/s], current [A] or integral [rad].
+    real(wp) :: crank(3) = 0
   end type outcome_t
 
   !> Parts of a trajectory: up to the window, the window, and on until converged.
@@ -339,6 +341,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     outcome%x = position_of(trajectory%state)
     outcome%v = trajectory%state%v
+    outcome%crank = [trajectory%motor%phi, trajectory%motor%w, trajectory%motor%own(1)]
     outcome%impacts = trajectory%impacts + trajectory%tally%impacts
     outcome%events = trajectory%tally%events
     outcome%steps = trajectory%tally%steps

@@ -18,7 +18,7 @@ module basin_map
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
   use build_pair, only: is_pair
-  use point_columns, only: marks_of_attractor, point_values
+  use point_columns, only: map_values, marks_of_attractor, point_values
   use refined_tile, only: layers_of
   use refinement, only: automatic_block
   use refinement_report, only: add_refinement, report_refinement
@@ -43,7 +43,8 @@ contains
     type(basin_work_t), intent(inout) :: work
     integer, allocatable, intent(out) :: tile(:)
     integer, intent(in) :: ranks, gpus
-    work%variables = point_values
+    work%variables = map_values(the_case%laws)
+    if (the_case%refine%active) work%variables = point_values
     work%grid = grid_of(the_case, the_case%axes)
     work%span = span_of(the_case)
     work%max_period = the_case%attractors%max_period
@@ -64,7 +65,7 @@ contains
     if (work%refine%active) then
       call add_refined_variables(schema, dimensions)
     else
-      call add_map_variables(schema, '', dimensions)
+      call add_map_variables(schema, '', dimensions, session%the_case%laws)
     end if
     if (size(work%catalogues) > 0) call offer_second_look(session%the_case%attractors%second_look, schema)
   end subroutine describe_basin

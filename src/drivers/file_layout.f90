@@ -6,10 +6,12 @@ module file_layout
   use attractors, only: attractor_t, kind_chaotic, kind_cycle, kind_names, kind_not_known, last_kind, last_regime, regime_names
   use axis, only: axis_t
   use basin, only: catalogue_t
+  use crank_summary, only: crank_outcomes, last_crank_outcome
   use kinds, only: int64, wp
+  use law_table, only: law_choice_t
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int64, type_int8
   use motion_state, only: event_names
-  use point_columns, only: margin_or_infinite, marks_of_attractor, point_table
+  use point_columns, only: map_values, margin_or_infinite, marks_of_attractor, point_table
   use status, only: last_reason, reason_names
   use refinement, only: last_origin, origin_names
   use text, only: join, replace_all
@@ -88,10 +90,11 @@ contains
   end subroutine add_reason
 
   !> The variables of a map's points; names get `prefix`.
-  subroutine add_map_variables(schema, prefix, dimensions)
+  subroutine add_map_variables(schema, prefix, dimensions, choices)
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: prefix, dimensions(:)
-    call add_columns(schema, prefix, dimensions, size(point_table))
+    type(law_choice_t), intent(in) :: choices(:)
+    call add_columns(schema, prefix, dimensions, map_values(choices))
   end subroutine add_map_variables
 
   !> The first `count` columns of points.
@@ -99,7 +102,7 @@ contains
     type(schema_t), intent(inout) :: schema
     character(len=*), intent(in) :: prefix, dimensions(:)
     integer, intent(in) :: count
-    integer :: k
+    integer :: i, k
     do k = 1, count
       associate (column => point_table(k))
         select case (column%name)
@@ -107,6 +110,10 @@ contains
           call add_regime(schema, prefix//'regime', dimensions, .true.)
         case ('reason')
           call add_reason(schema, prefix//'reason', dimensions, .true.)
+        case ('crank_outcome')
+          call schema%add_variable(prefix//'crank_outcome', type_int8, dimensions, units=coded_unit, &
+            long_name=trim(column%meaning), flag_values=[(i, i=0, last_crank_outcome)], &
+            flag_meanings=join(crank_outcomes, ' '), tiled=.true.)
         case default
           call schema%add_variable(prefix//trim(column%name), type_named(column%type), dimensions, units=trim(column%unit), &
                                    long_name=trim(column%meaning), tiled=.true.)

@@ -21,7 +21,7 @@ module sweep_driver
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
-  use point_columns, only: at_impacts, at_reason, point_values
+  use point_columns, only: at_impacts, at_reason, map_values
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use sweep, only: hold_parameter, hold_t
@@ -147,7 +147,7 @@ contains
         allocate (work%catalogues(0))
         call pilot_seconds(work, [size(values), product(sweep%starts)], seconds, error)
         call session%stop_if(error)
-        call add_map_variables(points, 'branch_', ['value', 'start'])
+        call add_map_variables(points, 'branch_', ['value', 'start'], session%the_case%laws)
         plan = plan//'; many starts: '//plan_text([size(values), product(sweep%starts)], [1, product(sweep%starts)], &
                                                   points%bytes_of_point(), seconds)
       else
@@ -195,7 +195,7 @@ contains
     type(session_t), intent(in) :: session
     type(branch_work_t), intent(inout) :: work
     associate (sweep => session%the_case%sweep)
-      work%variables = point_values
+      work%variables = map_values(session%the_case%laws)
       work%grid = grid_of(session%the_case, sweep_axes(session%the_case))
       work%span = span_of(session%the_case)
       work%max_period = session%the_case%attractors%max_period
@@ -229,7 +229,7 @@ contains
     call schema%add_dimension('start', int(starts, int64))
     call schema%add_variable('start_x0', type_float64, ['start'], units='m', long_name='initial position', data=x0)
     call schema%add_variable('start_v0', type_float64, ['start'], units='m/s', long_name='initial velocity', data=v0)
-    call add_map_variables(schema, 'branch_', dimensions)
+    call add_map_variables(schema, 'branch_', dimensions, session%the_case%laws)
     call open_tiles(session, path, schema, dimensions, [1, starts], file)
     call run_tiles(session, file, work, complete)
     call session%team%sum(work%impacting)

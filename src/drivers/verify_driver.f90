@@ -23,7 +23,7 @@ module verify_driver
   use map_invariants, only: check_invariants
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
-  use point_columns, only: at_attractor, at_reason, at_regime, marks_of_attractor, point_table, point_values
+  use point_columns, only: at_attractor, at_reason, at_regime, map_values, marks_of_attractor, point_table
   use reference, only: run_reference
   use refinement, only: origin_contradicted
   use restoring_law, only: position_is_angle
@@ -141,12 +141,13 @@ contains
     type(grid_t) :: grid
     type(catalogue_t), allocatable :: catalogues(:)
     type(slice_cache_t) :: cache
-    real(wp) :: values(1, point_values)
+    real(wp), allocatable :: values(:, :)
     integer, allocatable :: index(:)
     integer(int64), allocatable :: lengths(:), subscripts(:)
     integer(int64) :: points
     integer :: i, before
     grid = grid_of(the_case, axes)
+    allocate (values(1, map_values(grid%laws)))
     call restore_catalogues(reader, alone, journal, grid, the_case, catalogues, error)
     if (.not. allocated(error)) call reader%lengths('/'//prefix//'regime', lengths, error)
     if (.not. allocated(error)) call check_lengths(reader%path, lengths, grid%shape, error)
@@ -212,7 +213,7 @@ contains
       inferred = nint(stored(1)) > origin_contradicted
       if (inferred) audit%inferred = audit%inferred + 1
     end if
-    do k = 1, size(point_table)
+    do k = 1, size(values)
       if (.not. reader%has('/'//prefix//trim(point_table(k)%name))) cycle
       call reader%read_block('/'//prefix//trim(point_table(k)%name), subscripts, spread(1_int64, 1, size(subscripts)), stored, &
         error)

@@ -4,6 +4,8 @@
 !> Points of a basin map: start to values, with the machine of the current slice at hand.
 module basin
   use attractors, only: attractor_t
+  use crank_summary, only: crank_summary_t, no_summary
+  use crank_turns, only: summarize_attractor, summarize_while
   use discover, only: discover_attractors
   use device_run, only: run_on_device
   use errors, only: error_t, fail
@@ -13,9 +15,9 @@ module basin
   use machine_type, only: machine_t
   use match, only: carry_labels, number_new, remember
   use build_pair, only: is_pair
-  use point_columns, only: outcome_values
+  use point_columns, only: at_attractor, crank_values_of, outcome_values, point_values
   use span_check, only: check_periods
-  use status, only: exit_bad_case
+  use status, only: exit_bad_case, reason_settled, reason_time_over
   use text, only: to_text
   use trajectories, only: block_size
   use trajectory_slots, only: describe_all, ensemble_t
@@ -35,6 +37,8 @@ module basin
   type, public :: slice_cache_t
     integer(int64) :: slice = -1
     type(ensemble_t) :: ensemble
+    !> What the crank of a motor does on each attractor, once a point asked for it.
+    type(crank_summary_t), allocatable :: cranks(:)
   end type slice_cache_t
 
 contains
@@ -92,6 +96,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     if (slice == cache%slice) return
     cache%slice = -1
+    if (allocated(cache%cranks)) deallocate (cache%cranks)
     call open_ensemble(grid, span, slice, describe_all, cache%ensemble, error)
     if (.not. allocated(error)) cache%slice = slice
   end subroutine turn_to
@@ -173,8 +178,7 @@ contains
       associate (members => pack([(i, i=1, size(slices))], left .and. slices == slices(first)))
         left(members) = .false.
         if (size(catalogues) > 0) then
-          call slice_points(grid, cache%ensemble, catalogues(slices(first) + 1)%attractors, index, members, values, done, error, &
-                            watch)
+          call slice_points(grid, cache, catalogues(slices(first) + 1)%attractors, index, members, values, done, error, watch)
           if (present(whole)) whole = done
           if (allocated(error) .or. .not. done) return
         else
@@ -185,9 +189,9 @@ contains
   end subroutine basin_points
 
   !> Points of one slice with a catalogue.
-  subroutine slice_points(grid, ensemble, catalogue, index, members, values, whole, error, watch)
+  subroutine slice_points(grid, cache, catalogue, index, members, values, whole, error, watch)
     type(grid_t), intent(in) :: grid
-    type(ensemble_t), intent(in) :: ensemble
+    type(slice_cache_t), intent(inout) :: cache
     type(attractor_t), intent(in) :: catalogue(:)
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
@@ -201,10 +205,13 @@ contains
     do i = 1, size(members)
       starts(:, i) = point_start(grid, index(:, members(i)))
     end do
-    call run_on_device(ensemble, catalogue, starts, outcomes, whole, error, watch)
+    call run_on_device(cache%ensemble, catalogue, starts, outcomes, whole, error, watch)
     if (allocated(error) .or. .not. whole) return
+    if (size(values, 2) > point_values .and. .not. allocated(cache%cranks)) then
+      call summarize_all(cache%ensemble%moving, catalogue, cache%cranks)
+    end if
     do i = 1, size(members)
-      values(members(i), :) = outcome_values(outcomes(i))
+      call put_values(cache%ensemble, outcomes(i), catalogue, cache%cranks, values(members(i), :))
     end do
   end subroutine slice_points
 
@@ -216,16 +223,56 @@ contains
     integer, intent(in) :: index(:, :), members(:)
     real(wp), intent(inout) :: values(:, :)
     type(attractor_t), allocatable :: own(:)
+    type(crank_summary_t), allocatable :: cranks(:)
     type(outcome_t) :: outcome
     real(wp) :: start(3 + size(grid%others))
-    integer :: i
+    integer :: i, k
     do i = 1, size(members)
       start = point_start(grid, index(:, members(i)))
       if (allocated(own)) deallocate (own)
       call discover_attractors(ensemble%moving, ensemble%span, reshape(start, [size(start), 1]), max_period, own)
+      own%id = [(k, k=1, size(own))]
       call run_trajectory(ensemble%moving, own, ensemble%span, start, outcome)
-      values(members(i), :) = outcome_values(outcome)
+      if (size(values, 2) > point_values) call summarize_all(ensemble%moving, own, cranks)
+      call put_values(ensemble, outcome, own, cranks, values(members(i), :))
+      values(members(i), at_attractor) = 0
     end do
   end subroutine isolated_points
+
+  !> What the crank of a motor does on each attractor.
+  pure subroutine summarize_all(moving, catalogue, cranks)
+    class(machine_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(crank_summary_t), allocatable, intent(out) :: cranks(:)
+    integer :: i
+    allocate (cranks(size(catalogue)))
+    do i = 1, size(catalogue)
+      call summarize_attractor(moving, catalogue(i), cranks(i))
+    end do
+  end subroutine summarize_all
+
+  !> The values of a point; with `cranks` those of a motor too: of the attractor if it converged, else over as long as the window
+  !> after its end.
+  pure subroutine put_values(ensemble, outcome, catalogue, cranks, values)
+    type(ensemble_t), intent(in) :: ensemble
+    type(outcome_t), intent(in) :: outcome
+    type(attractor_t), intent(in) :: catalogue(:)
+    type(crank_summary_t), intent(in), optional :: cranks(:)
+    real(wp), intent(out) :: values(:)
+    type(crank_summary_t) :: crank
+    integer :: i
+    values(:point_values) = outcome_values(outcome)
+    if (.not. present(cranks)) return
+    crank = no_summary()
+    select case (outcome%reason)
+    case (reason_time_over)
+      call summarize_while(ensemble%moving, [outcome%x, outcome%v, outcome%crank], ensemble%span%window, crank)
+    case (reason_settled)
+      do i = 1, size(catalogue)
+        if (catalogue(i)%id == outcome%attractor) crank = cranks(i)
+      end do
+    end select
+    values(point_values + 1:) = crank_values_of(crank)
+  end subroutine put_values
 
 end module basin

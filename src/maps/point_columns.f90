@@ -4,24 +4,28 @@
 !> What is reported of each point of a map, in one table: name, type and unit in a file, meaning, and value. Files, verification,
 !> the C interface and the merging of shares take it from here.
 module point_columns
+  use crank_summary, only: crank_summary_t
   use kinds, only: wp
+  use law_table, only: law_choice_t
+  use motor_choices, only: has_motor
   use single_trajectory, only: outcome_t
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_quiet_nan, ieee_value
   implicit none
   private
 
-  public :: outcome_values, margin_or_infinite
+  public :: crank_values_of, map_values, margin_or_infinite, outcome_values
 
   type, public :: point_column_t
     character(len=18) :: name
     !> As HDF5 files and numpy call it.
     character(len=7) :: type
-    character(len=3) :: unit
+    character(len=5) :: unit
     character(len=80) :: meaning
   end type point_column_t
 
-  !> The first are the same for all that converged to one attractor; `regime` and `reason` are codes. A new one goes to the end.
-  type(point_column_t), parameter, public :: point_table(13) = [ &
+  !> The first are the same for all that converged to one attractor; `regime`, `reason` and `crank_outcome` are codes. A new one
+  !> goes before the last two, which only machines with a motor have.
+  type(point_column_t), parameter, public :: point_table(15) = [ &
     point_column_t('regime', 'int8', '1', 'regime of the motion'), &
     point_column_t('attractor', 'int32', '1', 'label of the attractor in the catalogue, 0 = none'), &
     point_column_t('reason', 'int8', '1', 'why the trajectory ended'), &
@@ -34,10 +38,12 @@ module point_columns
     point_column_t('x_min', 'float32', 'm', 'smallest position'), &
     point_column_t('v_max', 'float32', 'm/s', 'largest velocity towards the upper barrier'), &
     point_column_t('settle_time', 'float32', 's', 'time from the start to capture by the attractor'), &
-    point_column_t('grazing_margin', 'float32', 'm', 'smallest distance to a barrier at a turning point that missed it')]
+    point_column_t('grazing_margin', 'float32', 'm', 'smallest distance to a barrier at a turning point that missed it'), &
+    point_column_t('crank_outcome', 'int8', '1', 'outcome of a run-up of the crank'), &
+    point_column_t('crank_speed', 'float32', 'rad/s', 'mean speed of the crank')]
 
-  !> How many there are; how many of them are marks of the attractor, which distinguish points.
-  integer, parameter, public :: point_values = size(point_table), marks_of_attractor = 5
+  !> How many all machines have, and those with a motor more; how many of them are marks of the attractor, which distinguish points.
+  integer, parameter, public :: point_values = 13, crank_point_values = 2, marks_of_attractor = 5
   !> Their columns. In a refined map the marks are followed by the origin of a point.
   integer, parameter, public :: at_regime = 1, at_attractor = 2, at_reason = 3, at_period = 4, at_event_word = 5, &
     at_impacts = 6, at_impact_speed = 7, at_amplitude = 8, at_x_max = 9, at_x_min = 10, at_v_max = 11, at_settle_time = 12, &
@@ -67,6 +73,20 @@ contains
       values(at_margin) = margin_or_infinite(f%grazing_margin)
     end associate
   end function outcome_values
+
+  !> How many values a point of a map has.
+  pure integer function map_values(choices) result(number)
+    type(law_choice_t), intent(in) :: choices(:)
+    number = point_values
+    if (has_motor(choices)) number = point_values + crank_point_values
+  end function map_values
+
+  !> The further values of a point of a machine with a motor.
+  pure function crank_values_of(crank) result(values)
+    type(crank_summary_t), intent(in) :: crank
+    real(wp) :: values(crank_point_values)
+    values = [real(crank%outcome, wp), crank%speed]
+  end function crank_values_of
 
   !> The smallest distance to a barrier; infinite where no turning point missed one.
   elemental real(wp) function margin_or_infinite(margin)

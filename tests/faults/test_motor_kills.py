@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map over the crank speed of a motor that is killed goes on, on other ranks, to the same bits."""
+"""Maps of a motor that are killed go on, on other ranks, to the same bits."""
 
 import time
 from pathlib import Path
@@ -10,22 +10,26 @@ import pytest
 from program import succeed
 
 CASE = Path(__file__).resolve().parents[2] / "examples/motor_impact.toml"
+STARTS = ("axis[1].count=8", "axis[2].count=8")
+PLANE = (
+    "axis=[{name='motor.voltage', from=6, to=8, count=4},"
+    " {name='motor.inertia', from=0.04, to=0.06, count=4}]",
+)
 SETTINGS = (
-    "axis[1].count=8", "axis[2].count=8", "grid.tile=[2, 2]", "run.duration=8", "run.window=2",
-    'run.stop="duration"', "attractors.sample=8",
+    "grid.tile=[2, 2]", "run.duration=8", "run.window=2", 'run.stop="duration"', "attractors.sample=8",
 )  # fmt: skip
-RUN = ["basin", "case.toml", *(f"--set={setting}" for setting in SETTINGS), "-o", life.NAME]
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_killed_maps_go_on(separatrix, mpi_separatrix, tmp_path, monkeypatch, ranks):
-    """One rank is killed in the middle of the map."""
-    monkeypatch.setattr(life, "RUN", RUN)
+@pytest.mark.parametrize(("ranks", "axes"), [(2, STARTS), (3, PLANE)], ids=["starts", "plane"])
+def test_killed_maps_go_on(separatrix, mpi_separatrix, tmp_path, monkeypatch, ranks, axes):
+    """One rank is killed in the middle of a map, over starts and over voltage and inertia."""
+    command = ["basin", "case.toml", *(f"--set={one}" for one in (*axes, *SETTINGS)), "-o", life.NAME]
+    monkeypatch.setattr(life, "RUN", command)
     whole, folder = tmp_path / "whole", tmp_path / "killed"
     for path in (whole, folder):
         path.mkdir()
         (path / "case.toml").write_text(CASE.read_text())
-    succeed(separatrix, *RUN, folder=whole, timeout=300)
+    succeed(separatrix, *command, folder=whole, timeout=300)
     process = life.launch(mpi_separatrix, folder, ranks)
     while process.poll() is None and not (life.stage(folder) == "fill" and life.tiles_of(folder)[0] > 0):
         time.sleep(0.02)

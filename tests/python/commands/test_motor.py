@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Machines with a motor: outcomes of a run-up, branches and exponents, maps on several ranks."""
 
+import itertools
 import re
 from pathlib import Path
 
@@ -207,6 +208,42 @@ def test_starts_that_end_fast(separatrix, tmp_path):
     fast = np.isclose(speed, 15.30884297906753, rtol=0, atol=1e-8)
     assert fast.sum() == 1229
     np.testing.assert_allclose(speed[~fast], 12.47775818691878, rtol=0, atol=1e-8)
+
+
+def test_cranks_of_points(separatrix, yoke, tmp_path):
+    """Without starts among the axes, as over voltage and inertia: speed and outcome of every point."""
+    axes = f"{{name='motor.voltage', values=[{THRESHOLD - 1e-6}, {THRESHOLD + 1e-6}]}}"
+    axes += ", {name='motor.bearing_friction', values=[0.0, 0.8]}"
+    sets = (f"--set=axis=[{axes}]", "--set=run.duration=60")
+    succeed(separatrix, "basin", yoke, *sets, "-o", "plane.h5", folder=tmp_path, timeout=300)
+    with sx.open_result(tmp_path / "plane.h5") as result:
+        names = result.separatrix.decoded("crank_outcome").values
+        assert names.tolist() == [["captured", "stalled"], ["passed", "stalled"]]
+        speed = result["crank_speed"].values
+        np.testing.assert_allclose(speed, [[9.164705, 0], [12.22538, 0]], rtol=1e-4)
+        for field in ("crank_outcome", "crank_speed"):
+            assert result.separatrix.plot(field).axes
+    assert "checksums" in succeed(separatrix, "verify", "plane.h5", "--sample", "1", folder=tmp_path).out
+
+
+def test_cranks_of_points_that_have_not_settled(separatrix, yoke, tmp_path):
+    """They are those of the trajectory over as long as the window after its end."""
+    axes = "{name='motor.voltage', values=[6.0, 8.0]}, {name='motor.inertia', values=[0.05, 0.4]}"
+    short = "run={duration=6, window=2, extension=1, average='window'}"
+    sets = (f"--set=axis=[{axes}]", f"--set={short}")
+    succeed(separatrix, "basin", yoke, *sets, "-o", "plane.h5", folder=tmp_path, timeout=300)
+    with sx.open_result(tmp_path / "plane.h5") as result:
+        speeds, names = result["crank_speed"], result.separatrix.decoded("crank_outcome")
+        ends = result.separatrix.decoded("reason")
+        assert (ends == "time_over").sum() >= 3
+        for volts, inertia in itertools.product((6.0, 8.0), (0.05, 0.4)):
+            at = {"motor_voltage": volts, "motor_inertia": inertia}
+            if ends.sel(at) != "time_over":
+                continue
+            given = (f"motor.voltage={volts}", f"motor.inertia={inertia}", "run.duration=8", "run.window=2")
+            assert names.sel(at) == outcome(separatrix, yoke, tmp_path, *given)
+            with sx.open_result(tmp_path / "motion.h5") as motion:
+                np.testing.assert_allclose(float(speeds.sel(at)), motion.attrs["crank_speed"], rtol=2e-4)
 
 
 def test_cranks_of_attractors(separatrix, tmp_path):
