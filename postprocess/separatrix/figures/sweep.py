@@ -32,7 +32,7 @@ _NOT_RUN = 0
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figures of a sweep file by name."""
     look.require("sweep", "region", "units")
-    # before a region is chosen: a slice is known by its place among all values
+    # before a region is chosen: a slice is known by its number among all values
     starts = [at_points(result, name) for name in derived_names(result)]
     result = look.selected(result.assign({str(one.name): one for one in starts}))
     if "driven_mass" in resolved_case(result).get("body", {}):

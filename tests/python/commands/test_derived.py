@@ -283,7 +283,7 @@ def test_the_many_starts_of_a_sweep_have_those_of_their_attractors(separatrix, t
         succeed(separatrix, "trajectory", "case.toml", *options, "-o", "t.h5", "--force", folder=tmp_path)
         with h5py.File(tmp_path / "t.h5") as file:
             assert float(lost[value, start]) == pytest.approx(file.attrs["derived_lost"], rel=1e-9, abs=1e-12)
-    # by label and place among all values, also in a figure of some of them
+    # by label and number among all values, also in a figure of some of them
     named = sweep.separatrix.table("branch_regime")
     assert np.array_equal(named["branch_derived_lost"], lost.values.ravel(), equal_nan=True)
     drawn = sweep.separatrix.plot("derived_lost", region={"drive.ratio": (1.3, 1.32)}).axes[0].collections[0]
