@@ -48,8 +48,9 @@ class Accessor:
 
     @property
     def attractors(self) -> "pandas.DataFrame":
-        """The attractors of a map or of the many starts of a sweep: regime, period, word, fixed point, multiplier, share of the points, ...
+        """The attractors of a map, or of the many starts of a sweep.
 
+        Their regime, period, word, fixed point, multiplier, share of the points, ...
         Of a motor `crank_speed` [rad/s], `torque` and `power` are means; `crank_outcome` is the
         side of the resonance.
         `grazing_margin` is NaN where no turning point missed a barrier.
