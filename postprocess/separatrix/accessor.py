@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 
 from separatrix.cases import Case
-from separatrix.derived import at_points, derived_names
+from separatrix.derived import at_points, derived_names, labels_of, slices_of
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.open import decode_flags, decode_words, flag_names, table
-from separatrix.variables import KINDS, REGIMES, is_start
+from separatrix.variables import KINDS, REGIMES
 
 if TYPE_CHECKING:
     import pandas
@@ -48,16 +48,20 @@ class Accessor:
 
     @property
     def attractors(self) -> "pandas.DataFrame":
-        """The attractors of a map: regime, period, word, fixed point, multiplier, share of the points, ...
+        """The attractors of a map, or of the many starts of a sweep.
 
+        Their regime, period, word, fixed point, multiplier, share of the points, ...
         Of a motor `crank_speed` [rad/s], `torque` and `power` are means; `crank_outcome` is the
         side of the resonance.
         `grazing_margin` is NaN where no turning point missed a barrier.
         """
-        self._require("basin")
+        self._require("basin", "sweep")
         catalogue = table(self._result, "catalogue")
         if "attractor" not in catalogue:
-            raise SeparatrixError("this map has no catalogue: none of its axes is a start", USAGE)
+            lacks = "map has no catalogue: none of its axes is a start"
+            if self.kind == "sweep":
+                lacks = "sweep has no catalogue: it has no starts"
+            raise SeparatrixError(f"this {lacks}", USAGE)
         # multipliers and section points have further dimensions
         frame = xr.Dataset({k: v for k, v in catalogue.items() if v.dims == ("entry",)}).to_dataframe()
         if "kind" in catalogue:
@@ -70,19 +74,18 @@ class Accessor:
         margins = frame["grazing_margin"]
         frame["grazing_margin"] = margins.where(margins < np.finfo(float).max)
         slices = np.unique(catalogue["slice"].values).size
-        frame.insert(2, "share", frame["count"] * slices / self._result["attractor"].size)
+        frame.insert(2, "share", frame["count"] * slices / labels_of(self._result).size)
         return frame.set_index(["slice", "attractor"] if slices > 1 else "attractor")
 
     def of_attractor(self, column: str) -> xr.DataArray:
-        """Return a number of `attractors` at every point of a map: that of its attractor, NaN without one."""
+        """Return a number of `attractors` at every point: that of its attractor, NaN without one."""
         values = self.attractors[column]
         if values.dtype.kind not in "fi":
             raise SeparatrixError(f"column '{column}' is no number", USAGE)
-        labels = self._result["attractor"]
+        labels = labels_of(self._result)
         keys = labels.values.ravel().tolist()
         if values.index.nlevels > 1:
-            sizes = [1 if is_start(str(name)) else size for name, size in labels.sizes.items()]
-            slices = np.broadcast_to(np.arange(np.prod(sizes)).reshape(sizes), labels.shape)
+            slices = np.broadcast_to(slices_of(labels), labels.shape)
             keys = list(zip(slices.ravel().tolist(), keys, strict=True))
         found = values.to_dict()
         numbers = np.array([found.get(key, np.nan) for key in keys], float).reshape(labels.shape)
@@ -112,7 +115,7 @@ class Accessor:
     def table(self, name: str | None = None) -> "pandas.DataFrame":
         """Return a table of this result: "attractors", "labelled_points", or that of a variable.
 
-        With a variable of a map it has its derived quantities too.
+        With a variable of a map, or of the many starts of a sweep, it has their derived quantities too.
 
         The table of a variable has all variables over the same dimensions: of a trajectory those over time
         with "x", its events with "event_kind". Without a name it is the attractors of a map, the samples of
@@ -128,9 +131,13 @@ class Accessor:
         return frame_of(self._result.assign(self.derived()) if self._has_catalogue() else self._result, name)
 
     def derived(self) -> dict[str, xr.DataArray]:
-        """Return the derived quantities of a map at its points, by name; NaN without an attractor."""
-        self._require("basin")
-        return {name: at_points(self._result, name) for name in derived_names(self._result)}
+        """Return the derived quantities at points, by name; NaN without an attractor.
+
+        Of a map they are called derived_NAME, of the many starts of a sweep branch_derived_NAME.
+        """
+        self._require("basin", "sweep")
+        found = [at_points(self._result, name) for name in derived_names(self._result)]
+        return {str(one.name): one for one in found}
 
     def save_table(self, path: str | Path, name: str | None = None, *, overwrite: bool = False) -> Path:
         """Write a `table` as .csv, at full precision, or with pyarrow as .parquet; return the path."""
@@ -320,9 +327,9 @@ class Accessor:
 
         return plain(title or ("" if look.ax else str(self._result.attrs.get("title", ""))))
 
-    def _require(self, kind: str) -> None:
-        if self.kind != kind:
-            raise SeparatrixError(f"this is a {self.kind}, not a {kind}", USAGE)
+    def _require(self, *kinds: str) -> None:
+        if self.kind not in kinds:
+            raise SeparatrixError(f"this is a {self.kind}, not a {' or '.join(kinds)}", USAGE)
 
 
 def _style(look: "Look", sheet: str | Path | None = None) -> AbstractContextManager:

@@ -11,7 +11,7 @@ from pathlib import Path
 from separatrix import style
 from separatrix.arguments import Parser, interval, list_of, names, pairs, size, two_names, whole_number
 from separatrix.errors import USAGE, SeparatrixError
-from separatrix.figures import basin, boundary, branches, contact, erosion, points, sweep, trajectory
+from separatrix.figures import basin, boundary, branches, contact, erosion, noise, points, sweep, trajectory
 from separatrix.figures.animation import animate
 from separatrix.figures.difference import difference
 from separatrix.figures.look import CAPTIONS, UNITS, Look
@@ -29,6 +29,8 @@ _BY_KIND = {
     "points": points,
     "branches": branches,
     "measures": erosion,
+    "noise": noise,
+    "first_passage": noise,
 }
 
 

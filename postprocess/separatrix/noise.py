@@ -1,54 +1,41 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions of one body under random forces, impulses and restitution; survival and first passage over starts.
+"""Motions under random forces, impulses and restitution; survival and first passage over starts.
 
-Between kicks the body moves as in the case, flown by the library. Random numbers belong to the seed, the
-motion, and what they are for: they do not depend on how many motions there are.
+Between kicks the machine moves as in the case, flown by the library. Random numbers belong to the seed, the
+motion, and what they are for: they do not depend on how many motions there are, nor on threads.
 """
 
-from collections.abc import Sequence
+import zlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from scipy import stats
 
 from separatrix.cases import Case, as_case
-from separatrix.errors import USAGE, GivenUpError, SeparatrixError
+from separatrix.checks import count, number, numbers
+from separatrix.cores import cores
+from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
+from separatrix.kept_rows import KeptRows, write_dataset
+from separatrix.kicked import PIECE, Machine, Noise, fly
 from separatrix.measuring.sampling import CONFIDENCE
-from separatrix.segments import Impacts
+from separatrix.variables import FORMAT_VERSION
 from separatrix.version import __version__
 
 __all__ = ["first_passage", "noisy"]
 
-# Kicks of a random force in a drive period, or in one of the spring.
+# Kicks of a random force in a drive period, or in the shortest of the springs.
 _KICKS = 64
-# Motions that are flown at once; their random numbers are drawn together.
-_PIECE = 1024
-# Impacts within a step or between samples after which restitution is that of the case: the body chatters.
-_MOST_IMPACTS = 64
-_FORCE, _WAIT, _IMPULSE, _RESTITUTION = 1, 2, 3, 4
-
-
-@dataclass(frozen=True)
-class _Noise:
-    """What acts on a motion, checked."""
-
-    case: Case
-    kick: float
-    impulses: tuple[float, float] | None
-    restitution: float
-    deviation: float
-    step: float
-    stops: tuple[float, float]
-    leaves: tuple[float, float]
-    at_impact: bool
-    period: float
-    seed: int
+# Friction whose force depends on more than the state of a segment.
+_MEMORY = ("elastic_coulomb", "maxwell_slip", "dahl", "bouc_wen", "lugre")
 
 
 def noisy(
-    case: Case | str,
+    case: Case | str | Path,
     x0: float | str | None = None,
     v0: float | str | None = None,
     crank_angle: float | str | None = None,
@@ -58,12 +45,16 @@ def noisy(
     force: float = 0.0,
     impulses: tuple[float, float] | None = None,
     restitution: float = 0.0,
+    body: str | None = None,
     leaves: Sequence[float] | str | None = None,
     step: float | None = None,
     samples: int = 200,
     seed: int = 1,
+    threads: int | None = None,
+    output: str | Path | None = None,
+    overwrite: bool = False,
 ) -> xr.Dataset:
-    """Return motions of one body from one start under noise, and the share that has not left yet.
+    """Return motions from one start under noise, and the share that has not left yet.
 
     Parameters
     ----------
@@ -78,28 +69,36 @@ def noisy(
         (rate [1/s], deviation [m/s]): changes of velocity at the instants of a Poisson process, normally
         distributed.
     restitution
-        Standard deviation of the coefficient of each impact around that of the case, cut off at 0 and 1.
+        Standard deviation of the coefficient of each impact around that of the case, cut off at 0 and 1; of
+        one body without a motor.
+    body
+        Of several bodies the one that `force` and `impulses` act on; the watched one if not given.
     leaves
-        (lower, upper) positions [m] between which a motion stays, looked at after each step and impulse; or
-        "impact": it has left at its first impact. Motions that have left go on.
+        (lower, upper) positions [m] of the watched body between which a motion stays, looked at after each
+        step and impulse; or "impact": it has left at its first impact. Motions that have left go on.
     step
-        [s]; a 64th of the drive period if not given.
+        [s]; a 64th of the drive period, or of a period below those of the springs, if that is shorter.
     samples
         Times, equally spaced over the duration, with the first and the last.
     seed
         Results are the same bits for the same seed; motion k is the same for any number of motions.
+    threads
+        They do not change the results; the cores if not given.
+    output, overwrite
+        A file that `open_result` and `separatrix-figures` read; whether one that exists is replaced.
 
     Returns
     -------
     xarray.Dataset
-        `x` [m] and `v` [m/s] (motion, time); `first_passage` [s] (motion), NaN of one that has not left; and
+        `x` [m] and `v` [m/s] (motion, time), of several bodies `NAME_x` and `NAME_v` too, with a motor
+        `crank_angle` and `crank_speed`; `first_passage` [s] (motion), NaN of one that has not left; and
         `survival`, `survival_lower`, `survival_upper` (time) with the 95 % interval of Wilson.
 
     Raises
     ------
     SeparatrixError
-        For several bodies, a motor, effects, random restitution without a rigid contact of constant
-        restitution, and values that are not allowed.
+        For what has a state beside positions, velocities and crank ([structure], [state], [effect], friction
+        with memory, controllers that integrate), two bodies of a pair, and values that are not allowed.
     GivenUpError
         If a motion had to be given up.
 
@@ -111,34 +110,33 @@ def noisy(
     {'motion': 20, 'time': 200}
     """
     case = as_case(case)
-    noise = _checked(case, force, impulses, restitution, leaves, step, seed)
+    machine = _machine(case, body, x0, v0, crank_angle)
+    noise = _noise(machine, force, impulses, restitution, leaves, step, count("seed", seed, 0))
     length = _duration(case, duration)
-    if motions < 1 or samples < 2:
-        raise SeparatrixError("noise: allowed are motions from 1 and samples from 2", USAGE)
-    start = case.start(x0=x0, v0=v0, crank_angle=crank_angle)
-    row = [start["x0"], start["v0"], start["crank_angle"]]
+    motions, samples = count("motions", motions), count("samples", samples, 2)
+    target = _target(output, overwrite)
     times = np.linspace(0.0, length, samples)
-    parts = [
-        _flown(noise, np.tile(row, (min(_PIECE, motions - first), 1)), times, first // _PIECE)
-        for first in range(0, motions, _PIECE)
-    ]
+    starts = np.tile(machine.start, (motions, 1))
+    parts = _pieces(motions, threads, lambda one: fly(machine, noise, starts[one.rows], times, one.piece))
     states = np.concatenate([part[0] for part in parts])
     left = np.concatenate([part[1] for part in parts])
     share = wilson((left[:, None] > times).sum(axis=0), motions)
-    return xr.Dataset(
+    data = xr.Dataset(
         {
-            "x": (("motion", "time"), states[..., 0], {"units": "m", "long_name": "position"}),
-            "v": (("motion", "time"), states[..., 1], {"units": "m/s", "long_name": "velocity"}),
+            **_motions(machine, states),
             "first_passage": ("motion", np.where(np.isfinite(left), left, np.nan), _PASSAGE),
             **{name: ("time", values, _SURVIVAL) for name, values in zip(_SHARES, share, strict=True)},
         },
         {"time": ("time", times, {"units": "s", "long_name": "time since the start"})},
         _attributes(case, "noise", motions, seed),
     )
+    if target:
+        write_dataset(data, target)
+    return data
 
 
 def first_passage(
-    case: Case | str,
+    case: Case | str | Path,
     x0: Sequence[float],
     v0: Sequence[float],
     *,
@@ -148,8 +146,13 @@ def first_passage(
     force: float = 0.0,
     impulses: tuple[float, float] | None = None,
     restitution: float = 0.0,
+    body: str | None = None,
     step: float | None = None,
     seed: int = 1,
+    threads: int | None = None,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
 ) -> xr.Dataset:
     """Return over a grid of starts the share of noisy motions that have not left, and when they leave.
 
@@ -157,8 +160,10 @@ def first_passage(
     ----------
     x0, v0
         Positions [m] and velocities [m/s] of the starts, or (first, last, count) of each.
-    leaves, duration, motions, force, impulses, restitution, step, seed
+    leaves, duration, motions, force, impulses, restitution, body, step, seed, threads, output, overwrite
         As for `sx.noisy`; `motions` from each start.
+    resume
+        Go on with a run into `output` that was stopped: what is done is kept in OUTPUT.part.
 
     Returns
     -------
@@ -176,25 +181,39 @@ def first_passage(
     {'x0': 2, 'v0': 1}
     """
     case = as_case(case)
-    noise = _checked(case, force, impulses, restitution, leaves, step, seed)
-    length = _duration(case, duration)
-    if motions < 1:
-        raise SeparatrixError("noise: allowed are motions from 1", USAGE)
+    machine = _machine(case, body)
+    noise = _noise(machine, force, impulses, restitution, leaves, step, count("seed", seed, 0))
+    length, motions = _duration(case, duration), count("motions", motions)
+    target = _target(output, overwrite)
     axes = [_axis(name, values) for name, values in (("x0", x0), ("v0", v0))]
-    angle = case.start(crank_angle=None)["crank_angle"]
     shape = (axes[0].size, axes[1].size)
-    starts = np.array([[x, v, angle] for x in axes[0] for v in axes[1]]).repeat(motions, axis=0)
+    starts = np.tile(machine.start, (shape[0] * shape[1], 1))
+    starts[:, machine.watched] = [[x, v] for x in axes[0] for v in axes[1]]
+    starts = starts.repeat(motions, axis=0)
     times = np.array([0.0, length])
-    left = np.concatenate(
-        [
-            _flown(noise, starts[first : first + _PIECE], times, first // _PIECE)[1]
-            for first in range(0, len(starts), _PIECE)
-        ]
-    ).reshape(*shape, motions)
+    content = [
+        __version__,
+        case.to_toml(),
+        noise,
+        machine.kicked,
+        *(a.tolist() for a in axes),
+        length,
+        motions,
+    ]
+    identity = f"{zlib.crc32(repr(content).encode()):08x}"
+    kept = KeptRows(target, identity, resume, "is of another case, other starts or other noise")
+
+    def one_piece(one: _Piece) -> list[float]:
+        row = kept.row(one.piece)
+        if row is None:
+            row = kept.keep(one.piece, fly(machine, noise, starts[one.rows], times, one.piece)[1].tolist())
+        return row
+
+    left = np.concatenate(_pieces(len(starts), threads, one_piece)).reshape(*shape, motions)
     share = wilson((left > length).sum(axis=-1), motions)
     mean = np.minimum(left, length).mean(axis=-1)
     passage = {"units": "s", "long_name": "mean time of first passage, at most the duration"}
-    return xr.Dataset(
+    data = xr.Dataset(
         {name: (("x0", "v0"), values, _SURVIVAL) for name, values in zip(_SHARES, share, strict=True)}
         | {"passage_time": (("x0", "v0"), mean, passage)},
         {
@@ -203,6 +222,10 @@ def first_passage(
         },
         {**_attributes(case, "first_passage", motions, seed), "duration": length},
     )
+    if target:
+        write_dataset(data, target)
+        kept.remove()
+    return data
 
 
 _SHARES = ("survival", "survival_lower", "survival_upper")
@@ -219,209 +242,176 @@ def wilson(hits: np.ndarray, count: int, confidence: float = CONFIDENCE) -> tupl
     return share, np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """Motions that share their random numbers."""
+
+    piece: int
+    rows: slice
+
+
+def _pieces(motions: int, threads: int | None, run: Callable) -> list:
+    """Return what `run` gives for the pieces of so many motions, in order."""
+    pieces = [
+        _Piece(number, slice(first, first + PIECE)) for number, first in enumerate(range(0, motions, PIECE))
+    ]
+    with ThreadPoolExecutor(cores() if threads is None else count("threads", threads)) as pool:
+        waiting = [pool.submit(run, one) for one in pieces]
+        try:
+            return [one.result() for one in waiting]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _motions(machine: Machine, states: np.ndarray) -> dict[str, tuple]:
+    """Return positions and velocities as variables (motion, time)."""
+    x, v = machine.watched
+    found = {"x": (x, "m", "position"), "v": (v, "m/s", "velocity")}
+    for i, name in enumerate(machine.case.model.coordinates):
+        bodies = len(machine.case.model.coordinates)
+        found[f"{name}_x"] = (i, "m", f"position of {name}")
+        found[f"{name}_v"] = (bodies + i, "m/s", f"velocity of {name}")
+    if not machine.turns:
+        found["crank_angle"] = (1, "rad", "crank angle")
+        found["crank_speed"] = (3, "rad/s", "speed of the crank")
+    return {
+        name: (("motion", "time"), states[..., at], {"units": unit, "long_name": meaning})
+        for name, (at, unit, meaning) in found.items()
+    }
+
+
 def _attributes(case: Case, kind: str, motions: int, seed: int) -> dict[str, object]:
     return {
-        "kind": kind, "title": case.title, "motions": motions, "seed": seed,
+        "Conventions": "CF-1.10", "format": "separatrix", "format_version": FORMAT_VERSION, "kind": kind,
+        "complete": 1, "title": case.title, "motions": motions, "seed": seed,
         "source": f"Separatrix {__version__}", "resolved_case": case.to_toml(),
     }  # fmt: skip
 
 
 def _duration(case: Case, duration: float | None) -> float:
-    length = float(case.resolved["run"]["duration"] if duration is None else duration)
-    if not 0 < length < np.inf:
-        raise SeparatrixError(f"noise: found duration {length:g} s, allowed more than 0", USAGE)
-    return length
+    return number(
+        "duration", case.resolved["run"]["duration"] if duration is None else duration, 0, above=True
+    )
+
+
+def _target(output: str | Path | None, overwrite: bool) -> Path | None:
+    target = None if output is None else Path(output).expanduser()
+    if target is not None and target.exists() and not overwrite:
+        raise SeparatrixError(f"{target}: exists; overwrite=True replaces it", CANNOT_CREATE)
+    return target
 
 
 def _axis(name: str, values: Sequence[float]) -> np.ndarray:
-    found = (
-        np.linspace(*values) if isinstance(values, tuple) and len(values) == 3 else np.array(values, float)
-    )
+    try:
+        found = (
+            np.linspace(float(values[0]), float(values[1]), count(name, values[2]))
+            if isinstance(values, tuple) and len(values) == 3
+            else np.array(values, float)
+        )
+    except (TypeError, ValueError):
+        found = np.empty(0)
     if found.ndim != 1 or not found.size or not np.isfinite(found).all():
-        raise SeparatrixError(f"{name}: found {values}, allowed numbers, or (first, last, count)", USAGE)
+        raise SeparatrixError(f"{name}: found {values!r}, allowed numbers, or (first, last, count)", USAGE)
     return found
 
 
-def _checked(
-    case: Case, force: float, impulses: tuple[float, float] | None, restitution: float,
-    leaves: Sequence[float] | str | None, step: float | None, seed: int,
-) -> _Noise:  # fmt: skip
+def _machine(case: Case, body: str | None, *start: float | str | None) -> Machine:
+    """Return where numbers are in the state of a machine; refuse one with a further state."""
     resolved = case.resolved
-    one_body = "mass" in resolved.get("body", {}) and "driven_mass" not in resolved["body"]
-    other = [name for name in ("motor", "effect", "state", "structure") if name in resolved]
-    if not one_body or other:
-        found = ", ".join(other) or "several bodies"
-        raise SeparatrixError(f"noise: found {found}, allowed one body, no motor, effects or states", USAGE)
+    other = [name for name in ("effect", "state", "structure") if name in resolved]
+    if not isinstance(resolved["body"].get("driven_mass", {}), dict):
+        other.append("two bodies of a pair")
+    friction = resolved.get("friction", {}).values()
+    other += [one["law"] for one in friction if isinstance(one, dict) and one.get("law") in _MEMORY]
+    if other:
+        raise SeparatrixError(
+            f"noise: found {', '.join(other)}, allowed machines without a further state", USAGE
+        )
+    names = ("x0", "v0", "crank_angle")
+    at = case.start(**dict(zip(names, start or (None,) * 3, strict=True)))
+    x, v, angle = (at[name] for name in names)
+    period = 2 * np.pi / float(case.model.drive_frequency({}))
+    if case.model.coordinates:
+        return _of_bodies(case, body, (x, v, angle), period)
+    if body is not None:
+        raise SeparatrixError(f"body: found {body!r} of a machine of one body, allowed None", USAGE)
     mass = float(resolved["body"]["mass"])
-    contact = resolved.get("contact", {"law": "none"})
-    if restitution and contact["law"] != "newton":
-        raise SeparatrixError(
-            f'noise: found restitution with contact.law "{contact["law"]}", allowed newton', USAGE
-        )
-    rate, deviation = impulses or (0.0, 0.0)
-    sizes = (force, rate, deviation, restitution)
-    if not all(0 <= one < np.inf for one in sizes) or (impulses and not rate > 0):
-        raise SeparatrixError(
-            "noise: allowed are values of 0 or more, and a rate of impulses more than 0", USAGE
-        )
-    at_impact = isinstance(leaves, str)
-    if at_impact and leaves != "impact":
-        raise SeparatrixError(f'leaves: found "{leaves}", allowed "impact" or (lower, upper)', USAGE)
-    if at_impact and contact["law"] == "none":
-        raise SeparatrixError(
-            'leaves: found "impact" of a body without a contact, allowed (lower, upper)', USAGE
-        )
-    lower, upper = (-np.inf, np.inf) if leaves is None or at_impact else map(float, leaves)
-    if not lower < upper:
-        raise SeparatrixError(f"leaves: found {lower} and {upper}, allowed lower < upper", USAGE)
-    frequency = float(case.model.drive_frequency({}))
-    period = 2 * np.pi / frequency
-    step = period / _KICKS if step is None else float(step)
-    if not 0 < step < np.inf:
-        raise SeparatrixError(f"noise: found step {step:g} s, allowed more than 0", USAGE)
-    stops = (float(contact.get("lower", -np.inf)), float(contact.get("upper", np.inf)))
-    coefficient = float(contact.get("restitution", 0.0))
-    return _Noise(
-        case, np.sqrt(force * step) / mass, impulses, coefficient, restitution, step, stops, (lower, upper),
-        at_impact, period, seed,
+    if "motor" not in resolved:
+        return Machine(case, np.array([x, v, angle]), (0, 1), (0, 1), mass, period)
+    motor = resolved["motor"]
+    # a current without inductance follows the speed
+    own = (
+        np.nan
+        if motor.get("inductance") == 0
+        else motor.get("start_current", motor.get("start_integral", 0.0))
+    )
+    state = np.array([x, angle, v, motor["crank_speed"], own], float)
+    return Machine(case, state, (0, 2), (0, 2), mass, np.inf)
+
+
+def _of_bodies(case: Case, body: str | None, start: tuple[float, ...], period: float) -> Machine:
+    bodies, names = case.resolved["body"], case.model.coordinates
+    watched = case.resolved.get("watch", {}).get("body", names[0])
+    body = watched if body is None else body
+    if body not in names:
+        raise SeparatrixError(f"body: found {body!r}, allowed {', '.join(names)}", USAGE)
+    state = [float(bodies[name].get(key, 0.0)) for key in ("x0", "v0") for name in names]
+    x, k = names.index(watched), names.index(body)
+    state[x], state[len(names) + x] = start[:2]
+    return Machine(
+        case, np.array([*state, start[2]]), (x, len(names) + x), (k, len(names) + k),
+        float(bodies[body]["mass"]), period,
     )  # fmt: skip
 
 
-class _Random:
-    """Normal and exponential numbers of a piece of the motions; number k is the same for any size of it."""
-
-    def __init__(self, seed: int, piece: int, count: int) -> None:
-        self.seed, self.piece, self.count = seed, piece, count
-
-    def normal(self, *purpose: int) -> np.ndarray:
-        return self._stream(purpose).standard_normal(self.count)
-
-    def exponential(self, *purpose: int) -> np.ndarray:
-        return self._stream(purpose).standard_exponential(self.count)
-
-    def _stream(self, purpose: tuple[int, ...]) -> np.random.Generator:
-        # Philox: a counter, and a key that is made of these numbers
-        return np.random.Generator(
-            np.random.Philox(np.random.SeedSequence([self.seed, self.piece, *purpose]))
+def _noise(
+    machine: Machine, force: float, impulses: tuple[float, float] | None, restitution: float,
+    leaves: Sequence[float] | str | None, step: float | None, seed: int,
+) -> Noise:  # fmt: skip
+    resolved = machine.case.resolved
+    force, deviation = number("force", force, 0), number("restitution", restitution, 0)
+    if impulses is not None:
+        rate, size = numbers("impulses", impulses, "(rate [1/s], deviation [m/s])")
+        impulses = (number("impulses: rate", rate, 0, above=True), number("impulses: deviation", size, 0))
+    one_body = not machine.case.model.coordinates
+    contact = resolved.get("contact", {"law": "none"}) if one_body else {}
+    if deviation and not (one_body and machine.turns and contact["law"] == "newton"):
+        what = (
+            f'contact.law "{contact["law"]}"' if one_body and machine.turns else "several bodies or a motor"
         )
-
-
-def _flown(noise: _Noise, starts: np.ndarray, times: np.ndarray, piece: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return states (motion, time, x and v) and times of first passage, infinite of what has not left."""
-    ensemble = _Ensemble(noise, starts, _Random(noise.seed, piece, len(starts)))
-    states = np.empty((len(starts), times.size, 2))
-    states[:, 0] = ensemble.state[:, :2]
-    ensemble.look()
-    count = 0
-    for k in range(1, times.size):
-        while True:
-            kick_at = (count + 1) * noise.step
-            kicks = noise.kick > 0 or np.isfinite(noise.leaves).any()
-            until = min(kick_at, times[k]) if kicks else times[k]
-            ensemble.move_to(float(until))
-            if kicks and kick_at <= times[k]:
-                count += 1
-                if noise.kick > 0:
-                    ensemble.state[:, 1] += noise.kick * ensemble.random.normal(_FORCE, count)
-            ensemble.look()
-            if until >= times[k]:
-                break
-        states[:, k] = ensemble.state[:, :2]
-    return states, ensemble.left
-
-
-class _Ensemble:
-    """Motions that are all at the same time between two kicks."""
-
-    def __init__(self, noise: _Noise, starts: np.ndarray, random: _Random) -> None:
-        self.noise, self.random, self.state = noise, random, starts.copy()
-        self.clock = np.zeros(len(starts))
-        self.left = np.full(len(starts), np.inf)
-        self.impulses = np.zeros(len(starts), int)
-        self.impacts = np.zeros(len(starts), int)
-        self.next_impulse = np.full(len(starts), np.inf)
-        self.drawn: dict[tuple[int, int], np.ndarray] = {}
-        self._wait(np.arange(len(starts)))
-
-    def look(self, which: np.ndarray | slice = slice(None)) -> None:
-        """Note which of these motions have left."""
-        lower, upper = self.noise.leaves
-        x = self.state[which, 0]
-        out = (x < lower) | (x > upper)
-        self.left[which] = np.where(out, np.minimum(self.left[which], self.clock[which]), self.left[which])
-
-    def move_to(self, until: float) -> None:
-        """Move all to a time [s], past impulses and impacts of random restitution."""
-        before = self.impacts.copy()
-        going = np.flatnonzero(self.clock < until)
-        while going.size:
-            aim = np.minimum(self.next_impulse[going], until)
-            struck = self._fly(going, aim, self.impacts[going] - before[going] < _MOST_IMPACTS)
-            self.clock[going[~struck]] = aim[~struck]
-            struck_now = going[~struck & (self.next_impulse[going] <= aim)]
-            if struck_now.size:
-                self._impulse(struck_now)
-            going = going[self.clock[going] < until]
-
-    def _fly(self, going: np.ndarray, aim: np.ndarray, may_bounce: np.ndarray) -> np.ndarray:
-        """Fly motions to times; which of them have come to an impact of random restitution before."""
-        noise = self.noise
-        waits = aim - self.clock[going]
-        flown = noise.case.model.segments(
-            [], np.zeros(0), self.state[going], np.arange(going.size + 1), waits, derivatives=False
+        raise SeparatrixError(f'restitution: found {what}, allowed one body with contact.law "newton"', USAGE)
+    at_impact = isinstance(leaves, str)
+    if at_impact and leaves != "impact":
+        raise SeparatrixError(f'leaves: found "{leaves}", allowed "impact" or (lower, upper)', USAGE)
+    if at_impact and not (contact["law"] != "none" if one_body else machine.case.model.contacts):
+        raise SeparatrixError(
+            'leaves: found "impact" of a body without a contact, allowed (lower, upper)', USAGE
         )
-        if flown.reason.any():
-            raise GivenUpError(f"noise: {np.count_nonzero(flown.reason)} motions had to be given up", None)
-        first, at = np.unique(flown.impact.segment, return_index=True)
-        if noise.at_impact:
-            hit = going[first]
-            self.left[hit] = np.minimum(self.left[hit], self.clock[hit] + flown.impact.time[at])
-        struck = np.zeros(going.size, bool)
-        if noise.deviation > 0:
-            struck[first] = may_bounce[first]
-        after = np.column_stack([flown.x, flown.v, self._angle(going, waits)])
-        chosen = struck[first]
-        self._bounce(going[first[chosen]], at[chosen], flown.impact)
-        self.state[going[~struck]] = after[~struck]
-        return struck
+    lower, upper = -np.inf, np.inf
+    if leaves is not None and not at_impact:
+        lower, upper = numbers("leaves", leaves, '"impact" or (lower, upper)')
+    if not lower < upper:
+        raise SeparatrixError(f"leaves: found {lower} and {upper}, allowed lower < upper", USAGE)
+    step = _step(machine) if step is None else number("step", step, 0, above=True)
+    kick = float(np.sqrt(force * step)) / machine.mass
+    return Noise(
+        kick, impulses, float(contact.get("restitution", 0.0)), deviation, step,
+        (float(contact.get("lower", -np.inf)), float(contact.get("upper", np.inf))), (lower, upper),
+        at_impact, seed,
+    )  # fmt: skip
 
-    def _bounce(self, hit: np.ndarray, at: np.ndarray, impact: Impacts) -> None:
-        """Put motions behind an impact, each with a restitution of its own."""
-        coefficient = np.empty(hit.size)
-        for number in np.unique(self.impacts[hit]):
-            mine = self.impacts[hit] == number
-            coefficient[mine] = self._numbers(_RESTITUTION, int(number))[hit[mine]]
-        coefficient = np.clip(self.noise.restitution + self.noise.deviation * coefficient, 0.0, 1.0)
-        self.state[hit, 2] = self._angle(hit, impact.time[at])
-        self.state[hit, 0] = np.where(impact.side[at] > 0, self.noise.stops[1], self.noise.stops[0])
-        self.state[hit, 1] = -impact.side[at] * coefficient * np.abs(impact.speed_before[at])
-        self.clock[hit] += impact.time[at]
-        self.impacts[hit] += 1
 
-    def _angle(self, which: np.ndarray, waits: np.ndarray) -> np.ndarray:
-        """Crank angles after waiting [rad]."""
-        return np.mod(self.state[which, 2] + 2 * np.pi * waits / self.noise.period, 2 * np.pi)
-
-    def _impulse(self, struck_now: np.ndarray) -> None:
-        deviation = self.noise.impulses[1]
-        for number in np.unique(self.impulses[struck_now]):
-            mine = struck_now[self.impulses[struck_now] == number]
-            self.state[mine, 1] += deviation * self._numbers(_IMPULSE, int(number))[mine]
-        self.look(struck_now)
-        self.impulses[struck_now] += 1
-        self._wait(struck_now)
-
-    def _wait(self, which: np.ndarray) -> None:
-        if self.noise.impulses is None:
-            return
-        for number in np.unique(self.impulses[which]):
-            mine = which[self.impulses[which] == number]
-            waits = self._numbers(_WAIT, int(number))[mine] / self.noise.impulses[0]
-            self.next_impulse[mine] = self.clock[mine] + waits
-
-    def _numbers(self, *purpose: int) -> np.ndarray:
-        """Numbers of all motions for a purpose, drawn once."""
-        if purpose not in self.drawn:
-            draw = self.random.exponential if purpose[0] == _WAIT else self.random.normal
-            self.drawn[purpose] = draw(*purpose)
-        return self.drawn[purpose]
+def _step(machine: Machine) -> float:
+    """Return a 64th of the drive period, or of a period that no spring between bodies is faster than."""
+    case = machine.case
+    fastest = float(case.model.drive_frequency({}))
+    bodies = case.resolved["body"]
+    # Gershgorin's bound on the squares of the natural frequencies
+    for name in case.model.coordinates:
+        springs = [
+            one for one in case.resolved.get("spring", {}).values() if name in np.atleast_1d(one["between"])
+        ]
+        stiffness = sum(2 * abs(float(one.get("stiffness", 0.0))) for one in springs)
+        fastest = max(fastest, float(np.sqrt(stiffness / bodies[name]["mass"])))
+    return 2 * np.pi / fastest / _KICKS

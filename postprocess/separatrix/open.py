@@ -22,7 +22,9 @@ from separatrix.words import decode_word
 FORMAT = "separatrix"
 # the oldest that is read
 _OLDEST = 1
-KINDS = ("basin", "sweep", "trajectory", "points", "branches", "boundary", "measures")
+KINDS = (
+    "basin", "sweep", "trajectory", "points", "branches", "boundary", "measures", "noise", "first_passage"
+)  # fmt: skip
 _TEXTS = ("case_text", "resolved_case")
 TABLES = ("catalogue", "limits", "saddles", "sets")
 

@@ -23,6 +23,7 @@ TOOLS = (
     "separatrix-view",
     "separatrix-discover",
     "separatrix-structure",
+    "separatrix-noise",
 )
 # one of each kind of file, small
 RUNS = {

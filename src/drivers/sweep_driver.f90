@@ -5,15 +5,18 @@
 module sweep_driver
   use attractors, only: longest_period
   use axis, only: axis_t, linear_values
-  use basin, only: basin_points, catalogue_t, points_at_a_time, slice_cache_t
+  use basin_work, only: basin_work_t, prepare_counts, sum_counts
+  use build_pair, only: is_pair
   use case_check, only: require_sweep
   use case_setup, only: grid_of, output_path, span_of, sweep_axes
   use case_type, only: case_t
   use catalogue_search, only: search_catalogues
   use command_line, only: command_t
+  use crank_catalogue, only: add_crank_catalogue
+  use derived_report, only: add_derived_catalogue
   use endings, only: assess_given_up, report_reasons
   use errors, only: error_t
-  use file_layout, only: add_map_variables, axis_dimension
+  use file_layout, only: add_catalogue, add_map_variables, axis_dimension
   use grid, only: grid_t
   use journal, only: duration_text, size_text
   use kinds, only: int64, wp
@@ -22,6 +25,7 @@ module sweep_driver
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
   use point_columns, only: at_impacts, at_reason, map_values
+  use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use sweep, only: hold_parameter, hold_t
@@ -29,26 +33,18 @@ module sweep_driver
   use sweep_report, only: describe_chains, report_given_up, report_limits
   use system, only: monotonic_seconds
   use text, only: to_text
-  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, point_work_t, run_tiles
+  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, run_tiles
   use work_watch, only: watch_t
-  use single_trajectory, only: span_t
   use written_check, only: check_written
   implicit none
   private
 
   public :: run_sweep
 
-  type, extends(point_work_t) :: branch_work_t
-    !> Grid over the swept parameter, x0 and v0; the file flattens the starts into one dimension.
-    type(grid_t) :: grid
-    type(span_t) :: span
-    integer :: max_period = 16
-    type(catalogue_t), allocatable :: catalogues(:)
-    type(slice_cache_t) :: cache
+  !> A map over the swept parameter, x0 and v0; the file flattens the starts into one dimension.
+  type, extends(basin_work_t) :: branch_work_t
     !> Per value: points with impacts and points without.
     integer(int64), allocatable :: impacting(:), free(:)
-    !> Points per reason.
-    integer(int64) :: reasons(0:last_reason) = 0
   contains
     procedure :: compute => compute_branch_points
     procedure :: note => note_branch_point
@@ -145,6 +141,7 @@ contains
       if (product(sweep%starts) > 0) then
         ! Without catalogues: every point discovers its own attractor, which takes longer.
         allocate (work%catalogues(0))
+        call prepare_counts(work%basin_work_t)
         call pilot_seconds(work, [size(values), product(sweep%starts)], seconds, error)
         call session%stop_if(error)
         call add_map_variables(points, 'branch_', ['value', 'start'], session%the_case%laws)
@@ -219,6 +216,7 @@ contains
     call search_catalogues(session%team, session%journal, work%grid, work%span, session%the_case%attractors, &
                            session%command%time_limit, work%catalogues, error)
     call session%stop_if(error)
+    call prepare_counts(work%basin_work_t)
     starts = product(work%grid%shape(2:3))
     associate (axes => work%grid%axes)
       x0 = [(axes(2)%values(1 + (i - 1)/work%grid%shape(3)), i=1, starts)]
@@ -234,11 +232,23 @@ contains
     call run_tiles(session, file, work, complete)
     call session%team%sum(work%impacting)
     call session%team%sum(work%free)
-    call session%team%sum(work%reasons)
+    call sum_counts(session, work%basin_work_t)
+    extra%positions_are_angles = position_is_angle(session%the_case%laws)
+    call add_catalogue(extra, work%catalogues, work%captured, is_pair(session%the_case%laws))
+    call add_crank_catalogue(session%team, work%grid, work%catalogues, extra)
+    if (complete) call add_derived_catalogue(session%team, work%grid, work%catalogues, work%span, extra)
     call finish_tiles(session, file, complete, extra)
     call report_multiple(session, work)
     call report_reasons(session%journal, work%reasons)
   end subroutine run_branches
+
+  !> Subscripts of a point of the file along the axes of the map.
+  pure function subscripts_of(grid, index) result(subscripts)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: index(:)
+    integer :: subscripts(3)
+    subscripts = [index(1), 1 + (index(2) - 1)/grid%shape(3), 1 + modulo(index(2) - 1, grid%shape(3))]
+  end function subscripts_of
 
   subroutine compute_branch_points(self, index, values, whole, error, watch)
     class(branch_work_t), intent(inout) :: self
@@ -247,11 +257,11 @@ contains
     logical, intent(out) :: whole
     type(error_t), allocatable, intent(out) :: error
     class(watch_t), intent(inout), optional :: watch
-    integer :: subscripts(3, size(index, 2))
-    subscripts(1, :) = index(1, :)
-    subscripts(2, :) = 1 + (index(2, :) - 1)/self%grid%shape(3)
-    subscripts(3, :) = 1 + modulo(index(2, :) - 1, self%grid%shape(3))
-    call basin_points(self%grid, self%span, self%max_period, self%catalogues, subscripts, self%cache, values, error, whole, watch)
+    integer :: subscripts(3, size(index, 2)), i
+    do i = 1, size(index, 2)
+      subscripts(:, i) = subscripts_of(self%grid, index(:, i))
+    end do
+    call self%basin_work_t%compute(subscripts, values, whole, error, watch)
   end subroutine compute_branch_points
 
   subroutine branch_points_from(self, index, points, error)
@@ -259,22 +269,20 @@ contains
     integer, intent(in) :: index(:)
     integer, intent(out) :: points
     type(error_t), allocatable, intent(out) :: error
-    points = 1
-    ! The slice depends on the first axis only.
-    if (size(self%catalogues) > 0) call points_at_a_time(self%grid, self%span, [index(1), 1, 1], self%cache, points, error)
+    call self%basin_work_t%points_from(subscripts_of(self%grid, index), points, error)
   end subroutine branch_points_from
 
   subroutine note_branch_point(self, index, values)
     class(branch_work_t), intent(inout) :: self
     integer, intent(in) :: index(:)
     real(wp), intent(in) :: values(:)
-    associate (reason => nint(values(at_reason)), subscripts => index(1))
-      self%reasons(reason) = self%reasons(reason) + 1
+    associate (reason => nint(values(at_reason)), at => index(1))
+      call self%basin_work_t%note(subscripts_of(self%grid, index), values)
       if (reason /= reason_settled .and. reason /= reason_time_over) return
       if (values(at_impacts) > 0) then
-        self%impacting(subscripts) = self%impacting(subscripts) + 1
+        self%impacting(at) = self%impacting(at) + 1
       else
-        self%free(subscripts) = self%free(subscripts) + 1
+        self%free(at) = self%free(at) + 1
       end if
     end associate
   end subroutine note_branch_point

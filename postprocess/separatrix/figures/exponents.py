@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from separatrix import style
 from separatrix.figures.caption import caption_pieces, describe_case, version_text
 from separatrix.figures.look import DEFAULT, Look
-from separatrix.figures.page import Figures, Page
+from separatrix.figures.page import Figures, Page, show_all
 from separatrix.labels import axis_label, count_text, plain, unit
 
 _COLOURS = ("#000000", "#777777")
@@ -37,8 +37,7 @@ def diagram(result: xr.Dataset, title: str, look: Look) -> Figure:
     handles = _exponents(ax, result, values) + _kinds(ax, result, values)
     ax.set_xlabel(axis_label(result[dim]))
     ax.set_ylabel(f"Lyapunov exponents ({unit(result['exponent'])})")
-    if values.size > 1:
-        ax.set_xlim(values.min(), values.max())
+    show_all(ax, values)
     page.letter()
     caption = [f"{count_text(values.size)} values of the parameter"]
     if both:

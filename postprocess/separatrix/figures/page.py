@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,6 +19,15 @@ from separatrix.layout import compose
 
 Maker = Callable[[], Figure]
 _BESIDE = 4.0  # points between the label of an axis and the legend below
+_ROOM = 0.01  # of the range of values, beside the first and the last
+
+
+def show_all(ax: Axes, values: np.ndarray) -> None:
+    """Limit the horizontal axis to values, with room for whole markers at the ends."""
+    low, high = float(values.min()), float(values.max())
+    if high > low:
+        room = _ROOM * (high - low)
+        ax.set_xlim(low - room, high + room)
 
 
 class Figures(Mapping):

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from separatrix import style
 from separatrix.figures.caption import caption_pieces, describe_case, version_text
 from separatrix.figures.look import DEFAULT, Look
-from separatrix.figures.page import Page
+from separatrix.figures.page import Page, show_all
 from separatrix.figures.regions import brackets, limit_texts
 from separatrix.labels import axis_label, flag_text, plain, unit
 from separatrix.open import flag_names, table
@@ -53,7 +53,7 @@ def regimes(result: xr.Dataset, name: str, title: str, look: Look = DEFAULT) -> 
     bottom.set_ylabel(f"velocity ({speed})\nonce per drive period")
     bottom.set_xlabel(axis_label(result[name]))
     for ax in page.axes:
-        ax.set_xlim(values.min(), values.max())
+        show_all(ax, values)
     page.letter()
     pieces = caption_pieces(result, look, describe_case(result))
     caption = [*pieces, *_limits_caption(result), plain(version_text(result))]

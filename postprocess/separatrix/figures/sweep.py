@@ -12,11 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from separatrix import style
-from separatrix.derived import PREFIX, short_name
+from separatrix.derived import PREFIX, at_points, derived_names, short_name
 from separatrix.figures import pair_sweep
 from separatrix.figures.caption import caption_pieces, describe_case, resolved_case, version_text
 from separatrix.figures.look import DEFAULT, UNITS, Look
-from separatrix.figures.page import Figures, Page
+from separatrix.figures.page import Figures, Page, show_all
 from separatrix.figures.regions import Boundary, Region, boundaries, limit_texts, regions
 from separatrix.labels import axis_label, count_text, plain, unit
 from separatrix.open import table
@@ -32,7 +32,9 @@ _NOT_RUN = 0
 def figures(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figures:
     """Return the figures of a sweep file by name."""
     look.require("sweep", "region", "units")
-    result = look.selected(result)
+    # before a region is chosen: a slice is known by its number among all values
+    starts = [at_points(result, name) for name in derived_names(result)]
+    result = look.selected(result.assign({str(one.name): one for one in starts}))
     if "driven_mass" in resolved_case(result).get("body", {}):
         return Figures({"regimes": partial(pair_sweep.regimes, result, swept_axis(result), title, look)})
     return Figures(
@@ -58,7 +60,7 @@ def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> F
     name = swept_axis(result)
     page = Page(look, (style.DOUBLE_COLUMN, 85.0))
     (ax,) = page.axes
-    handles = _draw_branches(ax, result, name)
+    handles = _draw_branches(ax, result, name, "branch_x_max", "branch_x_min")
     handles += _draw_runs(ax, result, name)
     handles += _draw_barriers(ax, result)
     handles += _draw_regions(ax, result, name)
@@ -69,13 +71,14 @@ def amplitude_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> F
 
 
 def derived_diagram(result: xr.Dataset, key: str, title: str, look: Look = DEFAULT) -> Figure:
-    """Return a derived quantity against the swept parameter, both runs."""
+    """Return a derived quantity against the swept parameter, both runs and the many starts."""
     name = swept_axis(result)
     page = Page(look, (style.DOUBLE_COLUMN, 70.0))
     (ax,) = page.axes
     values = result[name].values
+    handles = _draw_branches(ax, result, name, f"branch_{key}")
     _draw_run_pair(ax, values, result[key].transpose("direction", name).values, result)
-    ax.set_xlim(values.min(), values.max())
+    show_all(ax, values)
     ax.set_xlabel(axis_label(result[name]))
     ax.set_ylabel(axis_label(result[key].assign_attrs(label=short_name(result[key]))))
     caption = [
@@ -83,7 +86,7 @@ def derived_diagram(result: xr.Dataset, key: str, title: str, look: Look = DEFAU
         *_caption(result, name, look),
         plain(version_text(result)),
     ]
-    return page.finish(title, caption, _run_handles(result), columns=5)
+    return page.finish(title, caption, [*handles, *_run_handles(result)], columns=5)
 
 
 def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) -> Figure:
@@ -112,7 +115,7 @@ def bifurcation_diagram(result: xr.Dataset, title: str, look: Look = DEFAULT) ->
         bottom.set_ylim(bottom=min(0.0, bottom.get_ylim()[0]))
     page.axes[-1].set_xlabel(axis_label(result[name]))
     for ax in page.axes:
-        ax.set_xlim(values.min(), values.max())
+        show_all(ax, values)
     page.letter()
     caption = [
         f"last {result.sizes['sample']} stroboscopic points of each hold",
@@ -149,10 +152,10 @@ def _runs_agree(section: np.ndarray) -> np.ndarray:
         return (np.abs(low[0] - low[1]) <= room) & (np.abs(high[0] - high[1]) <= room)
 
 
-def _draw_branches(ax: Axes, result: xr.Dataset, name: str) -> list[Line2D]:
-    if "branch_x_max" not in result:
+def _draw_branches(ax: Axes, result: xr.Dataset, name: str, *keys: str) -> list[Line2D]:
+    if keys[0] not in result:
         return []
-    for key in ("branch_x_max", "branch_x_min"):
+    for key in keys:
         values = result[key].transpose(name, "start").values
         along = np.broadcast_to(result[name].values[:, np.newaxis], values.shape)
         ax.scatter(
@@ -173,7 +176,7 @@ def _draw_runs(ax: Axes, result: xr.Dataset, name: str) -> list[Line2D]:
     values = result[name].values
     for key in ("x_max", "x_min"):
         _draw_run_pair(ax, values, result[key].transpose("direction", name).values, result)
-    ax.set_xlim(values.min(), values.max())
+    show_all(ax, values)
     return _run_handles(result)
 
 

@@ -7,12 +7,12 @@ import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import h5py
 import numpy as np
 import xarray as xr
 
 from separatrix.cases import Case, as_case
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
+from separatrix.kept_rows import KeptRows, write_dataset
 from separatrix.map_axes import Values
 from separatrix.maps import basin
 from separatrix.measuring.api import NAMES, measures
@@ -83,7 +83,12 @@ def measures_along(
     if chosen is None:
         chosen = ("basin_stability",) if "sample" in result["attractor"].dims else ("global_integrity",)
     dim = _parameter(result, parameter, slice)
-    done = _Done(target, _identity(result, dim, chosen, slice, options), resume)
+    done = KeptRows(
+        target,
+        _identity(result, dim, chosen, slice, options),
+        resume,
+        "is of another map, or of other measures",
+    )
     rows = []
     with Progress(progress) as report:
         for number, value in enumerate(result[dim].values.tolist()):
@@ -99,7 +104,7 @@ def measures_along(
     data = _dataset(result, dim, rows)
     if target is None:
         return data
-    _write(data, target)
+    write_dataset(data, target)
     done.remove()
     return open_result(target)
 
@@ -169,43 +174,6 @@ def _identity(result: xr.Dataset, dim: str, *more: object) -> str:
     return f"{zlib.crc32(content.encode()):08x}{zlib.crc32(labels.tobytes()):08x}"
 
 
-class _Done:
-    """The values that are done, kept beside the output until it is written."""
-
-    def __init__(self, target: Path | None, identity: str, resume: bool) -> None:
-        self.path = None if target is None else target.with_name(target.name + ".part")
-        self.rows: dict[int, list] = {}
-        if self.path is None:
-            return
-        if resume and self.path.exists():
-            lines = self.path.read_text().splitlines()
-            if not lines or lines[0] != identity:
-                raise SeparatrixError(f"{self.path}: is of another map, or of other measures", USAGE)
-            for line in lines[1:]:
-                try:
-                    number, row = json.loads(line)
-                except ValueError:
-                    # the last line of a run that was killed
-                    break
-                self.rows[number] = row
-        self.path.write_text("\n".join([identity, *(json.dumps(item) for item in self.rows.items())]) + "\n")
-
-    def row(self, number: int) -> list | None:
-        return self.rows.get(number)
-
-    def keep(self, number: int, row: list) -> list:
-        # as it is read again
-        text = json.dumps([number, row])
-        if self.path is not None:
-            with self.path.open("a") as file:
-                file.write(text + "\n")
-        return json.loads(text)[1]
-
-    def remove(self) -> None:
-        if self.path is not None:
-            self.path.unlink()
-
-
 def _dataset(result: xr.Dataset, dim: str, rows: list[list[dict]]) -> xr.Dataset:
     numbers = sorted({int(one["of"]) for row in rows for one in row if one["of"] is not None})
     numbers = sorted({*numbers, *(int(one) for one in result["catalogue_attractor"].values)})
@@ -270,24 +238,3 @@ def _existence(result: xr.Dataset, dim: str, numbers: list[int], count: int) -> 
             },
         )
     }
-
-
-def _write(data: xr.Dataset, target: Path) -> None:
-    """Write a file that `open_result` reads; the case is kept where result files have it."""
-    part = target.with_name(target.name + ".writing")
-    try:
-        plain = data.drop_attrs(deep=False).assign_attrs(
-            {key: value for key, value in data.attrs.items() if key != "resolved_case"}
-        )
-        # of the map, not of what is written here
-        for variable in plain.variables.values():
-            variable.attrs.pop("checksum", None)
-        plain.to_netcdf(
-            part, engine="h5netcdf", encoding={name: {"_FillValue": None} for name in plain.variables}
-        )
-        with h5py.File(part, "a") as file:
-            file.create_group("provenance").attrs["resolved_case"] = data.attrs["resolved_case"]
-        part.replace(target)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise SeparatrixError(f"{target}: cannot be written ({error})", CANNOT_CREATE) from error

@@ -7,6 +7,7 @@ import math
 import h5py
 import numpy as np
 import pytest
+import separatrix as sx
 from program import differences, run, succeed
 
 QUANTITIES = """
@@ -250,3 +251,40 @@ def test_an_operation_that_is_not_defined_is_not_known(separatrix, tmp_path):
     assert np.isnan(found["a"]) and found["b"] > 0
     info = succeed(separatrix, "trajectory", "case.toml", "-o", "again.h5", folder=tmp_path)
     assert "a: not known (mean of log(x))" in info.out
+
+
+def test_the_many_starts_of_a_sweep_have_those_of_their_attractors(separatrix, tmp_path):
+    """With and without impacts; what a start has is what its motion has; the same bits for three ranks."""
+    text = IMPACTING.replace("amplitude = 1, ratio = 1", "amplitude = 0.4, ratio = 1.3").replace(
+        "0.1", "0.05"
+    )
+    text += 'derived.lost = { quantity = "power", of = "contacts" }\n'
+    text += (
+        'sweep = { parameter = "drive.ratio", from = 1.28, to = 1.32, count = 3, starts = [3, 3], '
+        "x0 = [-4, 1], v0 = [-4, 4] }\n"
+    )
+    (tmp_path / "case.toml").write_text(text)
+    succeed(separatrix, "sweep", "case.toml", "-o", "one.h5", folder=tmp_path)
+    succeed(separatrix, "sweep", "case.toml", "-o", "three.h5", folder=tmp_path, ranks=3)
+    assert not [
+        name for name in differences(tmp_path / "one.h5", tmp_path / "three.h5") if "catalogue" in name
+    ]
+    assert "invariants hold" in succeed(separatrix, "verify", "one.h5", folder=tmp_path).out
+    sweep = sx.open_result(tmp_path / "one.h5")
+    lost = sweep.separatrix.derived()["branch_derived_lost"]
+    assert lost.dims == ("drive_ratio", "start") and lost.attrs["units"] == "W"
+    catalogue = sweep.separatrix.attractors
+    assert catalogue["count"].sum() == (sweep.branch_attractor.values > 0).sum()
+    assert len(np.unique(sweep.branch_attractor)) > 1
+    for value, start in [(0, 0), (1, 4), (2, 8), (2, 2)]:
+        options = [f"start.x0={float(sweep.start_x0[start])}", f"start.v0={float(sweep.start_v0[start])}"]
+        options.append(f"drive.ratio={float(sweep.drive_ratio[value])}")
+        options = [word for option in options for word in ("--set", option)]
+        succeed(separatrix, "trajectory", "case.toml", *options, "-o", "t.h5", "--force", folder=tmp_path)
+        with h5py.File(tmp_path / "t.h5") as file:
+            assert float(lost[value, start]) == pytest.approx(file.attrs["derived_lost"], rel=1e-9, abs=1e-12)
+    # by label and number among all values, also in a figure of some of them
+    named = sweep.separatrix.table("branch_regime")
+    assert np.array_equal(named["branch_derived_lost"], lost.values.ravel(), equal_nan=True)
+    drawn = sweep.separatrix.plot("derived_lost", region={"drive.ratio": (1.3, 1.32)}).axes[0].collections[0]
+    assert np.asarray(drawn.get_offsets())[:, 1] == pytest.approx(lost.values[1:].ravel(), nan_ok=True)

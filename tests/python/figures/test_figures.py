@@ -37,6 +37,16 @@ def test_runs_and_branches_are_all_drawn(tmp_path: Path) -> None:
     assert sum(len(points.get_offsets()) for points in figure.axes[0].collections) == 2 * 6 * ratios.size
 
 
+@pytest.mark.parametrize("make", [sweep.amplitude_diagram, sweep.bifurcation_diagram])
+def test_markers_at_the_ends_of_a_sweep_are_whole(tmp_path: Path, make) -> None:
+    """The largest is 4 points wide with its edge."""
+    ratios = np.linspace(0.7, 1.8, 23)
+    for ax in drawn(write_sweep(tmp_path / "s.h5", ratios), make).axes:
+        points = ax.transData.transform([(end, 0) for end in ratios[[0, -1]]])[:, 0] * 72 / ax.figure.dpi
+        box = ax.get_window_extent()
+        assert points[0] - box.x0 * 72 / ax.figure.dpi > 2 and box.x1 * 72 / ax.figure.dpi - points[1] > 2
+
+
 def test_a_one_way_sweep_has_one_run(tmp_path: Path) -> None:
     path = write_sweep(tmp_path / "s.h5", np.linspace(0.7, 1.8, 23))
     with h5py.File(path, "r+") as file:
