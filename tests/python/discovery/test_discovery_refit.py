@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A machine that contains the base fits no worse, or its fit is not taken for converged."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from separatrix.discovery.fitting import refit
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.machine import IMPERFECTION, Free
 from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.policy import FIT
 
 FREE = [Free("restoring.stiffness", 9.0), Free("effect.viscous.damping", 0.5, lower=0.0)]
 
@@ -132,3 +134,38 @@ def test_a_segment_with_unsteady_impacts_counts_for_what_its_squares_prove(chi2,
     one.fit.chi2[1], one.fit.chi2[3] = chi2, 0.0
     assert refit.gain_over(one, base)[0] == pytest.approx(gained)
     assert refit.gain_over(base, one)[0] == pytest.approx(-gained)
+
+
+@pytest.mark.parametrize(
+    ("chi2", "of_base", "wanted"),
+    [(55.0, 100.0, True), (60.0, 100.0, False), (60.0, 1e6, True), (75.0, 1e6, False)],
+)
+def test_a_machine_that_nearly_leaves_noise_of_a_large_gap_settles_it(chi2, of_base, wanted):
+    """Of 192 degrees of freedom: 1.15 and 1.25 are within two and four standard deviations, 1.56 is not."""
+    one, base = (Fitted((), None, None, fit([8.0], size), ()) for size in (chi2, of_base))
+    assert refit.leaves_noise(one, base) == wanted
+
+
+@pytest.mark.parametrize(("ended_at", "carried"), [(80.0, True), (300.0, False)])
+def test_a_fit_that_ends_on_its_way_is_carried_on_before_others_are_begun(monkeypatch, ended_at, carried):
+    unfinished = replace(fit([8.0, 0.3], ended_at), decrement=270.0)
+    begun = []
+
+    def minimise(problem, values, starts, most=25, **_):
+        begun.append(most)
+        return fit(values.tolist(), 50.0)
+
+    monkeypatch.setattr(refit, "minimise", minimise)
+    monkeypatch.setattr(refit, "_try", lambda *_: (None, unfinished))
+    monkeypatch.setattr(refit, "polished", lambda data, problem, found, *_, **__: found)
+    base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 400.0), ())
+    candidate = SimpleNamespace(
+        names=("viscous",), model=None, free=FREE, added=(1,), linear=np.array([True]), starts=[]
+    )
+    screened = SimpleNamespace(
+        step={"viscous": np.ones(1)}, origin={"viscous": np.zeros(1)}, live={"viscous": np.ones(1) > 0},
+        gain={"viscous": 700.0},
+    )  # fmt: skip
+    found = refit.refit(SimpleNamespace(last=0), base, candidate, screened)
+    assert (FIT.fit_on in begun) == carried
+    assert found.fit.converged == carried

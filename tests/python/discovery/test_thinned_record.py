@@ -10,6 +10,7 @@ from separatrix.discovery.fitting.observations import observation_of
 from separatrix.discovery.fitting.sensed import measure_sensors
 from separatrix.discovery.measured.records import Record, make_record
 from separatrix.discovery.measured.sensors import prepare_sensors
+from separatrix.discovery.measured.signals import clipped_noise, white_noise
 from separatrix.discovery.measured.thinned_record import (
     at_middle,
     block_length,
@@ -49,6 +50,15 @@ def test_rows_are_the_motion_at_the_middle_of_blocks_with_white_noise() -> None:
     left = at_middle(means_of(record_of(noise), noise, size), size)
     assert np.std(left) == pytest.approx(SIGMA / np.sqrt(size), rel=0.05)
     assert abs(np.corrcoef(left[1:], left[:-1])[0, 1]) < 0.05
+
+
+def test_the_noise_of_samples_is_known_better_than_by_a_median() -> None:
+    samples = [np.random.default_rng([7, i]).standard_normal(COUNT) for i in range(60)]
+    by_median, by_squares = (np.array([f(x) for x in samples]) for f in (white_noise, clipped_noise))
+    assert np.mean(by_squares) == pytest.approx(1, abs=3e-3)
+    assert np.std(by_squares) < 0.008 < np.std(by_median)
+    jumping = samples[0] + 50 * (T > 7)
+    assert clipped_noise(jumping) == pytest.approx(by_squares[0], rel=1e-3)
 
 
 def test_a_jump_of_the_velocity_is_not_compared_and_fast_motion_keeps_its_samples() -> None:

@@ -22,13 +22,15 @@ from separatrix.discovery.fitting.refit import (
     crossed,
     gain_over,
     imitating,
+    leaves_noise,
     refit,
+    rough_total,
 )
 from separatrix.discovery.fitting.rig import cleaned, with_imperfections
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.fitting.time_limit import TimeLimit
 from separatrix.discovery.options import Options
-from separatrix.discovery.policy import SEARCH
+from separatrix.discovery.policy import FIT, SEARCH
 
 
 @dataclass
@@ -135,6 +137,8 @@ def run_round(
     # earlier leaders come first: the others may then be far behind at once
     ranked = list(known)
     chosen.sort(key=lambda name: ranked.index(name) if name in ranked else len(ranked))
+    if rival is None and not ranked and base.fit.reduced_chi2 > FIT.near_base:
+        chosen = _promising_first(context, found, chosen)
     for number, name in enumerate(chosen):
         if found.scored and not context.has_result:
             context.limit.work_counts = True
@@ -164,6 +168,18 @@ def run_round(
     _same_motion(context, found)
     _fair(context, found)
     return found
+
+
+def _promising_first(context: SearchContext, found: Round, names: list[str]) -> list[str]:
+    """The order of a few steps of each: far from the base the screen is none.
+
+    A machine that closes the gap spares the others most of their starts.
+    """
+    totals = {}
+    for number, name in enumerate(names):
+        context.report(f"trying {name}", number / len(names) / 2)
+        totals[name] = rough_total(context.training, found.base, found.candidates[name], found.screened)
+    return sorted(names, key=totals.get)
 
 
 def _screened(context: SearchContext, base: Fitted, predicted: Prediction | None) -> Round:
@@ -220,7 +236,7 @@ def _leading(found: Round) -> Prediction | None:
 
 
 def _far_behind(fitted: Fitted, found: Round, rival: Fitted | None) -> bool:
-    if rival is None or not (rival.fit.like_noise(2) and beaten(fitted, rival)):
+    if rival is None or not (leaves_noise(rival, found.base) and beaten(fitted, rival)):
         return False
     return rival is found.base or any(one.fitted is rival and one.held_out >= 0 for one in found.scored)
 

@@ -47,9 +47,10 @@ def fit_base(data: Data, model, mass: float) -> Fitted:
 
 def _same_far_minimum(one: Fit, other: Fit) -> bool:
     """Whether two fits of a machine that lacks much follow the same segments as badly."""
-    if one.good.sum() != other.good.sum() or one.reduced_chi2 < FIT.near_base**2:
+    if one.good.sum() != other.good.sum() or one.reduced_chi2 < 2:
         return False
-    return abs(one.total - other.total) < FIT.alike_behind * one.total
+    alike = FIT.alike_behind if one.reduced_chi2 > FIT.near_base**2 else FIT.alike_near
+    return abs(one.total - other.total) < alike * one.total
 
 
 def _follows_better(fit: Fit, best: Fit) -> bool:

@@ -279,7 +279,8 @@ def fit_stages(
         starts = data.smoothed_starts(stage) if known is None else data.carried_starts(stage, *known)
         begun = None
         if robust:
-            more = {"hopeless": hopeless, "fixed": fixed, "rough": not last}
+            # it only starts the fit by squares, or longer segments
+            more = {"hopeless": hopeless, "fixed": fixed, "rough": True}
             fit = minimise(problem, values, starts, robust=True, most=most, **more)
             values, starts, begun = fit.values, fit.starts, fit.evaluation
         if not robust or last:

@@ -219,7 +219,8 @@ class _Descent:
             self.open = _open(self.blocks, self.values, self.lower, self.upper, self.movable)
             _, _, self.decrement = gauss_newton_step(self.blocks, self.open)
             cost = _cost(self.current, self.inside, self.scale, self.robust)
-            more = self.decrement >= max(tolerance, 1e-5 * cost)
+            share = FIT.fit_rough_share if rough and self.robust else FIT.fit_share
+            more = self.decrement >= max(tolerance, share * cost)
             if self.kept is None or (rough and not more):
                 return more
             if more and self.decrement * FIT.fit_falls <= self.kept:

@@ -64,7 +64,7 @@ def refit(
         if out or _delivers(best, base, candidate, screened):
             return best
     values = _base_values(base, candidate)
-    settled = rival is not None and rival.fit.converged and rival.fit.like_noise(2)
+    settled = rival is not None and rival.fit.converged and leaves_noise(rival, base)
     for tries, (kind, start) in enumerate(_starts(candidate, screened), start=1):
         tried = values.copy()
         tried[list(candidate.added)] = start
@@ -79,6 +79,9 @@ def refit(
         if kind == "linear" and not fit.far_off(hopeless(base)):
             # of other kinds it was done with the last stage
             fit = polished(data, problem, fit, data.last, 8, rival=base.fit)
+            if not settled and not fit.converged and fit.excess < (1 - FIT.most_closed) * base.fit.excess:
+                # it was ended on its way; a start from afar costs more
+                fit = minimise(problem, fit.values, fit.starts, most=FIT.fit_on)
         found = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
         agreed = best is not None and _agree({kind, best_kind}, found, best, base, rival)
         if best is None or _better(found, best):
@@ -97,6 +100,30 @@ def refit(
             # the other starts of a known fit were tried before
             break
     return _above_base(data, best, base, candidate)
+
+
+def leaves_noise(rival: Fitted, base: Fitted) -> bool:
+    """Whether a machine leaves noise, or nearly so and next to nothing of a gap that was far larger."""
+    fit = rival.fit
+    if fit.like_noise(2):
+        return True
+    return fit.like_noise(FIT.nearly_noise) and fit.excess < FIT.nothing_left * base.fit.excess
+
+
+def rough_total(data: Data, base: Fitted, candidate: Candidate, screened: Screened) -> float:
+    """Sum of squares after a few steps from the linearised estimate; infinite where there is none.
+
+    Segments that the base follows and the candidate does not count as the base leaves them.
+    """
+    kind, start = next(iter(_starts(candidate, screened)), ("", None))
+    if kind != "linear":
+        return np.inf
+    values = _base_values(base, candidate)
+    values[list(candidate.added)] = start
+    problem = data.problem(candidate.model, data.last, candidate.free)
+    fit = minimise(problem, values, base.fit.starts, most=FIT.fit_fewest, rough=True)
+    lost = base.fit.good & ~fit.good
+    return fit.total + float(base.fit.chi2[lost].sum())
 
 
 def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | None) -> bool:

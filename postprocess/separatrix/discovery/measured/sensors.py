@@ -15,7 +15,7 @@ from separatrix.discovery.measured.bodies import Structure, structure_of
 from separatrix.discovery.measured.condense import whole
 from separatrix.discovery.measured.preflight import Prepared, check_periods, from_measured_angle
 from separatrix.discovery.measured.records import Record
-from separatrix.discovery.measured.signals import resolution_of, white_noise
+from separatrix.discovery.measured.signals import clipped_noise, resolution_of, white_noise
 from separatrix.discovery.measured.smoother import Smoothed, smooth
 from separatrix.discovery.measured.thinned_record import (
     block_length,
@@ -155,10 +155,11 @@ def _thin(prepared: SensedPrepared) -> None:
     thin = prepared.record = thinned_record(record, size)
     watched = {"x": thin.x, "v": thin.v}
     for one in sensors:
+        sigma = one.sigma if one.stated else max(clipped_noise(one.values), prepared.resolution / np.sqrt(12))
         one.values = thin.sensors.get(one.name, watched.get(one.kind))
         # noise with memory is not as much smaller; white noise is known better than any fit shows it
         # the correction of the curvature adds the noise of the means two blocks apart
-        expected, seen = one.sigma * np.sqrt((1 + 1 / 24) / size), white_noise(one.values)
+        expected, seen = sigma * np.sqrt((1 + 1 / 24) / size), white_noise(one.values)
         one.sigma, one.stated = max(expected, seen), one.stated or seen < RECORDS.white * expected
         one.known = known.copy()
     prepared.block, prepared.samples, prepared.sigma = size, whole(thin), sensors[0].sigma

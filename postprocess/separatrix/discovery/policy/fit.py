@@ -68,6 +68,9 @@ class Fit:
     fit_little_share: float = row(3e-5, "1", "campaign", "the same as a share of chi^2")
     fit_without_gain: int = row(2, "1", "effort", "negligible steps in a row that end a fit")
     fit_patience: int = row(4, "1", "effort", "the same of a patient fit")
+    fit_share: float = row(1e-5, "1", "campaign", "decrement over the loss at which a fit ends")
+    fit_rough_share: float = row(2e-3, "1", "campaign",
+        "the same of a fit by Huber's loss, whose weights converge slowly and which only starts another")
     fit_rough: float = row(0.5, "1", "campaign", "decrement at which a fit ends that only starts another")
     fit_as_promised: float = row(0.25, "1", "campaign",
         "error of a promised gain up to which derivatives are kept")
@@ -150,10 +153,15 @@ class Fit:
         "distance by which a machine that contains the base may be worse")
     same_minimum: float = row(1e-3, "1", "campaign", "share of chi^2 by which two fits of one minimum differ")
     alike_behind: float = row(0.05, "1", "campaign", "the same of two fits far behind")
+    alike_near: float = row(0.02, "1", "campaign", "the same of two fits of the base that are nearer")
     near_base: float = row(10.0, "1", "campaign",
         "reduced chi^2 of the base up to which a start from it is trusted")
+    nearly_noise: float = row(4.0, "1", "test",
+        "standard deviations of chi^2 within which a machine nearly leaves noise")
+    nothing_left: float = row(1e-3, "1", "campaign", "share of a gap that is next to nothing of it")
     most_closed: float = row(0.5, "1", "campaign",
-        "share of the gap closed by a rival for one start to be enough")
+        "share of the gap closed by a rival for one start to be enough; by a fit to be carried on at once")
+    fit_on: int = row(40, "1", "effort", "iterations of such a fit")
     farthest: float = row(25.0, "1", "campaign",
         "usual sizes beyond which a linearised estimate is not believed")
     # fitting/rescue.py

@@ -153,6 +153,8 @@ class Search:
         "share of the gap that a force of one joint must close")
     # decision/stages/in_part.py
     pairs_in_part: int = row(12, "1", "effort", "pairs of effects that are fitted for names in part")
+    hardly_apart: float = row(0.98, "1", "test",
+        "correlation of the estimates of two effects from which they are known as a pair only")
     leaders_in_part: int = row(2, "1", "effort",
         "leading effects to which another is added for names in part")
     closes_in_part: float = row(0.1, "1", "campaign",

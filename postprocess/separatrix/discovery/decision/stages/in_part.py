@@ -9,6 +9,7 @@ choose. Of the candidates that predict no worse than the best, the one with the 
 Each effect must close a share of the held-out gap that no other effect closes.
 """
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,7 @@ from separatrix.discovery.decision.scoring import (
 from separatrix.discovery.decision.several import fit_set, over_base, without
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.ceiling import ceiling
+from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH
 
@@ -64,9 +66,36 @@ def effects_in_part(state: SearchState) -> SearchState:
         complete=complete,
         accepted=[whole],
         rounds=rounds,
-        reasons=[*([] if complete else remaining(context, whole)), *odd],
+        reasons=[*([] if complete else remaining(context, whole)), *hardly_apart(whole.fitted), *odd],
     )
     return state.decided(named)
+
+
+def hardly_apart(fitted: Fitted) -> list[str]:
+    """Pairs of effects in words of which the records show little more than a combination.
+
+    Their estimates are correlated so much that each error is mostly that of the other.
+    """
+    owners = {
+        i: name
+        for i in fitted.added
+        for name in fitted.names
+        if fitted.problem.free[i].path.startswith(f"effect.{name}.")
+    }
+    covariance, found = fitted.covariance, {}
+    for i, j in itertools.combinations(owners, 2):
+        both = float(np.sqrt(covariance[i, i] * covariance[j, j]))
+        pair = owners[i], owners[j]
+        if pair[0] == pair[1] or both <= 0:
+            continue
+        correlation = float(covariance[i, j]) / both
+        if abs(correlation) > max(SEARCH.hardly_apart, abs(found.get(pair, 0.0))):
+            found[pair] = correlation
+    return [
+        f"{one} and {other} are known as a pair only: their estimates have a correlation of {size:.4f}; "
+        "a record in which only one of them acts would distinguish them"
+        for (one, other), size in found.items()
+    ]
 
 
 def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
