@@ -280,7 +280,8 @@ def _checked(
     if not 0 < step < np.inf:
         raise SeparatrixError(f"noise: found step {step:g} s, allowed more than 0", USAGE)
     stops = (float(contact.get("lower", -np.inf)), float(contact.get("upper", np.inf)))
-    coefficient = float(contact.get("restitution", 0.0))
+    # an expression where it is not drawn
+    coefficient = float(contact["restitution"]) if restitution else 0.0
     return _Noise(
         case, np.sqrt(force * step) / mass, impulses, coefficient, restitution, step, stops, (lower, upper),
         at_impact, period, seed,

@@ -11,6 +11,7 @@ from separatrix.noise import wilson
 pytestmark = pytest.mark.usefixtures("library")
 
 MASS, STIFFNESS, DAMPING = 2.0, 50.0, 3.0
+EXPRESSION = "contact = { law = 'expression', restitution = '1/(2 + speed)', upper = 0.2 }\n"
 LINEAR = f"""
 body.mass = {MASS}
 restoring = {{ law = "linear", stiffness = {STIFFNESS} }}
@@ -145,6 +146,7 @@ def test_the_interval_of_wilson():
         (LINEAR, {"leaves": "rest"}, 'allowed "impact"'),
         (LINEAR, {"leaves": "impact"}, "without a contact"),
         (LINEAR, {"motions": 0}, "motions from 1"),
+        (f"{LINEAR}{EXPRESSION}", {"force": 0.1}, "trajectory, basin and sweep"),
         ('body.a.mass = 1\nspring.s = { between = ["a"], stiffness = 1 }\n', {}, "several bodies"),
     ],
 )
