@@ -247,7 +247,9 @@ def _checked(
     leaves: Sequence[float] | str | None, step: float | None, seed: int,
 ) -> _Noise:  # fmt: skip
     resolved = case.resolved
-    one_body = "mass" in resolved.get("body", {}) and "driven_mass" not in resolved["body"]
+    body = resolved.get("body", {})
+    # one of several bodies may be called mass
+    one_body = "mass" in body and not isinstance(body["mass"], dict) and "driven_mass" not in body
     other = [name for name in ("motor", "effect", "state", "structure") if name in resolved]
     if not one_body or other:
         found = ", ".join(other) or "several bodies"

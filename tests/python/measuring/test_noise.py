@@ -148,6 +148,7 @@ def test_the_interval_of_wilson():
         (LINEAR, {"motions": 0}, "motions from 1"),
         (f"{LINEAR}{EXPRESSION}", {"force": 0.1}, "trajectory, basin and sweep"),
         ('body.a.mass = 1\nspring.s = { between = ["a"], stiffness = 1 }\n', {}, "several bodies"),
+        ('body.mass.mass = 1\nspring.s = { between = ["mass"], stiffness = 1 }\n', {}, "several bodies"),
     ],
 )
 def test_what_is_not_allowed_is_refused(text, more, message):
