@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 
 import h5py
+import mutant_cases
 import numpy as np
 from program import CASE, STARTS, make_results
 from scipy import io, sparse
@@ -19,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 #: What a case needs to be run in no time.
 _SMALL = {"count": 3, "sample": 3, "samples": 3, "searches": 2, "periods": 20}
 _LONGEST = 30
+_BLOCK = re.compile(r"^```toml\n(.*?)^```", re.DOTALL | re.MULTILINE)
 T = np.arange(240) / 60
 X = 0.4 + 0.1 * np.sin(7.5 * T)
 STIFFNESS = np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, -0.5], [0.0, -0.5, 4.0]])
@@ -26,21 +28,31 @@ MASS = np.diag([1.0, 2.0, 0.5])
 
 
 def cases(folder: Path) -> list[Path]:
-    """Write the examples with few points and short runs, each with the files that it names."""
+    """Write the examples and the cases of the documents with few points and short runs."""
+    texts = {
+        f"{path.parent.name}_{path.name}": path.read_text() for path in (ROOT / "examples").rglob("*.toml")
+    }
+    for path in (ROOT / "docs").rglob("*.md"):
+        for number, block in enumerate(_BLOCK.findall(path.read_text())):
+            texts[f"page_{path.parent.name}_{path.stem}_{number}.toml"] = block
+    texts |= {f"{name}.toml": text for name, text in mutant_cases.cases().items()}
     found = []
-    for path in sorted((ROOT / "examples").rglob("*.toml")):
-        text = path.read_text()
-        for key, value in _SMALL.items():
-            text = re.sub(rf"(?m)^(\s*{key}\s*=\s*)\d+", rf"\g<1>{value}", text)
-        text = re.sub(r"(count = )\d+", r"\g<1>3", text)
-        text = re.sub(
-            r"(?m)^(\s*duration\s*=\s*)([\d.]+)", lambda m: m[1] + str(min(float(m[2]), _LONGEST)), text
-        )
-        found.append(folder / f"{path.parent.name}_{path.name}")
-        found[-1].write_text(text)
+    for name, text in sorted(texts.items()):
+        found.append(folder / name)
+        found[-1].write_text(_small(text))
     found.append(folder / "plain.toml")
     found[-1].write_text(CASE.replace("count = 19", "count = 3").replace("count = 31", "count = 3"))
     return found
+
+
+def _small(text: str) -> str:
+    """Return a case with few points and a short run."""
+    for key, value in _SMALL.items():
+        text = re.sub(rf"(?m)^(\s*{key}\s*=\s*)\d+", rf"\g<1>{value}", text)
+    text = re.sub(r"(count = )\d+", r"\g<1>3", text)
+    return re.sub(
+        r"(?m)^(\s*duration\s*=\s*)([\d.]+)", lambda m: m[1] + str(min(float(m[2]), _LONGEST)), text
+    )
 
 
 def accepted(program: Path, paths: list[Path]) -> dict[str, list[str]]:

@@ -69,6 +69,8 @@ contains
         if (present(log) .and. path%length > 0) call log_flight(machine, flow, path, start, state%time - start%time, log)
         steps = steps + 1
         if (failed) reason = reason_step_failed
+        ! Before a pole in time; positions may grow by its logarithm alone.
+        if (failed .and. any(abs(state%v(:machine%n))*(until - state%time) > options%domain)) reason = reason_left_domain
         call watch_pace(state%time, until, options%step_budget, pace, hopeless)
         if (hopeless .or. steps > options%step_budget) reason = reason_step_budget
         if (.not. all(abs(state%q(:machine%n)) <= options%domain)) reason = reason_left_domain

@@ -162,10 +162,9 @@ contains
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
-    real(wp) :: until, at_switch, began(moving%system%variables)
+    real(wp) :: until, at_switch
     integer :: status, fault, idle
     call begin_mode(moving%system, state, crank, tally%needs_v_max, merge(1, 0, present(log)), flight, fault)
-    began = flight%state(:size(began))
     status = merge(flight_left_domain, flight_reached, fault > 0)
     if (fault < 0) status = flight_wrong_branch
     if (fault == 0) call add_jump(moving%system, flight, state, crank, log)
@@ -196,7 +195,7 @@ contains
     end do
     tally%steps = tally%steps + flight%steps
     tally%v_max = max(tally%v_max, state%v)
-    reason = reason_of_flight(status, flight, began)
+    reason = reason_of_flight(status, flight)
   end subroutine fly
 
   !> Goes on with the other branches of forces where their switching functions crossed zero; no branch fits where that happens

@@ -124,7 +124,8 @@ def critical_impulse(found: Slice, own: int) -> Measure:
         "crank_angle": float(turns[least]),
         "direction": "up" if sign > 0 else "down",
     }
-    if mass is not None and math.isfinite(upper):
+    # a table: one of several bodies is called mass
+    if mass is not None and not isinstance(mass, dict) and math.isfinite(upper):
         parameters["impulse"] = f"{upper * float(mass):.9g} N s"
     return Measure(
         "critical_impulse",

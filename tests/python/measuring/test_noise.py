@@ -14,6 +14,7 @@ from separatrix.noise import wilson
 pytestmark = pytest.mark.usefixtures("library")
 
 MASS, STIFFNESS, DAMPING = 2.0, 50.0, 3.0
+EXPRESSION = "contact = { law = 'expression', restitution = '1/(2 + speed)', upper = 0.2 }\n"
 LINEAR = f"""
 body.mass = {MASS}
 restoring = {{ law = "linear", stiffness = {STIFFNESS} }}
@@ -304,6 +305,7 @@ def test_the_command_writes_what_the_function_returns(tmp_path, capsys):
         (LINEAR, {"leaves": "rest"}, 'allowed "impact"'),
         (LINEAR, {"leaves": "impact"}, "without a contact"),
         (LINEAR, {"motions": 0}, "motions: found 0, allowed a whole number from 1 on"),
+        (f"{LINEAR}{EXPRESSION}", {"force": 0.1}, "trajectory, basin and sweep"),
     ],
 )
 def test_what_is_not_allowed_is_refused(text, more, message):
