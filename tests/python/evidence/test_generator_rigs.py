@@ -8,7 +8,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 from separatrix.discovery.fitting.observations import observation_of
-from separatrix.discovery.fitting.sensed import joint_parameters
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.library import Model
 
@@ -34,16 +33,6 @@ def test_every_case_is_a_machine_and_what_it_hides_has_a_name(rigs: ModuleType) 
         # another number draws another machine, the same one the same
         again = draw(np.random.default_rng([SEED, 15, 0]))
         assert again.machine(rig.drives[0]).mass == rig.machine(rig.drives[0]).mass
-
-
-@pytest.mark.usefixtures("library")
-def test_of_a_belt_the_friction_and_the_frame_are_fitted(rigs: ModuleType) -> None:
-    """An exponent is hardly determined beside the velocity: a fit would creep along both."""
-    model = Model.from_text(rigs.RIGS["belt"](np.random.default_rng([SEED, 15, 0])).case)
-    assert {one.path for one in joint_parameters(model, False)} == {
-        "spring.frame.stiffness", "spring.frame.damping", "friction.belt.force", "friction.belt.static_force",
-        "friction.belt.stribeck_velocity",
-    }  # fmt: skip
 
 
 def test_a_decay_is_that_of_dry_and_viscous_friction(rigs: ModuleType, tmp_path) -> None:

@@ -25,7 +25,7 @@ from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError
 
 # parameters of joints that records hardly determine, or that another parameter represents
-_FIXED = ("free_length", "exponent", "stribeck_exponent", "tension", "velocity")
+_FIXED = ("free_length", "exponent", "tension", "velocity")
 
 
 @dataclass
