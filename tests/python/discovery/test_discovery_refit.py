@@ -169,3 +169,28 @@ def test_a_fit_that_ends_on_its_way_is_carried_on_before_others_are_begun(monkey
     found = refit.refit(SimpleNamespace(last=0), base, candidate, screened)
     assert (FIT.fit_on in begun) == carried
     assert found.fit.converged == carried
+
+
+def test_the_order_far_from_the_base_is_that_of_a_few_steps_from_it(monkeypatch):
+    """A linearised estimate may be far out; a segment that only the base follows counts as it leaves it."""
+    begun = []
+
+    def minimise(problem, values, starts, most, rough):
+        begun.append((values.tolist(), most))
+        found = fit(values.tolist(), 50.0)
+        found.evaluation.failed[0] = True
+        return found
+
+    monkeypatch.setattr(refit, "minimise", minimise)
+    base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 400.0), ())
+    candidate = SimpleNamespace(
+        names=("viscous",), model=None, free=FREE, added=(1,), linear=np.ones(1) > 0, starts=[]
+    )
+    screened = SimpleNamespace(
+        step={"viscous": np.array([9.0])}, origin={"viscous": np.zeros(1)}, live={"viscous": np.ones(1) > 0}
+    )
+    data = SimpleNamespace(last=0, problem=lambda *_: None)
+    assert refit.rough_total(data, base, candidate, screened) == 3 * 50.0 + 400.0
+    assert begun == [([8.0, 0.0], FIT.fit_fewest)]
+    curved = SimpleNamespace(step={}, origin={}, live={})
+    assert refit.rough_total(data, base, candidate, curved) == np.inf

@@ -194,6 +194,20 @@ def test_a_verdict_in_part_reports_the_remaining_gap() -> None:
         assert ("All gates are passed" in summary) == complete
 
 
+@pytest.mark.parametrize(
+    ("changes", "wanted"),
+    [
+        ({}, "but offset force, offset force with sensor bias would do about as well."),
+        ({"alternatives": [], "gates": {"detect": True, "stable": False}}, "gate is passed: stable."),
+        ({"alternatives": [], "stopped_before": "another effect"}, "ended before 'another effect'."),
+        ({"alternatives": [], "stopped_before": ""}, "but it is in doubt for the reason below."),
+    ],
+)
+def test_a_doubt_is_reported_with_its_cause(changes, wanted) -> None:
+    found = verdict("ambiguous") | {"gates": {"detect": True, "stable": True}} | changes
+    assert sections(found)[0].body[0].endswith(wanted)
+
+
 def test_the_words_fit_the_outcome(report: tuple) -> None:
     reported, page, _ = report
     expected = {

@@ -111,9 +111,10 @@ def leaves_noise(rival: Fitted, base: Fitted) -> bool:
 
 
 def rough_total(data: Data, base: Fitted, candidate: Candidate, screened: Screened) -> float:
-    """Sum of squares after a few steps from the linearised estimate; infinite where there is none.
+    """Sum of squares after a few steps from the base; infinite where an effect has no linear estimate.
 
-    Segments that the base follows and the candidate does not count as the base leaves them.
+    That estimate itself may be far out. Segments that the base follows and the candidate does not count as
+    the base leaves them.
     """
     kind, start = next(iter(_starts(candidate, screened)), ("", None))
     if kind != "linear":
@@ -121,7 +122,8 @@ def rough_total(data: Data, base: Fitted, candidate: Candidate, screened: Screen
     values = _base_values(base, candidate)
     values[list(candidate.added)] = start
     problem = data.problem(candidate.model, data.last, candidate.free)
-    fit = minimise(problem, values, base.fit.starts, most=FIT.fit_fewest, rough=True)
+    begun = _absent(values, candidate)
+    fit = minimise(problem, begun, base.fit.starts, most=FIT.fit_fewest, rough=True)
     lost = base.fit.good & ~fit.good
     return fit.total + float(base.fit.chi2[lost].sum())
 

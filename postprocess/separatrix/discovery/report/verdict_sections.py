@@ -77,7 +77,6 @@ def cause(verdict: dict) -> str:
 
 
 def _summary(verdict: dict) -> Section:
-    others = ", ".join(_pair(name) for name in verdict["alternatives"])
     text = {
         "named": f"The base machine lacks: {names(verdict)}. "
         + (
@@ -85,8 +84,7 @@ def _summary(verdict: dict) -> Section:
             if verdict["complete"]
             else "All gates but the adequacy are passed: a gap remains that the catalogue does not name."
         ),
-        "ambiguous": f"Something is missing that looks like {names(verdict)}, "
-        + (f"but {others} would do about as well." if others else "but not every gate is passed."),
+        "ambiguous": f"Something is missing that looks like {names(verdict)}, but {_doubt(verdict)}.",
         "none": "No effect is missing that these records could show.",
         "not-in-catalogue": f"Something is missing, and no effect of {searched(verdict)} explains it.",
         "characterised": f"Something is missing, and no effect of {searched(verdict)} explains it; "
@@ -125,6 +123,18 @@ def _summary(verdict: dict) -> Section:
     if verdict["notes"]:
         body += ["Notes:", list(verdict["notes"])]
     return Section("verdict", "Verdict", body)
+
+
+def _doubt(verdict: dict) -> str:
+    """What keeps an effect from being named, as words."""
+    if verdict["alternatives"]:
+        return f"{', '.join(_pair(name) for name in verdict['alternatives'])} would do about as well"
+    failed = [name for name, passed in verdict["gates"].items() if not passed]
+    if failed:
+        return f"not every gate is passed: {', '.join(failed)}"
+    if verdict.get("stopped_before"):
+        return f"the search was ended before '{verdict['stopped_before']}'"
+    return "it is in doubt for the reason below"
 
 
 def _gap_of(use: str, one: dict) -> str:
