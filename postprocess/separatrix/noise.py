@@ -98,8 +98,8 @@ def noisy(
     Raises
     ------
     SeparatrixError
-        For several bodies, a motor, effects, random restitution without a rigid contact of constant
-        restitution, and values that are not allowed.
+        For several bodies, a motor, effects, laws by expressions, random restitution without a rigid contact
+        of constant restitution, and values that are not allowed.
     GivenUpError
         If a motion had to be given up.
 
