@@ -151,7 +151,8 @@ def basin(
         of the case. Numbers are in SI units; texts have a unit ("-3 mm"). None removes an axis. Axes of
         the case that are not named stay; new ones come first, as the slowest.
     output
-        The result file. Without one the result is kept in memory and computed in this process.
+        The result file. Without one the result is kept in memory. It is computed in this process unless the
+        case has a motor, derived quantities or a refined grid.
     threads, workers, ranks
         Choose one: threads of this process (the default without `output`); serial processes on this machine,
         each with a share of the tiles (the default with `output`); ranks of MPI, where the program has been

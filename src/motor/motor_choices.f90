@@ -144,7 +144,8 @@ contains
     integer :: i
     do i = 1, size(choices)
       if (choices(i)%family == effect_family) then
-        call fail(error, exit_bad_case, 'effect.'//trim(choices(i)%name)//': not allowed with a motor')
+        call fail(error, exit_bad_case, 'effect.'//trim(choices(i)%name)//': found with a table [motor], allowed without: '// &
+                  'effects are not part of its equations')
         return
       else if (choices(i)%name == own_law) then
         call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "expression", allowed without a table [motor]')

@@ -84,14 +84,3 @@ def test_basins_over_the_speed_mark_the_cycles() -> None:
     assert {str(label) for label in speeds.index} == set(marked)
     for label, speed in speeds.items():
         assert marked[str(label)] == pytest.approx(speed)
-
-
-def test_maps_over_parameters_show_captured_and_passed() -> None:
-    """The outcome at every point has its own colour and name; exponents of units are above the line."""
-    case = sx.load(IMPACT).with_({"run.duration": 8.0, "run.window": 2.0, "start.x0": 0.05})
-    result = sx.basin(case, {"motor.voltage": (5, 9, 2), "motor.inertia": (0.05, 0.06, 2)})
-    figure = result.separatrix.plot("crank_outcome")
-    legend = {text.get_text().split(" (")[0] for text in figure.legends[0].get_texts()}
-    names = set(result.separatrix.decoded("crank_outcome").values.ravel())
-    assert legend == {name.replace("_", " ") for name in names}
-    assert figure.axes[0].get_ylabel() == "motor inertia (kg m\u00b2)"
