@@ -143,7 +143,7 @@ def pantograph(program: Program) -> list[Row]:
 
 
 def percussion(program: Program) -> list[Row]:
-    """A hammer, a bit, and rock that yields: positions and velocities of both, place of the slider."""
+    """A hammer, a bit, and rock that yields: positions and velocities of both, position of the slider."""
 
     def slope(slides: float) -> Callable:
         def function(t: float, y: np.ndarray) -> list[float]:

@@ -37,7 +37,8 @@ module part_reader
 
 contains
 
-  !> Whether a case has tables [body.NAME] or [structure.NAME]. A body may have the name of a key of [body]: it has a mass or an inertia.
+  !> Whether a case has tables [body.NAME] or [structure.NAME]. A body may have the name of a key of [body]: it has a mass or an
+  !> inertia.
   pure logical function has_parts(source)
     type(case_source_t), intent(in) :: source
     character(len=label_length), allocatable :: names(:)
