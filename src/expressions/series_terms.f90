@@ -169,7 +169,7 @@ contains
     type(instruction_t), intent(in) :: program(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: unit, sign, divisor(:)
-    real(wp), intent(inout) :: c(0:order, *)
+    real(wp), intent(inout) :: c(0:order, size(divisor))
     integer, intent(out) :: fault
     real(wp) :: y
     integer :: k, at
@@ -226,7 +226,7 @@ contains
   pure real(wp) function function_term(it, k, sign, divisor, order, c) result(y)
     type(instruction_t), intent(in) :: it
     integer, intent(in) :: k, order
-    real(wp), intent(in) :: sign, divisor(:), c(0:order, *)
+    real(wp), intent(in) :: sign, divisor(:), c(0:order, size(divisor))
     real(wp) :: weight
     integer :: j
     y = 0
