@@ -3,38 +3,31 @@
 
 !> Certified motion of z' = f(z) by Taylor series of one order, to the first zero of a guard.
 !>
-!> The length of a step follows from the last coefficients (Jorba & Zou 2005). A step is accepted if an enclosure is proven: with
-!> B the range of the Taylor polynomials widened by a margin, and M bounds over B of the next coefficients, |M h^(p+1)| less
-!> than the margin proves that the solution stays in B and that the remainder is no larger (Nedialkov, Jackson & Pryce 2001).
-!> With the same bound for each guard, no zero before the one that ends the motion is possible: see `bernstein`.
+!> The length of a step follows from the last coefficients (Jorba & Zou 2005). A step is accepted if an enclosure is proven
+!> (`enclosures`). With the same bound for each guard, no zero before the one that ends the motion is possible: see `bernstein`.
 module series_flight
-  use bernstein, only: bernstein_of, first_crossing
+  use bernstein, only: first_crossing
   use elementary, only: exponential, logarithm
-  use intervals, only: interval_t
+  use enclosures, only: bounds_t, enclose, enclosure_t, least_margin, prepare_enclosure, series_order, widest_margin
   use kinds, only: wp
-  use operations, only: op_add, op_select, op_subtract
+  use operations, only: op_add, op_select, op_subtract, op_variable
   use step_length, only: is_plain, natural_step
   use tape, only: tape_t
-  use tape_bounds, only: bound_coefficients
   use tape_series, only: expand, prepare_series, series_t
   use tape_value, only: evaluate, starting_branches
   implicit none
   private
 
-  public :: start_flight, set_branches, change_branches, advance_flight, value_in_flight
+  public :: start_flight, set_branches, change_branches, advance_flight, value_in_flight, keep_bounds, take_bounds, series_order
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
   !> proven; at the budget of steps; at its start, whose branches are not those of the state.
   integer, parameter, public :: flight_reached = 0, flight_crossed = 1, flight_left_domain = 2, flight_no_progress = 3, &
     flight_step_budget = 4, flight_wrong_branch = 5
 
-  !> The last term of a step is then some epsilon of the first.
-  integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
   integer, parameter :: most_tries = 200
   !> Steps in which the time does not change, after which a motion into a pole is given up.
   integer, parameter :: most_idle_steps = 100
-  !> Margins of enclosures, as parts of the state.
-  real(wp), parameter :: widest_margin = epsilon(1.0_wp)**0.6_wp, least_margin = 16*epsilon(1.0_wp)
   !> Shortest step, as a part of the time.
   real(wp), parameter :: shortest = 0.01_wp*epsilon(1.0_wp)
 
@@ -64,9 +57,12 @@ module series_flight
     !> Steps, enclosures tried for them, and decisions that even short steps left to rounding.
     integer :: steps = 0, tries = 0, uncertain = 0
     integer :: step_budget = 1000000
-    !> Margin of an enclosure, as a part of the state; it is less where it would reach beyond the end of a domain.
-    real(wp) :: margin = widest_margin
-    type(series_t), private :: series, bounds
+    type(series_t), private :: series
+    type(enclosure_t), private :: around
+    !> Node of each variable of the tape among the states, 0 for other states; the polynomials of the states in the fraction of a
+    !> step.
+    integer, allocatable, private :: variables(:)
+    real(wp), allocatable, private :: path(:, :)
     !> Nodes of the active guards that are more than a variable and a constant.
     integer, allocatable, private :: curved(:)
     !> Length of the last proven step, as a part of that by the last coefficients.
@@ -97,6 +93,12 @@ contains
     flight%zeros = 0
     flight%crossed = .false.
     flight%state = 0
+    allocate (flight%path(0:series_order, size(rates)), flight%variables(size(rates)))
+    flight%variables = 0
+    do k = 1, tape%count
+      if (tape%nodes(k)%operation /= op_variable) cycle
+      if (tape%nodes(k)%first <= size(rates)) flight%variables(tape%nodes(k)%first) = k
+    end do
     call set_branches(flight, [(1, k=1, size(tape%switches))])
   end subroutine start_flight
 
@@ -107,7 +109,7 @@ contains
     integer :: i, own
     own = size(flight%guards) - size(branches)
     call prepare_series(flight%tape, series_order, flight%rates, flight%guards(:own)%node, branches, flight%series)
-    call prepare_series(flight%tape, series_order + 1, flight%rates, flight%guards(:own)%node, branches, flight%bounds)
+    call prepare_enclosure(flight%tape, flight%rates, flight%guards(:own)%node, branches, flight%around)
     flight%is_active = .true.
     flight%is_active(own + 1:) = .false.
     do i = 1, flight%tape%count
@@ -255,9 +257,9 @@ contains
     real(wp), intent(in) :: longest
     real(wp), intent(out) :: step, fraction
     integer, intent(out) :: status
-    real(wp) :: natural, excess, scaling
+    real(wp) :: natural, scaling
     integer :: try, fault
-    logical :: is_certain
+    logical :: is_certain, is_anew
     natural = natural_step(flight%series, flight%state, flight%curved)
     if (natural < 1e12_wp*flight%next_unit) then
       flight%next_unit = scale(1.0_wp, exponent(natural))
@@ -269,89 +271,70 @@ contains
     fraction = 2
     fault = 0
     status = flight_reached
-    flight%margin = min(widest_margin, 64*flight%margin)
-    do try = 1, most_tries
-      flight%tries = flight%tries + 1
-      if (.not. step > shortest*max(abs(flight%time), longest)) exit
-      call enclose(flight, step, excess)
-      if (flight%fault > 0) then
-        fault = flight%fault
-        step = 0.5_wp*step
-        flight%margin = max(least_margin, flight%margin/16)
-        cycle
-      end if
-      ! What the remainder allows: it grows with the step to the power of its order.
-      scaling = exponential(logarithm(0.5_wp/max(excess, 1e-90_wp))/(series_order + 1))
-      flight%proven = step/natural*scaling
-      ! Less than 1 by far more than rounding of the polynomials.
-      if (excess > 0.9_wp) then
-        step = step*max(0.25_wp, min(0.9_wp, scaling))
-        cycle
-      end if
-      call find_crossing(flight, step, fraction, is_certain)
-      if (.not. is_certain) then
+    is_anew = .false.
+    associate (around => flight%around)
+      around%margin = min(widest_margin, 64*around%margin)
+      do try = 1, most_tries
+        flight%tries = flight%tries + 1
+        if (.not. step > shortest*max(abs(flight%time), longest)) exit
+        call set_path(flight, step)
+        call enclose(flight%tape, flight%parameters, flight%path, step, is_anew, around)
+        if (around%fault > 0) then
+          fault = around%fault
+          step = 0.5_wp*step
+          around%margin = max(least_margin, around%margin/16)
+          cycle
+        end if
+        ! What the remainder allows: it grows with the step to the power of its order.
+        scaling = exponential(logarithm(0.5_wp/max(around%excess, 1e-90_wp))/(series_order + 1))
+        flight%proven = merge(step/natural*scaling, max(flight%proven, step/natural*scaling), around%is_own)
+        ! Less than 1 by far more than rounding of the polynomials.
+        if (around%excess > 0.9_wp) then
+          step = step*max(0.25_wp, min(0.9_wp, scaling))
+          cycle
+        end if
+        call find_crossing(flight, step, fraction, is_certain)
+        if (is_certain) then
+          if (fraction <= 1) status = flight_crossed
+          return
+        end if
+        is_anew = .true.
+        if (.not. around%is_own) cycle
         flight%proven = step/natural
         step = 0.5_wp*step
-        cycle
-      end if
-      if (fraction <= 1) status = flight_crossed
-      return
-    end do
+      end do
+    end associate
     ! Next to the end of a domain steps may shrink before one leaves it: a longer one does.
     if (fault == 0) then
-      call enclose(flight, 16*natural, excess)
-      fault = max(0, flight%fault)
+      call set_path(flight, 16*natural)
+      call enclose(flight%tape, flight%parameters, flight%path, 16*natural, .true., flight%around)
+      fault = max(0, flight%around%fault)
     end if
     flight%fault = fault
     status = merge(flight_left_domain, flight_no_progress, fault > 0)
   end subroutine take_step
 
-  !> Proves that the solution stays in a box over the step, and bounds the next coefficients there. `excess`: the largest
-  !> remainder over its margin; proven if it is less than 1.
-  pure subroutine enclose(flight, step, excess)
+  !> Polynomials of the states in the fraction of a step. The unit of the series is a power of two.
+  pure subroutine set_path(flight, step)
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: step
-    real(wp), intent(out) :: excess
-    type(interval_t) :: box(size(flight%rates))
-    real(wp) :: margin(size(flight%rates)), b(0:series_order), power
-    integer :: i
-    real(wp), parameter :: least = 1e-70_wp
-    do i = 1, size(flight%rates)
-      b = bernstein_of(polynomial_of(flight, i, step))
-      box(i) = interval_t(minval(b), maxval(b))
-      margin(i) = flight%margin*max(abs(box(i)%low), abs(box(i)%high)) + least
-      box(i) = interval_t(box(i)%low - margin(i), box(i)%high + margin(i))
-    end do
-    excess = huge(1.0_wp)
-    flight%bounds%unit = scale(1.0_wp, exponent(step))
-    call bound_coefficients(flight%tape, box, flight%parameters, flight%bounds, flight%fault)
-    if (flight%fault /= 0) return
-    excess = 0
-    ! Not by **: how compilers multiply for it differs.
-    power = 1.01_wp*step
-    do i = 1, series_order
-      power = power*(step/flight%bounds%unit)
-    end do
-    do i = 1, size(flight%rates)
-      excess = max(excess, flight%bounds%c(series_order, flight%rates(i))/(series_order + 1)*power/margin(i))
-    end do
-    if (.not. excess <= huge(1.0_wp)) excess = huge(1.0_wp)
-  end subroutine enclose
-
-  !> Coefficients of a variable in the fraction of a step.
-  pure function polynomial_of(flight, i, step) result(p)
-    type(flight_t), intent(in) :: flight
-    integer, intent(in) :: i
-    real(wp), intent(in) :: step
-    real(wp) :: p(0:series_order), power
-    integer :: k
-    p(0) = flight%state(i)
-    power = step
+    real(wp) :: power(0:series_order)
+    integer :: i, k
+    power(0) = 1
     do k = 1, series_order
-      p(k) = flight%series%c(k - 1, flight%rates(i))/k*power
-      power = power*(step/flight%series%unit)
+      power(k) = power(k - 1)*(step/flight%series%unit)
     end do
-  end function polynomial_of
+    do i = 1, size(flight%rates)
+      if (flight%variables(i) > 0) then
+        flight%path(:, i) = flight%series%c(:, flight%variables(i))*power
+      else
+        do k = 1, series_order
+          flight%path(k, i) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k*power(k)
+        end do
+      end if
+      flight%path(0, i) = flight%state(i)
+    end do
+  end subroutine set_path
 
   !> First fraction of the step at which an active guard crosses zero, 2 without one, and the guards that do. `is_certain`
   !> is false if a shorter step could decide what this one leaves open.
@@ -369,8 +352,8 @@ contains
       if (.not. flight%is_active(g)) cycle
       call cross(flight, g, step, at(g), remainder, rounding, is_proven)
       if (is_proven) cycle
-      is_certain = is_certain .and. remainder <= rounding
-      if (remainder <= rounding) flight%uncertain = flight%uncertain + 1
+      is_certain = is_certain .and. remainder <= rounding .and. flight%around%is_own
+      if (remainder <= rounding .and. flight%around%is_own) flight%uncertain = flight%uncertain + 1
     end do
     fraction = min(2.0_wp, minval(at))
     flight%crossed = fraction <= 1 .and. at - fraction <= 8*epsilon(1.0_wp)*fraction
@@ -397,11 +380,11 @@ contains
     end do
     power = 1.01_wp
     do k = 1, series_order + 1
-      power = power*(step/flight%bounds%unit)
+      power = power*(step/flight%around%bounds%unit)
     end do
-    remainder = power*flight%bounds%c(series_order + 1, node)
+    remainder = power*flight%around%bounds%last(node)
     rounding = epsilon(1.0_wp)*total
-    if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, flight%bounds%c(0, :), node)
+    if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, flight%around%bounds%first, node)
     p(:series_order - m) = p(m:)
     p(series_order - m + 1:) = 0
     total = remainder + rounding
@@ -429,17 +412,35 @@ contains
   pure subroutine move(flight, step)
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: step
-    real(wp) :: p(0:series_order), total
+    real(wp) :: total
     integer :: i, k
+    call set_path(flight, step)
     do i = 1, size(flight%rates)
-      p = polynomial_of(flight, i, step)
       total = 0
       do k = series_order, 0, -1
-        total = total + p(k)
+        total = total + flight%path(k, i)
       end do
       flight%state(i) = total
     end do
     flight%time = flight%time + step
   end subroutine move
+
+  !> Takes over bounds that a motion with the same tape, rates and guards has left, if it had the same parameters and branches.
+  pure subroutine take_bounds(flight, bounds)
+    type(flight_t), intent(inout) :: flight
+    type(bounds_t), intent(in) :: bounds
+    if (.not. bounds%are_known) return
+    if (size(bounds%rest) /= size(flight%rates)) return
+    if (any(abs(bounds%parameters - flight%parameters) > 0)) return
+    if (any(bounds%branches /= flight%series%branches)) return
+    flight%around%bounds = bounds
+  end subroutine take_bounds
+
+  !> The bounds that a motion has left.
+  pure subroutine keep_bounds(flight, bounds)
+    type(flight_t), intent(in) :: flight
+    type(bounds_t), intent(inout) :: bounds
+    if (flight%around%bounds%are_known) bounds = flight%around%bounds
+  end subroutine keep_bounds
 
 end module series_flight

@@ -4,7 +4,7 @@
 !> Length of a Taylor step from its last coefficients (Jorba & Zou 2005).
 module step_length
   use elementary, only: exponential
-  use kinds, only: wp
+  use kinds, only: int64, real64, wp
   use operations, only: op_add, op_subtract, op_variable
   use tape, only: tape_t
   use tape_series, only: series_t
@@ -15,7 +15,9 @@ module step_length
 
   integer :: i
   !> Products cost less than quotients.
-  real(wp), parameter :: inverse(64) = [(1.0_wp/i, i=1, 64)]
+  integer, parameter :: most_order = 64
+  real(wp), parameter :: inverse(most_order) = [(1.0_wp/i, i=1, most_order)]
+  real(wp), parameter :: log_epsilon = (exponent(epsilon(1.0_wp)) + 2*fraction(epsilon(1.0_wp)) - 2)*0.693147180559945_wp
 
 contains
 
@@ -25,47 +27,55 @@ contains
     real(wp), intent(in) :: state(:)
     integer, intent(in) :: others(:)
     real(wp) :: terms(0:series%order), reach
-    integer :: i, k, rate
+    integer :: i, k
     ! Its powers must not overflow.
     real(wp), parameter :: most = 30
     reach = most
     do i = 1, size(state)
-      terms(0) = state(i)
-      rate = series%rates(i)
-      do k = 1, series%order
-        terms(k) = series%unit*series%c(k - 1, rate)*inverse(k)
-      end do
-      reach = min(reach, reach_of(terms))
+      associate (rate => series%c(:, series%rates(i)), n => series%order)
+        if (all(abs(rate(n - 4:n)) <= 0)) cycle
+        terms(0) = state(i)
+        do k = 1, n
+          terms(k) = series%unit*rate(k)*inverse(k)
+        end do
+      end associate
+      call shorten(terms, series%order, reach)
     end do
     do i = 1, size(others)
-      reach = min(reach, reach_of(series%c(:, others(i))))
+      call shorten(series%c(:, others(i)), series%order, reach)
     end do
     step = exponential(reach)*series%unit
   end function natural_step
 
-  !> Logarithm of that length for one series. Symmetric motions lack some of the last orders: those before count as if terms
-  !> shrank evenly.
-  pure real(wp) function reach_of(terms) result(reach)
-    real(wp), intent(in) :: terms(0:)
-    real(wp) :: size_of(0:ubound(terms, 1)), share(0:ubound(terms, 1)/2), longest
-    integer :: k, j, order
-    real(wp), parameter :: none = -huge(1.0_wp)
-    order = ubound(terms, 1)
-    size_of = none
-    do k = 0, order
-      if ((k <= order/2 .or. k >= order - 4) .and. abs(terms(k)) > 0) size_of(k) = rough_logarithm(abs(terms(k)))
-    end do
-    share = rough_logarithm(epsilon(1.0_wp))*inverse(order:order - order/2:-1)
-    reach = huge(1.0_wp)
+  !> Shortens the logarithm of a length to that for one series. Symmetric motions lack some of the last orders: those before count
+  !> as if terms shrank evenly.
+  pure subroutine shorten(terms, order, reach)
+    integer, intent(in) :: order
+    real(wp), intent(in) :: terms(0:order)
+    real(wp), intent(inout) :: reach
+    real(wp) :: size_of(0:most_order/2), last, longest
+    integer :: k, j
+    logical :: is_known
+    real(wp), parameter :: none = -1e30_wp
+    is_known = .false.
     do k = order - 4, order
-      if (size_of(k) <= none) cycle
-      longest = none
+      if (.not. abs(terms(k)) > 0) cycle
+      if (.not. is_known) then
+        do j = 0, order/2
+          size_of(j) = none
+          if (abs(terms(j)) > 0) size_of(j) = rough_logarithm(abs(terms(j)))
+        end do
+        if (all(size_of(:order/2) <= none)) return
+        is_known = .true.
+      end if
+      last = rough_logarithm(abs(terms(k)))
+      longest = -huge(1.0_wp)
       do j = 0, order/2
-        if (size_of(j) > none) longest = max(longest, share(j) + (size_of(j) - size_of(k))*inverse(k - j))
+        longest = max(longest, log_epsilon*inverse(order - j) + (size_of(j) - last)*inverse(k - j))
       end do
-      if (longest > none) reach = min(reach, longest)
+      reach = min(reach, longest)
     end do
-  end function reach_of
+  end subroutine shorten
 
   !> Whether a node is a variable, or the sum or difference of one and what is constant in time.
   pure logical function is_plain(tape, node)
@@ -81,10 +91,21 @@ contains
     is_plain = (is_variable(1) .and. is_steady(2)) .or. (is_steady(1) .and. is_variable(2))
   end function is_plain
 
-  !> Logarithm to 0.06, by the exponent and a line.
+  !> Logarithm of x > 0 to 0.06, by the exponent and a line; in double precision from the bits of normal numbers, without a call.
   pure elemental real(wp) function rough_logarithm(x)
     real(wp), intent(in) :: x
-    rough_logarithm = (exponent(x) + 2*fraction(x) - 2)*0.693147180559945_wp
+    integer(int64) :: bits
+    real(wp) :: mantissa
+    integer :: power
+    if (digits(x) == 53) then
+      bits = transfer(real(x, real64), 0_int64)
+      mantissa = transfer(ior(iand(bits, ishft(1_int64, 52) - 1), ishft(1022_int64, 52)), 0.0_real64)
+      power = int(ishft(bits, -52)) - 1022
+    else
+      mantissa = fraction(x)
+      power = exponent(x)
+    end if
+    rough_logarithm = (power + 2*mantissa - 2)*0.693147180559945_wp
   end function rough_logarithm
 
 end module step_length

@@ -65,10 +65,12 @@ contains
     integer, intent(out) :: origin
     integer, intent(in), optional :: branches(:)
     integer :: argument
-    logical :: occurs(2)
+    logical :: occurs(2), is_given
     argument = tape%switches(node%first)%argument
     origin = 0
-    if (present(branches)) then
+    is_given = .false.
+    if (present(branches)) is_given = node%first <= size(branches)
+    if (is_given) then
       occurs = [branches(node%first) > 0, branches(node%first) <= 0]
     else
       origin = fault(argument)
@@ -101,7 +103,7 @@ contains
     fault = maxval(faults, mask=series%is_used)
     if (fault > 0) return
     series%c(0, :) = magnitude(bound)
-    call raise_orders(tape, 1.0_wp, least_magnitude(bound), series, fault)
+    call raise_orders(1.0_wp, least_magnitude(bound), series, fault)
   end subroutine bound_coefficients
 
 end module tape_bounds

@@ -85,9 +85,12 @@ contains
     integer, intent(out) :: branch_fault
     integer, intent(in), optional :: branches(:)
     integer :: argument, side
+    logical :: is_given
     argument = tape%switches(node%first)%argument
     branch_value = 0
-    if (present(branches)) then
+    is_given = .false.
+    if (present(branches)) is_given = node%first <= size(branches)
+    if (is_given) then
       side = branches(node%first)
     else
       branch_fault = fault(argument)

@@ -19,7 +19,8 @@ module motor_equations
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
   use motor_choices, only: number_of_family, refuse_laws, speed_of
-  use motor_system, only: both_held, body_held, both_move, crank_held, far, guard_count, guard_fastest, guard_ramp_end, low_order, &
+  use motor_system, only: both_held, body_held, both_move, crank_held, far, guard_body_down, guard_body_up, guard_count, &
+    guard_crank_down, guard_crank_up, guard_fastest, guard_ramp_end, low_order, &
     motor_system_t, phi_at, v_at, w_at, x_at, y_at
   use motor_torque, only: add_motor, control_guards
   use restoring_law, only: restoring_of, restoring_t
@@ -261,6 +262,9 @@ contains
         if (.not. is_held(mode)) rates(v_at) = node_of(sheet, 'v_rate'//trim(suffix(mode)))
         if (system%control%has_own) rates(y_at) = node_of(sheet, 'y_rate')
         if (system%control%supply > 0) rates(system%control%supply) = node_of(sheet, 'ramp_rate')
+        ! Nothing holds what moves.
+        if (.not. is_held(mode)) guards([guard_body_up, guard_body_down])%node = zero
+        if (mode < crank_held) guards([guard_crank_up, guard_crank_down])%node = zero
         call prepare_series(sheet%tape, low_order, rates, [guards%node, system%torque, system%load, system%foot, system%inertia], &
                             [integer ::], system%low(mode))
         do kept = 0, 1

@@ -12,13 +12,13 @@ module motor_modes
   use motor_now, only: parameters_now, state_vector
   use motor_rest, only: equation_mode, low_series, size_of_forces, slips, zero_order
   use motor_state, only: motor_state_t
-  use series_flight, only: flight_t, set_branches
+  use series_flight, only: flight_t, keep_bounds, set_branches, take_bounds
   use switch_branches, only: choose_branches
   use tape_series, only: series_t
   implicit none
   private
 
-  public :: begin_mode, keep_angle
+  public :: begin_mode, end_mode, keep_angle
 
 contains
 
@@ -44,6 +44,7 @@ contains
     call low_series(system, mode, state, crank, series, fault)
     own = size(flight%guards) - size(flight%tape%switches)
     if (own < size(flight%guards)) call begin_branches(flight, own)
+    call take_bounds(flight, crank%bounds(slip, mode))
     flight%is_active(:own) = .false.
     if (slips(state%mode)) then
       call watch(flight, guard_turning, -slip)
@@ -70,6 +71,15 @@ contains
     end if
     call watch_motor(system, crank, series, flight)
   end subroutine begin_mode
+
+  !> What the next flight in this mode can use.
+  pure subroutine end_mode(state, flight, crank)
+    type(state_t), intent(in) :: state
+    type(flight_t), intent(in) :: flight
+    type(motor_state_t), intent(inout) :: crank
+    call keep_bounds(flight, crank%bounds(merge(-1, 1, state%mode == mode_slip_minus), &
+                                          equation_mode(slips(state%mode), crank%turning /= 0)))
+  end subroutine end_mode
 
   !> The branches of the switching functions, whose guards follow the `own` ones.
   pure subroutine begin_branches(flight, own)

@@ -17,7 +17,7 @@ module motor_motion
   use motor_equations, only: build_motor_equations
   use motor_limits, only: change_limits, start_limits
   use motor_log, only: add_sample, motor_energy, record_motor_event
-  use motor_modes, only: begin_mode, keep_angle
+  use motor_modes, only: begin_mode, end_mode, keep_angle
   use motor_now, only: restitution_of
   use motor_reason, only: reason_of_flight
   use motor_rest, only: chatter_dies_out, choose_body, choose_crank, enters_stop, hold_without_room, slips, turns_at_section
@@ -193,6 +193,7 @@ contains
       if (flight%steps > moving%options%step_budget) status = flight_step_budget
       if (status == flight_reached .and. until >= time_end) exit
     end do
+    call end_mode(state, flight, crank)
     tally%steps = tally%steps + flight%steps
     tally%v_max = max(tally%v_max, state%v)
     reason = reason_of_flight(status, flight)

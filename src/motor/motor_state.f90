@@ -3,6 +3,7 @@
 
 !> State of a motor, or of equations by expressions, beside that of the body.
 module motor_state
+  use enclosures, only: bounds_t
   use kinds, only: wp
   implicit none
   private
@@ -29,6 +30,8 @@ module motor_state
     integer :: limited = 0, held = 0
     !> Piece of a table of the torque.
     integer :: piece = 0
+    !> Bounds that flights have left, by direction of slip and mode of the equations: they depend on neither time nor state.
+    type(bounds_t) :: bounds(-1:1, 4)
   end type motor_state_t
 
 end module motor_state

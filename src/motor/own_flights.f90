@@ -18,7 +18,7 @@ contains
   !> A motion per mode, without and with work and losses. The equations are complete.
   pure subroutine add_own_flights(system)
     type(motor_system_t), intent(inout) :: system
-    type(guard_t) :: guards(guard_count)
+    type(guard_t) :: guards(guard_count), watched(guard_count)
     integer :: rates(system%variables), powers(3), mode, i
     call add_guards(system, guards)
     associate (sheet => system%sheet)
@@ -34,8 +34,10 @@ contains
         do i = 1, system%variables - v_at
           rates(v_at + i) = node_of(sheet, 'rate '//to_text(i))
         end do
-        call start_flight(system%flights(mode, 0), sheet%tape, rates, guards, sheet%parameters)
-        call start_flight(system%flights(mode, 1), sheet%tape, [rates, powers], guards, sheet%parameters)
+        watched = guards
+        if (mode == both_move) watched([guard_body_up, guard_body_down])%node = node_of(sheet, 'zero')
+        call start_flight(system%flights(mode, 0), sheet%tape, rates, watched, sheet%parameters)
+        call start_flight(system%flights(mode, 1), sheet%tape, [rates, powers], watched, sheet%parameters)
       end do
     end associate
   end subroutine add_own_flights
