@@ -34,7 +34,7 @@ def cached(
 
     The name of the file is a checksum of the resolved case, the arguments and the version of the program with
     its commit: another case, argument or program is computed anew. Files stay until the user deletes them.
-    A computation that is interrupted goes on where it was, at the next call. A damaged file is computed again,
+    A computation that is interrupted goes on where it was, at the next call. A damaged file is computed anew,
     with a warning.
 
     Parameters
