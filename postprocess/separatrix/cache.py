@@ -5,6 +5,7 @@
 import hashlib
 import inspect
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -33,7 +34,8 @@ def cached(
 
     The name of the file is a checksum of the resolved case, the arguments and the version of the program with
     its commit: another case, argument or program is computed anew. Files stay until the user deletes them.
-    A computation that is interrupted goes on where it was, at the next call.
+    A computation that is interrupted goes on where it was, at the next call. A damaged file is computed anew,
+    with a warning.
 
     Parameters
     ----------
@@ -70,7 +72,11 @@ def cached(
     )
     path = Path(folder) / f"{function.__name__}_{hashlib.sha256(key.encode()).hexdigest()[:20]}.h5"
     if path.exists():
-        return open_result(path)
+        try:
+            return open_result(path)
+        except SeparatrixError as error:
+            warnings.warn(f"cached: computed again, as {error}", stacklevel=2)
+            path.unlink()
     path.parent.mkdir(parents=True, exist_ok=True)
     if "resume" in known and "resume" not in more:
         more["resume"] = True

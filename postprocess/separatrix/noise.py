@@ -255,7 +255,10 @@ def _pieces(motions: int, threads: int | None, run: Callable) -> list:
     pieces = [
         _Piece(number, slice(first, first + PIECE)) for number, first in enumerate(range(0, motions, PIECE))
     ]
-    with ThreadPoolExecutor(cores() if threads is None else count("threads", threads)) as pool:
+    threads = min(cores() if threads is None else count("threads", threads), len(pieces))
+    if threads == 1:
+        return [run(one) for one in pieces]
+    with ThreadPoolExecutor(threads) as pool:
         waiting = [pool.submit(run, one) for one in pieces]
         try:
             return [one.result() for one in waiting]

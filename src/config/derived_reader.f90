@@ -3,7 +3,7 @@
 
 !> The tables [derived.NAME]: quantities derived from the motions of the machine.
 module derived_reader
-  use case_source, only: case_source_t, enter_table, report
+  use case_source, only: case_source_t, enter_table, know, report
   use case_type, only: case_t
   use case_values, only: take_choice, take_text
   use build_motion, only: machine_of
@@ -30,6 +30,8 @@ contains
     type(case_t), intent(inout) :: the_case
     character(len=label_length), allocatable :: names(:)
     integer :: i
+    ! Named also where there is none and a table is misspelt.
+    call know(source, 'derived.')
     names = names_of(source, 'derived')
     allocate (the_case%derived(size(names)))
     do i = 1, size(names)

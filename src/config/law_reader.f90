@@ -63,6 +63,7 @@ contains
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), allocatable, intent(inout) :: choices(:)
     type(law_choice_t) :: choice
+    call know(source, motor_family//'.')
     if (.not. is_table(source, motor_family)) return
     call read_law(source, motor_family, '', .false., choice)
     choices = [choices, choice]

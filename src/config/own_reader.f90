@@ -38,6 +38,7 @@ contains
     type(law_choice_t) :: choice
     integer :: k, i
     do k = 1, 2
+      call know(source, trim(kinds(k))//'.')
       names = names_of(source, trim(kinds(k)))
       do i = 1, size(names)
         choice = law_choice(trim(kinds(k)), own_law)

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from separatrix import style
+from separatrix.checks import count, number
 from separatrix.errors import USAGE, SeparatrixError
 from separatrix.figures.animation import check_format, write_film
 from separatrix.figures.pair import carried_stop, stops_of
@@ -43,15 +44,16 @@ def film(
     `speed`: seconds of the motion in a second of the film. The suffix of `path`, .gif or .mp4, is the format.
     """
     check_format(path)
-    if not (0 < speed < np.inf and 0 < frames_per_second < np.inf):
-        raise SeparatrixError(
-            f"film: found speed {speed} and {frames_per_second} frames per second, allowed more than 0", USAGE
-        )
+    speed = number("film: speed", speed, 0, above=True)
+    frames_per_second = number("film: frames_per_second", frames_per_second, 0, above=True)
+    count("film: dpi", dpi)
     time = motion["time"].values
     if time.size < 2:
         raise SeparatrixError(f"film: found {time.size} samples, allowed two or more", USAGE)
-    end = float(time[-1]) if end is None else end
-    if begin is None:
+    end = float(time[-1]) if end is None else number("film: end", end)
+    if begin is not None:
+        begin = number("film: begin", begin)
+    else:
         begin = max(float(time[0]), end - 10 * float(motion.attrs["drive_period"]))
     if not time[0] <= begin < end <= time[-1]:
         raise SeparatrixError(

@@ -243,6 +243,14 @@ def test_what_is_wrong_is_named(separatrix, tmp_path, table, message):
     assert message in refused.err
 
 
+def test_tables_that_may_be_there_are_named_where_one_is_misspelt(separatrix, tmp_path):
+    (tmp_path / "case.toml").write_text("body.mass = 1\nderiveds.a.unit = 'm'\n")
+    refused = run(separatrix, "trajectory", "case.toml", folder=tmp_path)
+    assert refused.code == 65 and "key 'deriveds': unknown (did you mean 'derived'?)" in refused.err
+    allowed = refused.err.split("allowed ")[1].strip().split(", ")
+    assert {"derived", "force", "state", "motor"} <= set(allowed)
+
+
 def test_an_operation_that_is_not_defined_is_not_known(separatrix, tmp_path):
     """A logarithm of positions of both signs."""
     text = LINEAR + '[derived.a]\nexpression = "log(x)"\nunit = "1"\n'

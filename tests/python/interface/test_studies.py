@@ -50,6 +50,20 @@ def test_a_result_is_computed_once(case, tmp_path, monkeypatch):
     assert len(list((tmp_path / "kept").glob("basin_*.h5"))) == 5
 
 
+def test_a_damaged_file_is_computed_again(case, tmp_path):
+    """With a warning that names the file; the result is that of before."""
+    first = sx.cached(tmp_path, sx.basin, case, x0=4, v0=4, progress=False).load()
+    first.close()
+    (path,) = tmp_path.glob("basin_*.h5")
+    whole = path.read_bytes()
+    for damaged in (b"", whole[:3000], whole[:200] + bytes(len(whole) - 200)):
+        path.write_bytes(damaged)
+        with pytest.warns(UserWarning, match=f"computed again, as {path}"):
+            again = sx.cached(tmp_path, sx.basin, case, x0=4, v0=4, progress=False)
+        assert np.array_equal(again.attractor, first.attractor)
+        again.close()
+
+
 def test_the_cache_refuses_what_it_cannot_keep(case, tmp_path):
     with pytest.raises(sx.SeparatrixError, match="trajectory, which writes no file"):
         sx.cached(tmp_path, sx.trajectory, case)
@@ -117,6 +131,10 @@ def test_a_film_that_cannot_be_made_is_refused(case, tmp_path, monkeypatch):
         motion.separatrix.film(tmp_path / "a.gif", begin=4, end=6)
     with pytest.raises(sx.SeparatrixError, match="samples from .* allowed two or more"):
         motion.separatrix.film(tmp_path / "a.gif", begin=1, end=1.0001)
+    for given in ({"speed": "fast"}, {"frames_per_second": 0}, {"begin": "1 s"}, {"end": [1]}, {"dpi": 0.5}):
+        (name,) = given
+        with pytest.raises(sx.SeparatrixError, match=f"film: {name}: found .*, allowed a"):
+            motion.separatrix.film(tmp_path / "a.gif", **given)
     with pytest.raises(sx.SeparatrixError, match="frames, allowed 3000"):
         motion.separatrix.film(tmp_path / "a.gif", begin=0, end=5, speed=1e-4)
     assert not list(tmp_path.iterdir())
