@@ -74,7 +74,7 @@ class _Random:
         """Return the given number of each motion; none before the `oldest` is asked for again."""
         wanted = numbers // _BLOCK
         found = np.empty(which.size)
-        for block in range(int(wanted.min(initial=0)), int(wanted.max(initial=-1)) + 1):
+        for block in np.unique(wanted).tolist():
             mine = wanted == block
             found[mine] = self._block(purpose, block)[which[mine], numbers[mine] % _BLOCK]
         for kept in [kept for kept in self._blocks if kept[0] == purpose and kept[1] < oldest // _BLOCK]:

@@ -398,8 +398,10 @@ def _noise(
         raise SeparatrixError(f"leaves: found {lower} and {upper}, allowed lower < upper", USAGE)
     step = _step(machine) if step is None else number("step", step, 0, above=True)
     kick = float(np.sqrt(force * step)) / machine.mass
+    # an expression where it is not drawn
+    coefficient = float(contact["restitution"]) if deviation else 0.0
     return Noise(
-        kick, impulses, float(contact.get("restitution", 0.0)), deviation, step,
+        kick, impulses, coefficient, deviation, step,
         (float(contact.get("lower", -np.inf)), float(contact.get("upper", np.inf))), (lower, upper),
         at_impact, seed,
     )  # fmt: skip

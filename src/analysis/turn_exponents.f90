@@ -114,8 +114,8 @@ contains
     point = image
   end subroutine pass_turn
 
-  !> One section, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions that
-  !> the motion leaves of its start.
+  !> One section, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions
+  !> that the motion leaves of its start.
   subroutine advance_frame(machines, point, frame, growth, events, left, reason)
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(inout) :: point(:), frame(:, :)

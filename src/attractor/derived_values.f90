@@ -232,6 +232,8 @@ contains
     type(span_t), intent(in) :: span
     real(wp), intent(out) :: values(:)
     class(machine_t), allocatable :: on_section
+    type(section_state_t) :: start
+    real(wp) :: lasts
     integer :: i
     values = ieee_value(1.0_wp, ieee_quiet_nan)
     if (catalogue(k)%kind == kind_family .or. catalogue(k)%any_position) return
@@ -241,10 +243,9 @@ contains
     end if
     allocate (on_section, source=machine)
     on_section%by_event = catalogue(k)%by_event
-    associate (start => on_section%state_at(catalogue(k)%points(:catalogue(k)%coordinates, 1)), &
-               lasts => merge(catalogue(k)%duration, machine%period*max(1, catalogue(k)%period), catalogue(k)%duration > 0))
-      call derive_over(machine, laws, wanted, start, lasts, real(max(1, catalogue(k)%period), wp), values)
-    end associate
+    start = on_section%state_at(catalogue(k)%points(:catalogue(k)%coordinates, 1))
+    lasts = merge(catalogue(k)%duration, machine%period*max(1, catalogue(k)%period), catalogue(k)%duration > 0)
+    call derive_over(machine, laws, wanted, start, lasts, real(max(1, catalogue(k)%period), wp), values)
     do i = 1, size(wanted)
       if (.not. is_fixed(machine, wanted(i))) values(i) = ieee_value(1.0_wp, ieee_quiet_nan)
       if (is_power(wanted(i)) .or. .not. catalogue(k)%rests) cycle

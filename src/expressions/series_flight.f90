@@ -294,10 +294,8 @@ contains
           cycle
         end if
         call find_crossing(flight, step, fraction, is_certain)
-        if (is_certain) then
-          if (fraction <= 1) status = flight_crossed
-          return
-        end if
+        if (is_certain .and. fraction <= 1) status = flight_crossed
+        if (is_certain) return
         is_anew = .true.
         if (.not. around%is_own) cycle
         flight%proven = step/natural

@@ -3,7 +3,7 @@
 
 !> What a row of the catalogue of laws holds.
 module law_row
-  use kinds, only: wp
+  use kinds, only: real64, wp
   implicit none
   private
 
@@ -11,7 +11,7 @@ module law_row
   integer, parameter, public :: family_length = 9, law_length = 32
   integer, parameter, public :: unit_length = 20
 
-  real(wp), parameter, public :: none_above = huge(1.0_wp), none_below = -huge(1.0_wp)
+  real(wp), parameter, public :: none_above = real(huge(1.0_real64), wp), none_below = -none_above
 
   type, public :: law_row_t
     character(len=family_length) :: family

@@ -44,6 +44,7 @@ contains
     call low_series(system, mode, state, crank, series, fault)
     own = size(flight%guards) - size(flight%tape%switches)
     if (own < size(flight%guards)) call begin_branches(flight, own)
+    if (.not. allocated(crank%bounds)) allocate (crank%bounds(-1:1, 4))
     call take_bounds(flight, crank%bounds(slip, mode))
     flight%is_active(:own) = .false.
     if (slips(state%mode)) then

@@ -31,7 +31,7 @@ module motor_state
     !> Piece of a table of the torque.
     integer :: piece = 0
     !> Bounds that flights have left, by direction of slip and mode of the equations: they depend on neither time nor state.
-    type(bounds_t) :: bounds(-1:1, 4)
+    type(bounds_t), allocatable :: bounds(:, :)
   end type motor_state_t
 
 end module motor_state

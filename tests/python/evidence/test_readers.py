@@ -23,7 +23,9 @@ BARE = b"This is a netCDF dimension but not a netCDF variable."
 def kinds(separatrix, build_dir, source_dir, results, branch_file, tmp_path_factory) -> list[Path]:
     """A file of every kind, small; several of maps and of trajectories."""
     folder = tmp_path_factory.mktemp("kinds")
-    files = {name: folder / f"{name}.h5" for name in ("boundary", "structure", "measures")}
+    files = {
+        name: folder / f"{name}.h5" for name in ("boundary", "structure", "measures", "noise", "passage")
+    }
     succeed(separatrix, "boundary", results["map"], "-o", files["boundary"], folder=folder)
     case = source_dir / "examples" / "structure_blocks_on_a_belt.toml"
     short = ("--set", "run.duration=3")
@@ -31,6 +33,10 @@ def kinds(separatrix, build_dir, source_dir, results, branch_file, tmp_path_fact
     with pytest.MonkeyPatch.context() as patch, sx.open_result(results["stack"]) as stack:
         patch.setenv("SEPARATRIX_LIBRARY", str(build_dir / "lib" / "libseparatrix.so"))
         sx.measures_along(stack, names="global_integrity", output=files["measures"], progress=False)
+        some = {"duration": 0.5, "motions": 4, "impulses": (5.0, 0.1)}
+        sx.noisy(source_dir / "examples" / "basin_viscous.toml", output=files["noise"], **some)
+        some |= {"leaves": "impact", "x0": [0.0, 0.1], "v0": [0.0, 1.0]}
+        sx.first_passage(source_dir / "examples" / "basin_viscous.toml", output=files["passage"], **some)
     made = (results[kind] for kind in ("map", "refined", "sweep", "points", "trajectory"))
     return [*made, branch_file, *files.values()]
 
