@@ -83,7 +83,7 @@ def run(
         _follow(running, events, progress, time_limit, take)
     except KeyboardInterrupt:
         interrupted = True
-        _stop(running, ranks)
+        _stop(running)
     except BaseException:
         _kill(running)
         raise
@@ -230,10 +230,10 @@ def _pass_on(running: list[_Process], one: _Process, event: dict, progress: Prog
         log.info("%s", message)
 
 
-def _stop(running: list[_Process], ranks: int | None) -> None:
+def _stop(running: list[_Process]) -> None:
     """Ask for a clean stop; a second Ctrl-C, or too long a time, ends the programs at once."""
-    # mpiexec passes on SIGUSR1 and takes an interrupt for itself.
-    _signal(running, signal.SIGUSR1 if ranks else signal.SIGINT)
+    # mpiexec takes an interrupt for itself, and a script in the background has its children ignore it.
+    _signal(running, signal.SIGUSR1)
     try:
         last = time.monotonic() + _GRACE
         for one in running:

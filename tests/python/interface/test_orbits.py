@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`sx.branches` and `sx.stability` are the commands of these names, to the bit and to the word."""
 
+import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import separatrix as sx
 from program import succeed
+from separatrix import runner
 from test_python_api import assert_same
 
 
@@ -60,8 +63,22 @@ def test_branches_that_make_no_sense_are_refused(grazing: sx.Case) -> None:
         sx.branches(grazing, "drive.amplitude", 1, 2, x0=(0, 1, 2))
 
 
-def test_branches_end_at_an_interrupt(grazing: sx.Case, tmp_path: Path) -> None:
-    """Nothing can be resumed, so that it is no `Interrupted`."""
+@pytest.fixture(params=[signal.default_int_handler, signal.SIG_IGN], ids=["in front", "in the background"])
+def interrupts(request: pytest.FixtureRequest) -> Iterator[None]:
+    """How the programs that are started take an interrupt: a shell has those in the background ignore it."""
+    before = signal.signal(signal.SIGINT, request.param)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interrupts")
+def test_branches_end_at_an_interrupt(
+    grazing: sx.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By themselves. Nothing can be resumed, so that it is no `Interrupted`."""
+    killed, kill = [], runner._kill
+    monkeypatch.setattr(runner, "_GRACE", 6.0)
+    monkeypatch.setattr(runner, "_kill", lambda running: killed.append(kill(running)))
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
@@ -71,6 +88,7 @@ def test_branches_end_at_an_interrupt(grazing: sx.Case, tmp_path: Path) -> None:
             grazing, "drive.amplitude", 0.05, 1.2, searches=5000, progress=stop, output=tmp_path / "out.h5"
         )
     assert not isinstance(caught.value, sx.Interrupted)
+    assert killed == []
     assert list(tmp_path.iterdir()) == []
 
 
