@@ -27,6 +27,7 @@ module sweep_driver
   use point_columns, only: at_impacts, at_reason, map_values
   use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
+  use signals, only: end_time_limit
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use sweep, only: hold_parameter, hold_t
   use sweep_chain, only: chains_t, hold_reason, new_chains, run_chains
@@ -91,6 +92,7 @@ contains
       call run_branches(session, work, schema, path)
     else
       call session%provenance%finish(schema)
+      call end_time_limit()
       if (session%team%is_root()) call write_whole(path, schema, command%force, error)
       call session%stop_if(error)
       call check_written(session, path)
