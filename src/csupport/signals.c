@@ -74,7 +74,7 @@ void separatrix_signals_farewell(const char *text) {
 }
 
 /* The process ends by itself `patience` after so many seconds, unless separatrix_signals_no_limit comes
-   before. A signal takes the place of the limit. Returns 0, or -1 if the timer cannot be set. */
+   before. A signal replaces the limit. Returns 0, or -1 if the timer cannot be set. */
 int separatrix_signals_limit(double seconds) {
   struct sigaction action = {0};
   struct itimerval timer = {{0, 0}, {0, 0}};
