@@ -3,6 +3,7 @@
 """The exceptions of the package; their codes are the exit codes of the command."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 USAGE = 64
 BAD_DATA = 65
@@ -27,6 +28,11 @@ DAMAGE = (
     TypeError,
     ValueError,
 )
+
+
+def why_absent(path: Path) -> str:
+    """Return why there is no file at a path."""
+    return "a folder, expected a file" if path.is_dir() else "no such file"
 
 
 class SeparatrixError(Exception):

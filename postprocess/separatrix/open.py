@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.locks import lock_options
 from separatrix.stored import NamedErrors, compare_checksums, first_line
 from separatrix.trial import CASE_GIVEN, try_first
@@ -171,7 +171,7 @@ def _open_table(path: str | Path, name: str) -> xr.Dataset:
 def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
     """Check that the file is one that this package reads; return what describes it."""
     if not path.is_file():
-        raise SeparatrixError(f"{path}: no such file", NO_INPUT)
+        raise SeparatrixError(f"{path}: {why_absent(path)}", NO_INPUT)
     try:
         with h5py.File(path, "r", **lock_options(path)) as file:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}

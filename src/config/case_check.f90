@@ -178,12 +178,15 @@ contains
     do i = 1, size(the_case%axes)
       if (the_case%axes(i)%name /= 'x0') cycle
       is_axis = .true.
-      do j = 1, size(the_case%axes(i)%values)
-        problem = beyond(the_case, the_case%axes, the_case%axes(i)%values(j))
-        if (len(problem) == 0) cycle
-        call report(source, 'axis['//to_text(i)//']', problem)
-        exit
-      end do
+      ! An axis may have many values: one of its ends is beyond if any value is.
+      associate (values => the_case%axes(i)%values)
+        do j = 1, 2
+          problem = beyond(the_case, the_case%axes, merge(minval(values), maxval(values), j == 1))
+          if (len(problem) == 0) cycle
+          call report(source, 'axis['//to_text(i)//']', problem)
+          exit
+        end do
+      end associate
     end do
     if (.not. is_axis) then
       problem = beyond(the_case, the_case%axes, the_case%start%x0)

@@ -13,7 +13,7 @@ module files
   implicit none
   private
 
-  public :: file_exists, is_special, is_text, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
+  public :: file_exists, is_empty, is_special, is_text, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
     take_lock, give_lock, open_append, append_line, test_status
 
 contains
@@ -29,6 +29,15 @@ contains
     character(len=*), intent(in) :: path
     is_special = c_is_special(path//c_null_char) == 1
   end function is_special
+
+  !> Whether it is a file without a byte.
+  logical function is_empty(path)
+    character(len=*), intent(in) :: path
+    integer(int64) :: bytes
+    inquire (file=path, size=bytes)
+    is_empty = bytes == 0
+    if (is_empty) is_empty = .not. is_special(path)
+  end function is_empty
 
   !> Whether a file begins like a text: its first bytes are no control characters but tabs and ends of lines. False for an
   !> empty file and one that cannot be read.

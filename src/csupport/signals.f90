@@ -2,17 +2,19 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> Stop signals: SIGUSR1, SIGUSR2, SIGTERM and the first SIGINT are counted, SIGXFSZ can be ignored. A process that has not asked
-!> for the count some seconds after the first ends by itself with code 75.
+!> for the count some seconds after the first ends by itself with code 75, and so does one that has not noticed the end of its time.
 module signals
   use, intrinsic :: iso_c_binding, only: c_null_char
-  use bindings, only: c_signals_clear, c_signals_farewell, c_signals_ignore_file_limit, c_signals_install, c_signals_raise, &
-    c_signals_received, c_signals_terminated
+  use bindings, only: c_signals_clear, c_signals_farewell, c_signals_ignore_file_limit, c_signals_install, c_signals_limit, &
+    c_signals_no_limit, c_signals_raise, c_signals_received, c_signals_terminated
   use errors, only: error_t, fail
+  use kinds, only: real64
   use status, only: exit_internal
   implicit none
   private
 
-  public :: install_signals, ignore_file_limit, set_farewell, signal_count, termination_asked, clear_signals, raise_signal
+  public :: install_signals, ignore_file_limit, set_farewell, begin_time_limit, end_time_limit
+  public :: signal_count, termination_asked, clear_signals, raise_signal
 
   !> Linux signal numbers.
   integer, parameter, public :: sig_usr1 = 10, sig_usr2 = 12, sig_term = 15, sig_xfsz = 25
@@ -30,6 +32,19 @@ contains
     character(len=*), intent(in) :: text
     call c_signals_farewell(text//c_null_char)
   end subroutine set_farewell
+
+  !> The process ends by itself some seconds after the next `seconds`, unless `end_time_limit` is called before; code 70 if the
+  !> system refuses.
+  subroutine begin_time_limit(seconds, error)
+    real(real64), intent(in) :: seconds
+    type(error_t), allocatable, intent(out) :: error
+    if (c_signals_limit(seconds) /= 0) call fail(error, exit_internal, 'cannot set the timer of the time limit')
+  end subroutine begin_time_limit
+
+  !> The end of the time was noticed, or the work that it limits is done.
+  subroutine end_time_limit()
+    call c_signals_no_limit()
+  end subroutine end_time_limit
 
   !> Makes a write beyond the file size limit an error instead of the end of the process; code 70 if the system refuses.
   subroutine ignore_file_limit(error)

@@ -28,6 +28,7 @@ module boundary_driver
   use map_reader, only: reader_t
   use map_schema, only: schema_t
   use session, only: describe_file, identity_of, session_t
+  use signals, only: end_time_limit
   use status, only: exit_bad_case, exit_done
   use stored_map, only: open_map_session, read_labels, restore_catalogues
   use text, only: replace_all, to_text
@@ -90,6 +91,7 @@ contains
     if (session%team%is_root()) call describe_boundary(reader, grid, planes, names, schema, error)
     call session%stop_if(error)
     call session%provenance%finish(schema)
+    call end_time_limit()
     ! A run that was begun with --force may end after --resume.
     if (session%team%is_root()) call write_whole(path, schema, command%force .or. kept%taken_up, error)
     call session%stop_if(error)

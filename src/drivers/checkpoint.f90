@@ -11,6 +11,7 @@ module checkpoint
   use kinds, only: int64, int8, wp
   use output_check, only: check_result, working_path
   use session, only: session_t
+  use signals, only: set_farewell
   use status, only: exit_cannot_create, exit_other_case
   use stop_check, only: check_stop
   use text, only: to_text
@@ -77,6 +78,8 @@ contains
       if (.not. allocated(error) .and. .not. self%reading) call self%file%write(transfer(first, [0_int8]), 0_int64, error)
       self%offset = head
     end if
+    call set_farewell('stopped within one long trajectory; the parts done are kept in '//self%path// &
+                      '; the same command with --resume goes on')
     call session%team%agree(error)
   end subroutine open_checkpoint
 

@@ -24,7 +24,7 @@ module second_look
   use random, only: uniform
   use session, only: session_t
   use status, only: reason_time_over
-  use stop_check, only: check_stop
+  use stop_check, only: check_stop, limit_time
   use team, only: team_t
   use text, only: to_text
   use tiled_run, only: index_in_block, run_tiles
@@ -265,6 +265,7 @@ contains
     touched = [(any(slice == i - 1), i=1, size(catalogues))]
     mine = [(touched(i) .and. modulo(count(touched(:i)), team%size()) == team%rank(), i=1, size(catalogues))]
     before = pack_catalogues(catalogues, touched)
+    call limit_time(journal, time_limit, error)
     do i = 1, size(catalogues)
       if (.not. mine(i) .or. allocated(error)) cycle
       call open_slice(grid, span, int(i - 1, int64), moving, error)

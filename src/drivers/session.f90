@@ -26,6 +26,7 @@ module session
   use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, set_farewell, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
+  use stop_check, only: limit_time
   use sketch, only: sketch_of
   use structure_file, only: read_structure_file
   use system, only: exit_program, sleep_microseconds
@@ -86,6 +87,7 @@ contains
     row = rows(command_number(command%name))
     if (row%stops_early) call install_signals(error)
     call set_farewell('stopped within one long trajectory; nothing was written yet, the same command starts again')
+    if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
                                                    needs_sweep=command%name == 'sweep', structure_file=read_structure_file)

@@ -8,6 +8,7 @@ module shard
   use map_file, only: map_file_t, working_path
   use map_schema, only: schema_t, type_float64
   use session, only: session_t
+  use signals, only: end_time_limit
   use status, only: exit_done
   use text, only: to_text
   use tile_order, only: share_of
@@ -55,6 +56,7 @@ contains
     type(session_t), intent(inout) :: session
     type(map_file_t), intent(inout) :: file
     type(error_t), allocatable :: error
+    call end_time_limit()
     call file%close(session%team, error)
     call session%stop_if(error)
     call session%journal%line('shard', 'the attractors are in '//working_path(file%path)// &

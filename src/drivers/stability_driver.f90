@@ -12,7 +12,7 @@ module stability_driver
   use endings, only: assess_motion
   use errors, only: error_t
   use exponents, only: most_points, motion_names, spectrum_t, type_of_motion, zero_one_test
-  use files, only: file_exists, is_special, is_text
+  use files, only: file_exists, is_empty, is_special, is_text
   use journal, only: json_number, json_text
   use kinds, only: wp
   use launcher, only: launched_rank
@@ -48,6 +48,7 @@ contains
     is_map = file_exists(path)
     if (is_map) is_map = .not. is_special(path)
     if (is_map) is_map = .not. is_text(path)
+    if (is_map) is_map = .not. is_empty(path)
   end function is_map
 
   !> The motion of a case; ends the program with the exit code on errors.

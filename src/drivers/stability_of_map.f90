@@ -72,6 +72,9 @@ contains
     call journal%open(.true., command%json, command%quiet)
     call journal%open_copy(command%log, error)
     if (.not. allocated(error)) call probe_file(command%path, error)
+    ! What is no file of Separatrix is not called damaged.
+    if (.not. allocated(error)) call open_final(command%path, reader, error)
+    if (.not. allocated(error)) call reader%close(error)
     if (.not. allocated(error)) call verify_file(command%path, error, datasets)
     if (.not. allocated(error)) call open_final(command%path, reader, error)
     if (allocated(error)) return

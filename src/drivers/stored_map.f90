@@ -24,6 +24,7 @@ module stored_map
   use signals, only: ignore_file_limit
   use start_label, only: label_left_domain
   use status, only: exit_bad_case, exit_io, exit_resumable, reason_left_domain
+  use stop_check, only: limit_time
   use team, only: team_t
   implicit none
   private
@@ -51,6 +52,7 @@ contains
     call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
+    if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     call session%stop_if(error)
     if (session%team%is_root()) call check_map_file(command%path, session%alone, error)
     call session%stop_if(error)

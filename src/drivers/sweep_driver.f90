@@ -27,11 +27,11 @@ module sweep_driver
   use point_columns, only: at_impacts, at_reason, map_values
   use restoring_law, only: position_is_angle
   use session, only: describe_file, open_session, session_t
+  use signals, only: end_time_limit
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
   use sweep, only: hold_parameter, hold_t
   use sweep_chain, only: chains_t, hold_reason, new_chains, run_chains
   use sweep_report, only: describe_chains, report_given_up, report_limits
-  use system, only: monotonic_seconds
   use text, only: to_text
   use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, run_tiles
   use work_watch, only: watch_t
@@ -91,6 +91,7 @@ contains
       call run_branches(session, work, schema, path)
     else
       call session%provenance%finish(schema)
+      call end_time_limit()
       if (session%team%is_root()) call write_whole(path, schema, command%force, error)
       call session%stop_if(error)
       call check_written(session, path)
@@ -162,16 +163,18 @@ contains
     type(grid_t) :: grid
     type(hold_t) :: held
     type(section_state_t) :: state
+    real(wp) :: start
     grid = grid_of(session%the_case, session%the_case%axes(:0))
     state%state%x = grid%start(1)
     state%state%v = grid%start(2)
-    seconds = monotonic_seconds()
+    call cpu_time(start)
     associate (sweep => session%the_case%sweep)
       call hold_parameter(grid, span_of(session%the_case), trim(sweep%swept%name), &
                           sweep%swept%values(1 + size(sweep%swept%values)/2), state, grid%start(3), sweep%samples, &
                           longest_cycle(session%the_case), held, error)
     end associate
-    seconds = monotonic_seconds() - seconds
+    call cpu_time(seconds)
+    seconds = seconds - start
   end function hold_seconds
 
   !> Which ways the parameter runs.

@@ -24,8 +24,9 @@ module tiled_run
   use session, only: session_t
   use shard, only: in_shard
   use spread_order, only: new_spread_order, spread_order_t, spread_subscripts
-  use signals, only: set_farewell
+  use signals, only: end_time_limit, set_farewell
   use status, only: exit_resumable
+  use stop_check, only: limit_time
   use system, only: monotonic_seconds
   use text, only: to_text
   use tile_times, only: write_tile_times
@@ -139,6 +140,7 @@ contains
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
+    if (.not. allocated(error)) call limit_time(session%journal, session%command%time_limit, error)
     call session%stop_if(error)
     watch%scheduler => scheduler
     watch%session => session
@@ -157,6 +159,7 @@ contains
       if (.not. whole) exit
       computed = computed + 1
     end do
+    call end_time_limit()
     call file%flush(error)
     call session%abort_if(error)
     if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
@@ -326,6 +329,7 @@ contains
     type(schema_t), intent(inout) :: extra
     type(error_t), allocatable :: error
     real(wp) :: begun, alone
+    call end_time_limit()
     if (.not. complete) then
       call file%close(session%team, error)
       call session%stop_if(error)
@@ -356,10 +360,12 @@ contains
     do i = 1, pilot_points
       index(:, i) = spread_subscripts(i, lengths)
     end do
-    start = monotonic_seconds()
+    ! Of the processor, which others may be using too.
+    call cpu_time(start)
     call compute_list(work, index, values, whole, error)
     if (allocated(error)) return
-    seconds = (monotonic_seconds() - start)/pilot_points
+    call cpu_time(seconds)
+    seconds = (seconds - start)/pilot_points
   end subroutine pilot_seconds
 
   !> Points, tiles and bytes of a grid, and the time that `seconds_per_point` on one core mean.

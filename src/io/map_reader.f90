@@ -16,7 +16,7 @@ module map_reader
   use open_file, only: open_file_t
   use slabs, only: slab, slab_count
   use status, only: exit_bad_case, exit_io, exit_no_input
-  use files, only: file_exists, is_text
+  use files, only: file_exists, is_empty, is_text
   use output_check, only: is_folder
   use text, only: to_text
   use tile_record, only: head_bytes, is_done, tile_records
@@ -89,10 +89,35 @@ contains
       call fail(error, exit_no_input, ''''//path//''' is a folder')
     else if (is_text(path)) then
       call fail(error, exit_bad_case, ''''//path//''' is a text, allowed '//allowed)
+    else if (is_empty(path)) then
+      call fail(error, exit_io, ''''//path//''' is empty, allowed '//allowed)
+    else if (.not. is_hdf5(path)) then
+      call fail(error, exit_io, ''''//path//''' is no HDF5 file, or its beginning is damaged; allowed '//allowed)
     end if
     if (allocated(error)) return
     call h5_open(path, reader%file, error)
   end subroutine open_reader
+
+  !> Whether the signature of HDF5 is where the format allows it: at the beginning, or behind 512, 1024, 2048 ... bytes. True for
+  !> a file that cannot be read, whose reason HDF5 states.
+  logical function is_hdf5(path)
+    character(len=*), intent(in) :: path
+    character(len=*), parameter :: signature = char(137)//'HDF'//achar(13)//achar(10)//achar(26)//achar(10)
+    character(len=len(signature)) :: found
+    integer(int64) :: at
+    integer :: unit, status
+    open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=status)
+    is_hdf5 = status /= 0
+    if (is_hdf5) return
+    at = 0
+    do while (.not. is_hdf5)
+      read (unit, pos=at + 1, iostat=status) found
+      if (status /= 0) exit
+      is_hdf5 = found == signature
+      at = max(512_int64, 2*at)
+    end do
+    close (unit)
+  end function is_hdf5
 
   !> The variables of the root and of its groups in the order of the file, without dimensions that have
   !> no coordinates.

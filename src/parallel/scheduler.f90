@@ -15,7 +15,7 @@
 module scheduler
   use errors, only: error_t
   use kinds, only: real64
-  use signals, only: signal_count
+  use signals, only: end_time_limit, signal_count
   use system, only: monotonic_seconds
   use work_log, only: work_log_t
   implicit none
@@ -94,6 +94,7 @@ contains
     stop_is_due = signal_count() > 0
     if (stop_is_due .or. self%options%time_limit <= 0) return
     stop_is_due = monotonic_seconds() - self%started >= self%options%time_limit
+    if (stop_is_due) call end_time_limit()
   end function stop_is_due
 
   !> Starts the clock and an empty log.

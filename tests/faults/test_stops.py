@@ -201,8 +201,9 @@ def test_a_dead_rank_ends_the_job_and_the_others_report_how_to_continue(
 
 
 @pytest.mark.parametrize("ranks", [0, 2])
-def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, ranks):
+def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, long_if, ranks):
     """It ends with code 75 and reports how to go on, though nobody looks for signals meanwhile."""
+    long_if(ranks == 2)
     life.write_case(tmp_path)
     # The pilot points of a dry run take minutes each.
     long = ["--set", "run.duration=2e6", "--set", "integrator.event_budget=1000000000"]
@@ -215,6 +216,22 @@ def test_a_signal_within_one_long_trajectory(mpi_separatrix, tmp_path, ranks):
     assert code == 75, log
     assert ended < 8
     assert "stopped" in log
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_the_time_limit_within_one_long_trajectory(mpi_separatrix, tmp_path, long_if, ranks):
+    """It ends the run soon after, though nobody looks at the clock meanwhile."""
+    long_if(ranks == 2)
+    life.write_case(tmp_path)
+    # Every trajectory takes minutes.
+    long = ["--set", "run.duration=2e6", "--set", "integrator.event_budget=1000000000"]
+    process = life.launch(mpi_separatrix, tmp_path, ranks, *long, "--time-limit", "0.5")
+    began = time.monotonic()
+    code = process.wait(60)
+    log = (tmp_path / "log").read_text()
+    assert code == 75, log
+    assert time.monotonic() - began < 12
+    assert "stopped within one long trajectory" in log
 
 
 @pytest.mark.parametrize(("ranks", "moved"), [(0, False), (2, True)])

@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, CaseError, SeparatrixError
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, CaseError, SeparatrixError, why_absent
 from separatrix.trial import read_apart
 
 # numbers of a structure: in the case or in its file
@@ -100,7 +100,7 @@ def _without_file(table: Mapping, path: Path, name: str | Path, key: str) -> dic
 def _read(path: Path, at: str) -> tuple[dict, dict]:
     """Return matrices or modes of a file, and the rows of its points."""
     if not path.is_file():
-        raise CaseError(f"{at}: {path}: no such file", NO_INPUT)
+        raise CaseError(f"{at}: {path}: {why_absent(path)}", NO_INPUT)
     try:
         state = path.stat()
         return _content(path, state.st_mtime_ns, state.st_size)

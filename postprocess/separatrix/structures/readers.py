@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.structures.containers import ALONE, CONTAINERS, find_matrix, read_containers
 from separatrix.structures.content import Matrices
 from separatrix.structures.harwell_boeing import read_harwell_boeing
@@ -101,7 +101,7 @@ def _matrix(
 ) -> tuple[sparse.csr_array | None, list[str]]:
     """Return a matrix and the labels of its coordinates, none where the file has no names."""
     if not path.is_file():
-        raise SeparatrixError(f"{path}: there is no such file", NO_INPUT)
+        raise SeparatrixError(f"{path}: {why_absent(path)}", NO_INPUT)
     suffix = path.suffix.lower()
     try:
         if suffix in _MATRIX_MARKET:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from separatrix.errors import NO_INPUT, SeparatrixError
+from separatrix.errors import NO_INPUT, SeparatrixError, why_absent
 from separatrix.extras import library
 from separatrix.structures.content import Modes
 from separatrix.trial import read_apart
@@ -26,7 +26,7 @@ def read_modes(path: str | Path) -> Modes:
     """
     path = Path(path)
     if not path.is_file():
-        raise SeparatrixError(f"{path}: there is no such file", NO_INPUT)
+        raise SeparatrixError(f"{path}: {why_absent(path)}", NO_INPUT)
     pyuff = library("pyuff", path, "formats")
 
     def read() -> Modes:

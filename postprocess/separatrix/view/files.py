@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError
+from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.locks import lock_options
 from separatrix.palette import of_attractors
 from separatrix.trial import CASE_GIVEN, try_first
@@ -32,7 +32,7 @@ class ResultFile:
         """Open a file. SeparatrixError if it is missing, foreign, incomplete, too new or damaged."""
         self.path, self.number = Path(path), number
         if not self.path.is_file():
-            raise SeparatrixError(f"{path}: no such file", NO_INPUT)
+            raise SeparatrixError(f"{path}: {why_absent(self.path)}", NO_INPUT)
         options = lock_options(path)
         try_first(path, lambda: self._try(h5py.File(path, **options)))
         try:

@@ -5,6 +5,7 @@
 import re
 import time
 
+import h5py
 import pytest
 from program import CASE, STARTS, listing, run, succeed, write_case
 
@@ -57,7 +58,7 @@ BAD_CASES = {
     "barrier": (
         'to = "1.1 m"\ncount',
         'to = "1.2 m"\ncount',
-        ["axis[1]", "x0 = 1.13", "contact.upper = 1.1 m"],
+        ["axis[1]", "x0 = 1.2 m", "contact.upper = 1.1 m"],
     ),
     "empty_axis": ("count = 19", "count = 0", ["axis[1].count", "found 0", "from 1"]),
     "axis_of_nothing": ('from = 0\nto = "1.1 m"\ncount = 19', "values = []", ["axis[1]", "values"]),
@@ -406,3 +407,49 @@ def test_the_driving_body_of_a_pair_moves_its_stops(separatrix, source_dir, tmp_
         assert outcome.code == 65
         assert "start.x0" in outcome.err
         assert "body.driver_x0" in outcome.err
+
+
+STRANGE = {
+    "empty": (b"", "is empty", 74),
+    "bytes": (bytes(range(256)), "is no HDF5 file", 74),
+    "text": (b"hello\n", "is a text", 65),
+    "hdf5": (None, "is not a file of Separatrix", 74),
+    "folder": (None, "is a folder", 66),
+    "missing": (None, "there is no file", 66),
+}
+
+
+@pytest.mark.parametrize("content", STRANGE)
+def test_what_is_no_result_is_called_what_it_is(separatrix, tmp_path, content):
+    """Every command that reads results names the file and the reason."""
+    written, reason, code = STRANGE[content]
+    path = tmp_path / "strange.h5"
+    if content == "folder":
+        path.mkdir()
+    elif content == "hdf5":
+        with h5py.File(path, "w") as file:
+            file["values"] = [1.0, 2.0]
+    elif written is not None:
+        path.write_bytes(written)
+    before = listing(tmp_path)
+    commands = [["info", path.name], ["verify", path.name], ["boundary", path.name, "-o", "b.h5"]]
+    commands += [["merge", "whole.h5", path.name]]
+    # A text or nothing is a case.
+    if content in ("bytes", "hdf5"):
+        commands += [["stability", path.name]]
+    for words in commands:
+        outcome = run(separatrix, *words, folder=tmp_path)
+        assert outcome.code == code, outcome
+        assert reason in outcome.err, outcome
+        assert path.name in outcome.err
+    assert listing(tmp_path) == before
+
+
+@pytest.mark.parametrize("command", ["basin", "sweep", "trajectory", "stability", "points", "branches"])
+def test_an_empty_case_lacks_its_first_key(separatrix, tmp_path, command):
+    path = write_case(tmp_path, "", "empty.toml")
+    (tmp_path / "starts.csv").write_text(STARTS)
+    more = {"points": ["--list", "starts.csv"], "branches": ["--parameter", "drive.ratio"]}.get(command, [])
+    outcome = run(separatrix, command, path, *more, folder=tmp_path)
+    assert outcome.code == 65
+    assert f"{path}: key 'body.mass': missing" in outcome.err

@@ -4,6 +4,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 from pathlib import Path
@@ -92,6 +93,27 @@ def test_validate_and_dry_run_need_no_mpirun_and_write_nothing(separatrix, tmp_p
 def test_a_dry_run_counts_the_points(separatrix, tmp_path, kind, plan):
     write_case(tmp_path)
     assert plan in succeed(separatrix, *KINDS[kind], "--dry-run", folder=tmp_path).out
+
+
+@pytest.mark.parametrize("option", ["--validate", "--dry-run"])
+def test_a_plan_takes_as_much_work_for_a_large_map(separatrix, build_dir, tmp_path, option):
+    """Work is counted in allocations: the values of an axis are one, whatever their number."""
+    counter = build_dir / "bin/tests/libcounted_allocations.so"
+    if not counter.is_file():
+        pytest.skip(f"{counter} has not been built")
+    write_case(tmp_path)
+    counts = []
+    for values in (200, 200_000):
+        axes = [part for axis in (1, 2) for part in ("--set", f"axis[{axis}].count={values}")]
+        subprocess.run(
+            [separatrix, *KINDS["map"], *axes, option],
+            cwd=tmp_path,
+            env={**os.environ, "LD_PRELOAD": str(counter), "ALLOCATIONS": "count"},
+            capture_output=True,
+            check=True,
+        )
+        counts.append(int((tmp_path / "count").read_text()))
+    assert counts[1] < 1.5 * counts[0], counts
 
 
 def test_a_dry_run_of_a_sweep_counts_all_that_is_written(separatrix, tmp_path):

@@ -157,6 +157,9 @@ def test_missing_file_and_no_hdf5(tmp_path: Path) -> None:
     with pytest.raises(SeparatrixError, match="no such file") as caught:
         open_result(tmp_path / "absent.h5")
     assert caught.value.code == 66
+    with pytest.raises(SeparatrixError, match="a folder, expected a file") as caught:
+        open_result(tmp_path)
+    assert caught.value.code == 66
     text = tmp_path / "text.h5"
     text.write_text("not HDF5")
     with pytest.raises(SeparatrixError, match="cannot be read as HDF5") as caught:
