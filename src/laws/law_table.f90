@@ -350,9 +350,13 @@ contains
   pure integer function position_of(choice, parameter)
     type(law_choice_t), intent(in) :: choice
     character(len=*), intent(in) :: parameter
-    integer :: i
+    integer :: i, first, last
+    first = choice%first_row
+    last = choice%last_row
+    ! The name of a choice may have been changed.
+    if (.not. is_of(first, choice%family, choice%name)) call find_rows(choice%family, choice%name, first, last)
     position_of = 0
-    do i = choice%first_row, choice%last_row
+    do i = first, last
       if (.not. is_of(i, choice%family, choice%name)) cycle
       position_of = position_of + 1
       if (parameters(i)%name == parameter) return
