@@ -276,8 +276,8 @@ contains
     ok = certain
   end subroutine fly_on
 
-  !> The events of a log, which was opened at a point `start` after so many sections; `last` is the event before them. Not `certain`:
-  !> the instant of one does not follow from its guard.
+  !> The events of a log, which was opened at a point `start` after so many sections; `last` is the event before them. Not
+  !> `certain`: the instant of one does not follow from its guard.
   pure subroutine add_events(self, log, sections, start, last, events, certain)
     class(hybrid_body_t), intent(in) :: self
     type(log_t), intent(in) :: log
