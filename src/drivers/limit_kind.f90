@@ -12,7 +12,7 @@ module limit_kind
   use grid, only: grid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
-  use motor_body, only: motor_body_t, point_of_crank
+  use motor_body, only: motor_body_t
   use orbit_motion, only: orbit_of_motion
   use periodic_orbit, only: correct_orbit, orbit_t
   use orbit_directions, only: direct
@@ -83,7 +83,7 @@ contains
     if (allocated(error)) return
     select type (centre => machines%centre)
     type is (motor_body_t)
-      y = point_of_crank(centre, settled%state%state, settled%state%motor)
+      y = centre%point_of(settled%state)
       y(2) = 0
       call orbit_of_motion(machines, value, y, settled%period, seed, ok)
     end select

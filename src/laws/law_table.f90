@@ -58,6 +58,8 @@ module law_table
     !> Name of a part, force or state.
     character(len=label_length) :: label = ''
     type(parameter_value_t), allocatable :: parameters(:)
+    !> Its rows are among these of the table `parameters`, which is long.
+    integer, private :: first_row = 1, last_row = 0
     !> Expressions of a law by expressions, and the parameters that they name, after those of the table; else not allocated.
     type(law_text_t), allocatable :: texts(:)
     type(parameter_row_t), allocatable :: own(:)
@@ -114,6 +116,8 @@ module law_table
     [other_parameters, drive_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters, &
      motor_parameters, expression_parameters]
 
+  character(len=1), parameter :: law_letters(*) = parameters%law(1:1), family_letters(*) = parameters%family(1:1)
+
 contains
 
   !> Row of a law in `laws`, 0 if there is none.
@@ -137,20 +141,24 @@ contains
   pure function parameters_of(family, law) result(rows)
     character(len=*), intent(in) :: family, law
     type(parameter_row_t), allocatable :: rows(:)
-    integer :: i, count
-    count = 0
-    do i = 1, size(parameters)
-      if (is_of(parameters(i), family, law)) count = count + 1
-    end do
-    allocate (rows(count))
-    count = 0
-    do i = 1, size(parameters)
-      if (is_of(parameters(i), family, law)) then
-        count = count + 1
-        rows(count) = parameters(i)
-      end if
-    end do
+    integer :: i, first, last
+    call find_rows(family, law, first, last)
+    rows = pack(parameters(first:last), [(is_of(i, family, law), i=first, last)])
   end function parameters_of
+
+  !> The first and the last row of a law in `parameters`; 1 and 0 if it has none.
+  pure subroutine find_rows(family, law, first, last)
+    character(len=*), intent(in) :: family, law
+    integer, intent(out) :: first, last
+    integer :: i
+    first = 1
+    last = 0
+    do i = 1, size(parameters)
+      if (.not. is_of(i, family, law)) cycle
+      if (last == 0) first = i
+      last = i
+    end do
+  end subroutine find_rows
 
   !> The rows of a choice: those of its law, then of the parameters that its expressions name.
   pure function rows_of(choice) result(rows)
@@ -173,13 +181,14 @@ contains
     end do
   end function text_of
 
-  !> Whether a row is a parameter of a law. First letters are compared first: fits build thousands of machines, and rows are many.
+  !> Whether a row of `parameters` is one of a law. First letters are compared first: fits build thousands of machines, and rows
+  !> are many.
   pure logical function is_of(row, family, law)
-    type(parameter_row_t), intent(in) :: row
+    integer, intent(in) :: row
     character(len=*), intent(in) :: family, law
     is_of = .false.
-    if (row%law(1:1) /= law(1:1) .or. row%family(1:1) /= family(1:1)) return
-    is_of = row%family == family .and. row%law == law
+    if (law_letters(row) /= law(1:1) .or. family_letters(row) /= family(1:1)) return
+    is_of = parameters(row)%law == law .and. parameters(row)%family == family
   end function is_of
 
   !> Name of the table of a law in a case file, which the paths of its parameters begin with: the family, of an effect
@@ -249,17 +258,19 @@ contains
   pure function law_choice(family, name) result(choice)
     character(len=*), intent(in) :: family, name
     type(law_choice_t) :: choice
-    type(parameter_row_t), allocatable :: rows(:)
-    integer :: i
+    integer :: i, row
     choice%family = family
     choice%name = name
-    rows = parameters_of(family, name)
-    allocate (choice%parameters(size(rows)))
-    do i = 1, size(rows)
-      if (rows(i)%list) then
+    call find_rows(family, name, choice%first_row, choice%last_row)
+    allocate (choice%parameters(count([(is_of(i, family, name), i=choice%first_row, choice%last_row)])))
+    i = 0
+    do row = choice%first_row, choice%last_row
+      if (.not. is_of(row, family, name)) cycle
+      i = i + 1
+      if (parameters(row)%list) then
         allocate (choice%parameters(i)%values(0))
       else
-        choice%parameters(i)%values = [rows(i)%default]
+        choice%parameters(i)%values = [parameters(row)%default]
       end if
     end do
   end function law_choice
@@ -339,10 +350,14 @@ contains
   pure integer function position_of(choice, parameter)
     type(law_choice_t), intent(in) :: choice
     character(len=*), intent(in) :: parameter
-    integer :: i
+    integer :: i, first, last
+    first = choice%first_row
+    last = choice%last_row
+    ! The name of a choice may have been changed.
+    if (.not. is_of(first, choice%family, choice%name)) call find_rows(choice%family, choice%name, first, last)
     position_of = 0
-    do i = 1, size(parameters)
-      if (.not. is_of(parameters(i), choice%family, choice%name)) cycle
+    do i = first, last
+      if (.not. is_of(i, choice%family, choice%name)) cycle
       position_of = position_of + 1
       if (parameters(i)%name == parameter) return
     end do

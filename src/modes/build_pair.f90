@@ -141,10 +141,12 @@ contains
     type(law_choice_t), intent(in) :: choices(:)
     character(len=*), intent(in) :: family
     integer :: i
-    choice = law_choice(family, 'none')
-    do i = 1, size(choices)
-      if (choices(i)%family == family) choice = choices(i)
-    end do
+    i = findloc(choices%family == family, .true., dim=1, back=.true.)
+    if (i > 0) then
+      choice = choices(i)
+    else
+      choice = law_choice(family, 'none')
+    end if
   end function law_of
 
   !> Whether the drive gives the motion of the driving body.

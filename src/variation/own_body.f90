@@ -4,26 +4,26 @@
 !> A body by expressions as a hybrid machine. Its state is x [m], v [m/s] and the states of the case; the section is that of the
 !> drive.
 module own_body
-  use hybrid_machine, only: event_t, hybrid_t, neighbourhood_t
+  use hybrid_machine, only: event_t
   use constants, only: two_pi
   use kinds, only: wp
   use machine_type, only: section_state_t
-  use motion_state, only: event_barrier_release, event_chatter_lower, event_chatter_upper, event_impact_lower, &
-    event_impact_upper, event_release, mode_lower_barrier, mode_slip_minus, mode_upper_barrier, tally_t
+  use motion_state, only: log_t, mode_slip_minus, tally_t
   use motor_rest, only: slips
   use motor_system, only: body_held, both_move, guard_body_down, guard_body_up, phi_at, v_at, w_at, x_at
   use own_flow, only: add_slope_nodes, fly_own, new_own_flow, own_flow_t, rates_in, values_in
   use own_machine, only: own_machine_t
+  use hybrid_body, only: rests_on_barrier, hybrid_body_t
   implicit none
   private
 
-  public :: own_body_of, why_not_varied, release_margin
+  public :: own_body_of, why_not_varied
 
   integer, parameter, public :: x_of = 1, v_of = 2
   !> A speed at an event that is none, in sizes.
   real(wp), parameter :: no_speed = 1e-9_wp
 
-  type, extends(hybrid_t), public :: own_body_t
+  type, extends(hybrid_body_t), public :: own_body_t
     type(own_machine_t) :: machine
     !> Flights of a body that slips, and of one that is held.
     type(own_flow_t) :: flows(2)
@@ -32,311 +32,264 @@ module own_body
     integer, allocatable :: release_slopes(:, :), restitution_slopes(:)
     real(wp), allocatable :: sizes(:)
   contains
-    procedure :: rests => body_rests
     procedure :: fly => fly_body
     procedure :: slope => slope_of_body
-    procedure :: guard => guard_of_body
-    procedure :: jump => jump_of_body
-    procedure :: begin => begin_own
-    procedure :: go_on => go_on_with_own
-    procedure :: fly_to_section => fly_own_to_section
-    procedure :: fly_sections => fly_own_over_sections
-    procedure :: map => map_of_own
+    procedure :: start => start_of_own
+    procedure :: state_at => state_of_own
+    procedure :: point_of => point_of_own
+    procedure :: release_margin => margin_of_own
+    procedure :: apply_impact => rebound
+    procedure :: advance => advance_own
+    procedure :: set_arrival => arrival_of_own
     procedure :: starts_of_section => starts_of_own
   end type own_body_t
 
-  ! In the submodule `own_sections`.
-  interface
-    module pure subroutine begin_own(self, point, section, ok)
-    class(own_body_t), intent(in) :: self
-    real(wp), intent(in) :: point(:)
-    type(section_state_t), intent(out) :: section
-    logical, intent(out) :: ok
-  end subroutine begin_own
-
-  module pure subroutine go_on_with_own(self, section, point, ok)
-  class(own_body_t), intent(in) :: self
-  type(section_state_t), intent(inout) :: section
-  real(wp), intent(out) :: point(:)
-  logical, intent(out) :: ok
-end subroutine go_on_with_own
-
-module pure subroutine fly_own_to_section(self, start, point, events, ok)
-class(own_body_t), intent(in) :: self
-real(wp), intent(in) :: start(:)
-real(wp), intent(out) :: point(:)
-type(event_t), allocatable, intent(out) :: events(:)
-logical, intent(out) :: ok
-end subroutine fly_own_to_section
-
-module pure subroutine fly_own_over_sections(self, point, sections, collapsed, image, events, mode, tally, ok)
-class(own_body_t), intent(in) :: self
-real(wp), intent(in) :: point(:)
-integer, intent(in) :: sections
-logical, intent(in) :: collapsed
-real(wp), intent(out) :: image(:)
-type(event_t), allocatable, intent(out) :: events(:)
-integer, intent(out) :: mode
-type(tally_t), intent(out) :: tally
-logical, intent(out) :: ok
-end subroutine fly_own_over_sections
-
-module pure subroutine map_of_own(self, machines, point, sections, image, by_start, tally, ok, by_parameter)
-class(own_body_t), intent(in) :: self
-type(neighbourhood_t), intent(in) :: machines
-real(wp), intent(in) :: point(:)
-integer, intent(in) :: sections
-real(wp), intent(out) :: image(:), by_start(:, :)
-type(tally_t), intent(out) :: tally
-logical, intent(out) :: ok
-real(wp), intent(out), optional :: by_parameter(:)
-end subroutine map_of_own
-
-module pure function starts_of_own(self, watched, spread) result(points)
-class(own_body_t), intent(in) :: self
-real(wp), intent(in) :: watched(:, :)
-real(wp), intent(in), optional :: spread(:)
-real(wp) :: points(self%n, size(watched, 2))
-end function starts_of_own
-end interface
-
 contains
 
- !> Why the variations of a machine are not known, with the key of the case; '' if they are.
-pure function why_not_varied(machine) result(why)
-  type(own_machine_t), intent(in) :: machine
-  character(len=:), allocatable :: why
-  why = ''
-  if (.not. machine%motor%system%period > 0) then
-    why = 'drive.period: missing, needed here: a body by expressions has its section once a period'
-  end if
-end function why_not_varied
-
- !> The hybrid machine. `sizes`: of a position [m] and of a speed [m/s]; `smooth_turns`: no force depends on the direction.
-pure function own_body_of(machine, sizes, smooth_turns) result(body)
-  type(own_machine_t), intent(in) :: machine
-  real(wp), intent(in) :: sizes(2)
-  logical, intent(in) :: smooth_turns
-  type(own_body_t) :: body
-  real(wp) :: scales(machine%coordinates())
-  integer :: k
-  body%machine = machine
-  associate (system => machine%motor%system)
-    body%n = system%variables - x_at + 1
-    body%positions = 1
-    body%period = machine%period
-    body%lower = machine%lower
-    body%upper = machine%upper
-    body%barriers = [body%lower, body%upper]
-    body%force_size = system%mass*sizes(2)*machine%drive_frequency
-    body%smooth_turns = smooth_turns
-    body%size_of = machine%scales(sizes(1))
-    body%size_of = body%size_of(:body%n)
-    body%size_of(v_of) = sizes(2)
-    scales = body%size_of
-    body%sizes = [machine%period, two_pi, scales]
-    allocate (body%watched(2, body%n), source=0.0_wp)
-    body%watched(1, x_of) = 1
-    body%watched(2, v_of) = 1
-    call new_own_flow(system, both_move, body%flows(1))
-    call new_own_flow(system, body_held, body%flows(2))
-    allocate (body%release_slopes(system%variables, 2), body%restitution_slopes(system%variables))
-    associate (guards => system%flights(body_held, 0)%guards)
-      do k = 1, 2
-        call add_slope_nodes(body%flows(2), guards(merge(guard_body_up, guard_body_down, k == 1))%node, phi_at, &
-                             body%release_slopes(:, k))
-      end do
-    end associate
-    if (system%restitution > 0) call add_slope_nodes(body%flows(1), system%restitution, phi_at, body%restitution_slopes)
-  end associate
-end function own_body_of
-
-pure logical function body_rests(self, mode)
-  class(own_body_t), intent(in) :: self
-  integer, intent(in) :: mode
-  body_rests = self%n > 0 .and. .not. slips(mode)
-end function body_rests
-
- !> The variables of the equations at a time since the first section.
-pure function variables_at(self, t, y) result(z)
-  class(own_body_t), intent(in) :: self
-  real(wp), intent(in) :: t, y(:)
-  real(wp) :: z(self%n + w_at)
-  real(wp) :: time
-  time = t - self%period*floor(t/self%period)
-  z(:w_at) = time*[1.0_wp, two_pi/self%period]
-  z(x_at:) = y
-end function variables_at
-
- !> The parameters of a body that slips in a direction.
-pure function parameters_in(self, slip) result(parameters)
-  class(own_body_t), intent(in) :: self
-  integer, intent(in) :: slip
-  real(wp) :: parameters(size(self%machine%motor%system%sheet%parameters))
-  parameters = self%machine%motor%system%sheet%parameters
-  parameters(self%machine%motor%system%slip) = slip
-end function parameters_in
-
-pure integer function slip_in(mode)
-  integer, intent(in) :: mode
-  slip_in = merge(-1, 1, mode == mode_slip_minus)
-end function slip_in
-
-pure subroutine fly_body(self, mode, t0, y0, t1, y1, flight)
-  class(own_body_t), intent(in) :: self
-  integer, intent(in) :: mode
-  real(wp), intent(in) :: t0, y0(:), t1
-  real(wp), intent(out) :: y1(:)
-  real(wp), intent(out), optional :: flight(:, :)
-  real(wp) :: z(self%n + w_at), slopes(self%n, self%n), parameters(size(self%machine%motor%system%sheet%parameters))
-  real(wp) :: t, until
-  integer :: k, turn, last
-  k = merge(1, 2, slips(mode))
-  y1 = y0
-  if (k == 2) y1(v_of) = 0
-  if (mode == mode_upper_barrier) y1(x_of) = self%upper
-  if (mode == mode_lower_barrier) y1(x_of) = self%lower
-  if (present(flight)) then
-    flight = 0
-    do turn = 1, self%n
-      flight(turn, turn) = 1
-    end do
-  end if
-  parameters = parameters_in(self, slip_in(mode))
-  t = t0
-  turn = floor(t/self%period)
-  last = floor(t1/self%period)
-  ! Back from a section.
-  if (t1 < t0 .and. .not. t0 > turn*self%period) turn = turn - 1
-  do
-    z(:w_at) = (t - turn*self%period)*[1.0_wp, two_pi/self%period]
-    z(x_at:) = y1
-    until = t1
-    if (last > turn) until = (turn + 1)*self%period
-    if (last < turn) until = max(turn*self%period, t1)
-    if (present(flight)) then
-      call fly_own(self%flows(k), parameters, self%sizes, until - t, z, slopes)
-      if (abs(until - t) > 0) flight = matmul(slopes, flight)
-    else
-      call fly_own(self%flows(k), parameters, self%sizes, until - t, z)
+  !> Why the variations of a machine are not known, with the key of the case; '' if they are.
+  pure function why_not_varied(machine) result(why)
+    type(own_machine_t), intent(in) :: machine
+    character(len=:), allocatable :: why
+    why = ''
+    if (.not. machine%motor%system%period > 0) then
+      why = 'drive.period: missing, needed here: a body by expressions has its section once a period'
     end if
-    y1 = z(x_at:)
-    t = until
-    if (.not. abs(t1 - t) > 0) exit
-    turn = turn + merge(1, -1, t1 > t0)
-  end do
-  if (.not. present(flight)) return
-  if (k == 2) flight(:, v_of) = 0
-  if (k == 2) flight(v_of, :) = 0
-  if (rests_on_barrier(mode)) flight(:, x_of) = 0
-  if (rests_on_barrier(mode)) flight(x_of, :) = 0
-end subroutine fly_body
+  end function why_not_varied
 
-pure logical function rests_on_barrier(mode)
-  integer, intent(in) :: mode
-  rests_on_barrier = mode == mode_upper_barrier .or. mode == mode_lower_barrier
-end function rests_on_barrier
+  !> The hybrid machine. `sizes`: of a position [m] and of a speed [m/s]; `smooth_turns`: no force depends on the direction.
+  pure function own_body_of(machine, sizes, smooth_turns) result(body)
+    type(own_machine_t), intent(in) :: machine
+    real(wp), intent(in) :: sizes(2)
+    logical, intent(in) :: smooth_turns
+    type(own_body_t) :: body
+    real(wp) :: scales(machine%coordinates())
+    integer :: k
+    body%machine = machine
+    associate (system => machine%motor%system)
+      body%n = system%variables - x_at + 1
+      body%positions = 1
+      body%period = machine%period
+      body%lower = machine%lower
+      body%upper = machine%upper
+      body%barriers = [body%lower, body%upper]
+      body%force_size = system%mass*sizes(2)*machine%drive_frequency
+      body%smooth_turns = smooth_turns
+      body%size_of = machine%scales(sizes(1))
+      body%size_of = body%size_of(:body%n)
+      body%size_of(v_of) = sizes(2)
+      scales = body%size_of
+      body%sizes = [machine%period, two_pi, scales]
+      allocate (body%watched(2, body%n), source=0.0_wp)
+      body%watched(1, x_of) = 1
+      body%watched(2, v_of) = 1
+      call new_own_flow(system, both_move, body%flows(1))
+      call new_own_flow(system, body_held, body%flows(2))
+      allocate (body%release_slopes(system%variables, 2), body%restitution_slopes(system%variables))
+      associate (guards => system%flights(body_held, 0)%guards)
+        do k = 1, 2
+          call add_slope_nodes(body%flows(2), guards(merge(guard_body_up, guard_body_down, k == 1))%node, phi_at, &
+                             body%release_slopes(:, k))
+        end do
+      end associate
+      if (system%restitution > 0) call add_slope_nodes(body%flows(1), system%restitution, phi_at, body%restitution_slopes)
+    end associate
+  end function own_body_of
 
-pure function slope_of_body(self, mode, t, y) result(slope)
-  class(own_body_t), intent(in) :: self
-  integer, intent(in) :: mode
-  real(wp), intent(in) :: t, y(:)
-  real(wp) :: slope(size(y))
-  real(wp) :: z(self%n + w_at), rates(self%n + w_at)
-  z = variables_at(self, t, y)
-  ! Where it comes to rest, the branches are those of the side from which it comes.
-  if (slips(mode) .and. abs(z(v_at)) < no_speed*self%size_of(v_of)) z(v_at) = slip_in(mode)*no_speed*self%size_of(v_of)
-  rates = rates_in(self%flows(merge(1, 2, slips(mode))), z, parameters_in(self, slip_in(mode)))
-  slope = rates(x_at:)
-  if (slips(mode)) slope(x_of) = y(v_of)
-end function slope_of_body
+  !> The variables of the equations at a time since the first section.
+  pure function variables_at(self, t, y) result(z)
+    class(own_body_t), intent(in) :: self
+    real(wp), intent(in) :: t, y(:)
+    real(wp) :: z(self%n + w_at)
+    real(wp) :: time
+    time = t - self%period*floor(t/self%period)
+    z(:w_at) = time*[1.0_wp, two_pi/self%period]
+    z(x_at:) = y
+  end function variables_at
 
-pure subroutine guard_of_body(self, event, t, y, value, by_state, by_time)
-  class(own_body_t), intent(in) :: self
-  type(event_t), intent(in) :: event
-  real(wp), intent(in) :: t, y(:)
-  real(wp), intent(out) :: value, by_state(:), by_time
-  by_state = 0
-  by_time = 0
-  select case (event%kind)
-  case (event_impact_upper, event_chatter_upper)
-    value = y(x_of) - self%upper
-    by_state(x_of) = 1
-  case (event_impact_lower, event_chatter_lower)
-    value = y(x_of) - self%lower
-    by_state(x_of) = 1
-  case (event_release, event_barrier_release)
-    call release_margin(self, event%side, t, y, value, by_state, by_time)
-  case default
-    value = y(v_of)
-    by_state(v_of) = 1
-  end select
-end subroutine guard_of_body
+  !> The parameters of a body that slips in a direction.
+  pure function parameters_in(self, slip) result(parameters)
+    class(own_body_t), intent(in) :: self
+    integer, intent(in) :: slip
+    real(wp) :: parameters(size(self%machine%motor%system%sheet%parameters))
+    parameters = self%machine%motor%system%sheet%parameters
+    parameters(self%machine%motor%system%slip) = slip
+  end function parameters_in
 
- !> By how much the force on a body at rest is less than what moves it to a `side` [N], and its derivatives.
-pure subroutine release_margin(self, side, t, y, margin, by_state, by_time)
-  class(own_body_t), intent(in) :: self
-  integer, intent(in) :: side
-  real(wp), intent(in) :: t, y(:)
-  real(wp), intent(out) :: margin, by_state(:), by_time
-  real(wp) :: value(self%flows(2)%tape%count), slopes(self%n + w_at)
-  integer :: k
-  k = merge(1, 2, side > 0)
-  value = values_in(self%flows(2), variables_at(self, t, y), parameters_in(self, 1))
-  associate (guards => self%machine%motor%system%flights(body_held, 0)%guards)
-    margin = -side*value(guards(merge(guard_body_up, guard_body_down, side > 0))%node)
-  end associate
-  slopes = -side*value(self%release_slopes(:, k))
-  by_time = slopes(1) + slopes(w_at)*two_pi/self%period
-  by_state = slopes(x_at:)
-end subroutine release_margin
+  pure integer function slip_in(mode)
+    integer, intent(in) :: mode
+    slip_in = merge(-1, 1, mode == mode_slip_minus)
+  end function slip_in
 
-pure subroutine jump_of_body(self, event, t, y, after, by_state, by_time)
-  class(own_body_t), intent(in) :: self
-  type(event_t), intent(in) :: event
-  real(wp), intent(in) :: t, y(:)
-  real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
-  integer :: k
-  by_time = 0
-  by_state = 0
-  do k = 1, self%n
-    by_state(k, k) = 1
-  end do
-  after = y
-  select case (event%kind)
-  case (event_impact_upper, event_impact_lower)
-    call rebound(self, t, y, after, by_state, by_time)
-    ! Without rebound nothing is left of the position but the instant.
-    if (.not. abs(after(v_of)) > 0) by_state(:, x_of) = 0
-    if (.not. abs(after(v_of)) > 0) after(x_of) = merge(self%upper, self%lower, event%kind == event_impact_upper)
-  case default
-    after(v_of) = 0
-    by_state(v_of, v_of) = 0
-  end select
-  if (rests_on_barrier(event%after)) then
-    by_state(x_of, :) = 0
-    by_state(:, x_of) = 0
-    after(x_of) = merge(self%upper, self%lower, event%after == mode_upper_barrier)
-  end if
-end subroutine jump_of_body
+  pure subroutine fly_body(self, mode, t0, y0, t1, y1, flight)
+    class(own_body_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t0, y0(:), t1
+    real(wp), intent(out) :: y1(:)
+    real(wp), intent(out), optional :: flight(:, :)
+    real(wp) :: z(self%n + w_at), slopes(self%n, self%n), parameters(size(self%machine%motor%system%sheet%parameters))
+    real(wp) :: t, until
+    integer :: k, turn, last
+    k = merge(1, 2, slips(mode))
+    y1 = self%at_rest(mode, y0)
+    if (present(flight)) then
+      flight = 0
+      do turn = 1, self%n
+        flight(turn, turn) = 1
+      end do
+    end if
+    parameters = parameters_in(self, slip_in(mode))
+    t = t0
+    turn = floor(t/self%period)
+    last = floor(t1/self%period)
+    ! Back from a section.
+    if (t1 < t0 .and. .not. t0 > turn*self%period) turn = turn - 1
+    do
+      z(:w_at) = (t - turn*self%period)*[1.0_wp, two_pi/self%period]
+      z(x_at:) = y1
+      until = t1
+      if (last > turn) until = (turn + 1)*self%period
+      if (last < turn) until = max(turn*self%period, t1)
+      if (present(flight)) then
+        call fly_own(self%flows(k), parameters, self%sizes, until - t, z, slopes)
+        if (abs(until - t) > 0) flight = matmul(slopes, flight)
+      else
+        call fly_own(self%flows(k), parameters, self%sizes, until - t, z)
+      end if
+      y1 = z(x_at:)
+      t = until
+      if (.not. abs(t1 - t) > 0) exit
+      turn = turn + merge(1, -1, t1 > t0)
+    end do
+    if (.not. present(flight)) return
+    if (k == 2) flight(:, v_of) = 0
+    if (k == 2) flight(v_of, :) = 0
+    if (rests_on_barrier(mode)) flight(:, x_of) = 0
+    if (rests_on_barrier(mode)) flight(x_of, :) = 0
+  end subroutine fly_body
 
- !> The velocity after an impact, v+ = -e v, where e may depend on everything.
-pure subroutine rebound(self, t, y, after, by_state, by_time)
-  class(own_body_t), intent(in) :: self
-  real(wp), intent(in) :: t, y(:)
-  real(wp), intent(inout) :: after(:), by_state(:, :), by_time(:)
-  real(wp) :: value(self%flows(1)%tape%count), slopes(self%n + w_at), restitution
-  slopes = 0
-  restitution = self%machine%motor%system%contact%restitution
-  if (self%machine%motor%system%restitution > 0) then
-    value = values_in(self%flows(1), variables_at(self, t, y), parameters_in(self, merge(-1, 1, y(v_of) < 0)))
-    restitution = value(self%machine%motor%system%restitution)
-    slopes = value(self%restitution_slopes)
-  end if
-  after(v_of) = -restitution*y(v_of)
-  by_state(v_of, :) = -y(v_of)*slopes(x_at:)
-  by_state(v_of, v_of) = by_state(v_of, v_of) - restitution
-  by_time(v_of) = -y(v_of)*(slopes(1) + slopes(w_at)*two_pi/self%period)
-end subroutine rebound
+  pure function slope_of_body(self, mode, t, y) result(slope)
+    class(own_body_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: t, y(:)
+    real(wp) :: slope(size(y))
+    real(wp) :: z(self%n + w_at), rates(self%n + w_at)
+    z = variables_at(self, t, y)
+    ! Where it comes to rest, the branches are those of the side from which it comes.
+    if (slips(mode) .and. abs(z(v_at)) < no_speed*self%size_of(v_of)) z(v_at) = slip_in(mode)*no_speed*self%size_of(v_of)
+    rates = rates_in(self%flows(merge(1, 2, slips(mode))), z, parameters_in(self, slip_in(mode)))
+    slope = rates(x_at:)
+    if (slips(mode)) slope(x_of) = y(v_of)
+  end function slope_of_body
+
+  pure subroutine margin_of_own(self, side, t, y, margin, by_state, by_time)
+    class(own_body_t), intent(in) :: self
+    integer, intent(in) :: side
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(out) :: margin, by_state(:), by_time
+    real(wp) :: value(self%flows(2)%tape%count), slopes(self%n + w_at)
+    integer :: k
+    k = merge(1, 2, side > 0)
+    value = values_in(self%flows(2), variables_at(self, t, y), parameters_in(self, 1))
+    associate (guards => self%machine%motor%system%flights(body_held, 0)%guards)
+      margin = -side*value(guards(merge(guard_body_up, guard_body_down, side > 0))%node)
+    end associate
+    slopes = -side*value(self%release_slopes(:, k))
+    by_time = slopes(1) + slopes(w_at)*two_pi/self%period
+    by_state = slopes(x_at:)
+  end subroutine margin_of_own
+
+  !> The velocity after an impact is v+ = -e v, where e may depend on everything.
+  pure subroutine rebound(self, ends, t, y, after, by_state, by_time)
+    class(own_body_t), intent(in) :: self
+    logical, intent(in) :: ends
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(inout) :: after(:), by_state(:, :), by_time(:)
+    real(wp) :: value(self%flows(1)%tape%count), slopes(self%n + w_at), restitution
+    if (ends) then
+      after(v_of) = 0
+      by_state(v_of, v_of) = 0
+      return
+    end if
+    slopes = 0
+    restitution = self%machine%motor%system%contact%restitution
+    if (self%machine%motor%system%restitution > 0) then
+      value = values_in(self%flows(1), variables_at(self, t, y), parameters_in(self, merge(-1, 1, y(v_of) < 0)))
+      restitution = value(self%machine%motor%system%restitution)
+      slopes = value(self%restitution_slopes)
+    end if
+    after(v_of) = -restitution*y(v_of)
+    by_state(v_of, :) = -y(v_of)*slopes(x_at:)
+    by_state(v_of, v_of) = by_state(v_of, v_of) - restitution
+    by_time(v_of) = -y(v_of)*(slopes(1) + slopes(w_at)*two_pi/self%period)
+  end subroutine rebound
+
+  pure subroutine start_of_own(self, values, section, ok)
+    class(own_body_t), intent(in) :: self
+    real(wp), intent(in) :: values(:)
+    type(section_state_t), intent(out) :: section
+    logical, intent(out) :: ok
+    section = self%machine%start(values)
+    ok = self%machine%allows(values)
+  end subroutine start_of_own
+
+  pure type(section_state_t) function state_of_own(self, point) result(section)
+    class(own_body_t), intent(in) :: self
+    real(wp), intent(in) :: point(:)
+    section = self%machine%state_at(point)
+  end function state_of_own
+
+  pure function point_of_own(self, section) result(point)
+    class(own_body_t), intent(in) :: self
+    type(section_state_t), intent(in) :: section
+    real(wp) :: point(self%n)
+    point = [section%state%x, section%state%v, section%motor%own(:self%n - v_of)]
+  end function point_of_own
+
+  pure subroutine advance_own(self, section, tally, ok, log)
+    class(own_body_t), intent(in) :: self
+    type(section_state_t), intent(inout) :: section
+    type(tally_t), intent(inout) :: tally
+    logical, intent(out) :: ok
+    type(log_t), intent(inout), optional :: log
+    integer :: reason
+    call self%machine%advance_to_section(section, tally, reason, log)
+    ok = reason == 0
+  end subroutine advance_own
+
+  pure subroutine arrival_of_own(self, log, i, sections, start, last, event)
+    class(own_body_t), intent(in) :: self
+    type(log_t), intent(in) :: log
+    integer, intent(in) :: i, sections
+    real(wp), intent(in) :: start(:)
+    type(event_t), intent(in) :: last
+    type(event_t), intent(inout) :: event
+    real(wp) :: y(self%n)
+    y = last%departure(:self%n)
+    if (self%n > v_of) call self%fly(last%after, last%time, last%departure(:self%n), event%time, y)
+    event%arrival(:self%n) = [log%event_data(2:3, i), y(3:)]
+  end subroutine arrival_of_own
+
+  pure function starts_of_own(self, watched, spread) result(points)
+    class(own_body_t), intent(in) :: self
+    real(wp), intent(in) :: watched(:, :)
+    real(wp), intent(in), optional :: spread(:)
+    real(wp) :: points(self%n, size(watched, 2))
+    real(wp) :: share
+    integer :: i, k
+    points(x_of, :) = watched(1, :)
+    points(v_of, :) = watched(2, :)
+    share = 2
+    do i = 1, 60
+      share = (1 + share)**(1/real(self%n - 1, wp))
+    end do
+    do i = 1, size(watched, 2)
+      points(3:, i) = self%machine%starts
+      if (modulo(i, 2) == 1) cycle
+      do k = 3, self%n
+        points(k, i) = 2*self%size_of(k)*(2*modulo(0.5_wp + i*share**(2 - k), 1.0_wp) - 1)
+        if (present(spread)) points(k, i) = self%machine%starts(k - v_of) + spread(i)*(points(k, i) - self%machine%starts(k - v_of))
+      end do
+    end do
+  end function starts_of_own
 
 end module own_body
