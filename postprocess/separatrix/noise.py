@@ -42,7 +42,7 @@ def noisy(
     *,
     duration: float | None = None,
     motions: int = 100,
-    force: float = 0.0,
+    intensity: float = 0.0,
     impulses: tuple[float, float] | None = None,
     restitution: float = 0.0,
     body: str | None = None,
@@ -62,8 +62,8 @@ def noisy(
         As for `sx.trajectory`; `duration` in s.
     motions
         How many, each with random numbers of its own.
-    force
-        Intensity I of a white random force F [N^2 s]: <F(t) F(t')> = I delta(t - t'). It acts as a kick at
+    intensity
+        I of a white random force F [N^2 s]: <F(t) F(t')> = I delta(t - t'). It acts as a kick at
         the end of each `step`, normally distributed with the variance I step / m^2.
     impulses
         (rate [1/s], deviation [m/s]): changes of velocity at the instants of a Poisson process, normally
@@ -72,7 +72,7 @@ def noisy(
         Standard deviation of the coefficient of each impact around that of the case, cut off at 0 and 1; of
         one body without a motor.
     body
-        Of several bodies the one that `force` and `impulses` act on; the watched one if not given.
+        Of several bodies the one that the force and `impulses` act on; the watched one if not given.
     leaves
         (lower, upper) positions [m] of the watched body between which a motion stays, looked at after each
         step and impulse; or "impact": it has left at its first impact. Motions that have left go on.
@@ -111,7 +111,7 @@ def noisy(
     """
     case = as_case(case)
     machine = _machine(case, body, x0, v0, crank_angle)
-    noise = _noise(machine, force, impulses, restitution, leaves, step, count("seed", seed, 0))
+    noise = _noise(machine, intensity, impulses, restitution, leaves, step, count("seed", seed, 0))
     length = _duration(case, duration)
     motions, samples = count("motions", motions), count("samples", samples, 2)
     target = _target(output, overwrite)
@@ -143,7 +143,7 @@ def first_passage(
     leaves: Sequence[float] | str,
     duration: float | None = None,
     motions: int = 100,
-    force: float = 0.0,
+    intensity: float = 0.0,
     impulses: tuple[float, float] | None = None,
     restitution: float = 0.0,
     body: str | None = None,
@@ -160,7 +160,7 @@ def first_passage(
     ----------
     x0, v0
         Positions [m] and velocities [m/s] of the starts, or (first, last, count) of each.
-    leaves, duration, motions, force, impulses, restitution, body, step, seed, threads, output, overwrite
+    leaves, duration, motions, intensity, impulses, restitution, body, step, seed, threads, output, overwrite
         As for `sx.noisy`; `motions` from each start.
     resume
         Go on with a run into `output` that was stopped: what is done is kept in OUTPUT.part.
@@ -182,7 +182,7 @@ def first_passage(
     """
     case = as_case(case)
     machine = _machine(case, body)
-    noise = _noise(machine, force, impulses, restitution, leaves, step, count("seed", seed, 0))
+    noise = _noise(machine, intensity, impulses, restitution, leaves, step, count("seed", seed, 0))
     length, motions = _duration(case, duration), count("motions", motions)
     target = _target(output, overwrite)
     axes = [_axis(name, values) for name, values in (("x0", x0), ("v0", v0))]
@@ -325,8 +325,12 @@ def _machine(case: Case, body: str | None, *start: float | str | None) -> Machin
     other = [name for name in ("effect", "state", "structure") if name in resolved]
     if not isinstance(resolved["body"].get("driven_mass", {}), dict):
         other.append("two bodies of a pair")
-    friction = resolved.get("friction", {}).values()
-    other += [one["law"] for one in friction if isinstance(one, dict) and one.get("law") in _MEMORY]
+    friction = resolved.get("friction", {})
+    other += [
+        one["law"]
+        for one in (friction, *friction.values())
+        if isinstance(one, dict) and one.get("law") in _MEMORY
+    ]
     if other:
         raise SeparatrixError(
             f"noise: found {', '.join(other)}, allowed machines without a further state", USAGE
@@ -369,11 +373,11 @@ def _of_bodies(case: Case, body: str | None, start: tuple[float, ...], period: f
 
 
 def _noise(
-    machine: Machine, force: float, impulses: tuple[float, float] | None, restitution: float,
+    machine: Machine, intensity: float, impulses: tuple[float, float] | None, restitution: float,
     leaves: Sequence[float] | str | None, step: float | None, seed: int,
 ) -> Noise:  # fmt: skip
     resolved = machine.case.resolved
-    force, deviation = number("force", force, 0), number("restitution", restitution, 0)
+    intensity, deviation = number("intensity", intensity, 0), number("restitution", restitution, 0)
     if impulses is not None:
         rate, size = numbers("impulses", impulses, "(rate [1/s], deviation [m/s])")
         impulses = (number("impulses: rate", rate, 0, above=True), number("impulses: deviation", size, 0))
@@ -397,7 +401,7 @@ def _noise(
     if not lower < upper:
         raise SeparatrixError(f"leaves: found {lower} and {upper}, allowed lower < upper", USAGE)
     step = _step(machine) if step is None else number("step", step, 0, above=True)
-    kick = float(np.sqrt(force * step)) / machine.mass
+    kick = float(np.sqrt(intensity * step)) / machine.mass
     # an expression where it is not drawn
     coefficient = float(contact["restitution"]) if deviation else 0.0
     return Noise(

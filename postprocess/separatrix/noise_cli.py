@@ -55,7 +55,7 @@ def _answer(options: argparse.Namespace) -> str:
             "output",
         )
     }  # fmt: skip
-    given |= {"force": options.intensity, "overwrite": options.force}
+    given |= {"intensity": options.intensity, "overwrite": options.force}
     if grid:
         return _starts_text(
             first_passage(case, options.x0, options.v0, resume=options.resume, **given), options

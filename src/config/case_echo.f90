@@ -132,7 +132,7 @@ contains
     type(parameter_row_t), allocatable :: rows(:)
     integer :: i, own
     text = ''
-    if (law%name == 'point:row') return
+    if (law%name == 'point:row' .or. law%is_derived) return
     if (law%name /= 'point:watched') text = newline//'['//path_of(law)//']'//newline
     if (law%name == 'point:watched') then
       continue

@@ -11,6 +11,7 @@ module own_reader
   use law_row, only: any_value, unit_length
   use law_table, only: force_family, label_length, law_choice, law_choice_t, law_text_t, own_law, parameter_row_t, &
     parameter_value_t, parameters_of, part_family, path_of, state_family, text_of
+  use memory_reader, only: write_out_memory
   use part_names, only: names_of
   use text, only: number_length, read_number, starts_with, to_text
   use toml_bindings, only: toml_float, toml_integer, toml_string
@@ -37,6 +38,7 @@ contains
     character(len=:), allocatable :: law
     type(law_choice_t) :: choice
     integer :: k, i
+    call write_out_memory(source, choices)
     do k = 1, 2
       call know(source, trim(kinds(k))//'.')
       names = names_of(source, trim(kinds(k)))

@@ -10,6 +10,7 @@ module friction_law
   use elementary, only: exponential, logarithm
   use kinds, only: wp
   use law_table, only: law_choice_t, value_of
+  use memory_rows, only: memory_names
   implicit none
   private
 
@@ -49,6 +50,8 @@ contains
     real(wp), intent(in) :: normal_force
     type(friction_t) :: law
     real(wp) :: static
+    ! That is a force by an expression.
+    if (any(memory_names == choice%name)) return
     select case (choice%name)
     case ('none')
     case ('coulomb', 'coulomb_viscous')

@@ -10,6 +10,7 @@ module law_table
   use effect_rows, only: effect_laws, effect_parameters
   use expression_rows, only: expression_laws, expression_parameters
   use kinds, only: wp
+  use memory_rows, only: memory_laws, memory_parameters
   use law_row, only: any_value, family_length, law_length, law_row_t, not_negative, parameter_row_t, positive
   use motor_rows, only: motor_laws, motor_parameters
   use pair_rows, only: pair_laws, pair_parameters
@@ -63,6 +64,8 @@ module law_table
     !> Expressions of a law by expressions, and the parameters that they name, after those of the table; else not allocated.
     type(law_text_t), allocatable :: texts(:)
     type(parameter_row_t), allocatable :: own(:)
+    !> It is part of another law, in whose table the case has it.
+    logical :: is_derived = .false.
   end type law_choice_t
 
   type(law_row_t), parameter :: other_laws(*) = [ &
@@ -108,13 +111,14 @@ module law_table
 
   type(law_row_t), parameter, public :: laws( &
     size(other_laws) + size(drive_laws) + size(contact_laws) + size(pair_laws) + size(part_laws) + size(effect_laws) + &
-    size(motor_laws) + size(expression_laws)) = [other_laws, drive_laws, contact_laws, pair_laws, part_laws, effect_laws, &
-                                                 motor_laws, expression_laws]
+    size(motor_laws) + size(expression_laws) + size(memory_laws)) = &
+    [other_laws, drive_laws, contact_laws, pair_laws, part_laws, effect_laws, motor_laws, expression_laws, memory_laws]
   type(parameter_row_t), parameter, public :: parameters( &
     size(other_parameters) + size(drive_parameters) + size(contact_parameters) + size(pair_parameters) + &
-    size(part_parameters) + size(effect_parameters) + size(motor_parameters) + size(expression_parameters)) = &
+    size(part_parameters) + size(effect_parameters) + size(motor_parameters) + size(expression_parameters) + &
+    size(memory_parameters)) = &
     [other_parameters, drive_parameters, contact_parameters, pair_parameters, part_parameters, effect_parameters, &
-     motor_parameters, expression_parameters]
+     motor_parameters, expression_parameters, memory_parameters]
 
   character(len=1), parameter :: law_letters(*) = parameters%law(1:1), family_letters(*) = parameters%family(1:1)
 

@@ -9,6 +9,7 @@ module motor_choices
   use friction_law, only: friction_of, friction_t
   use kinds, only: real64, wp
   use law_table, only: effect_family, law_choice_t, list_of, motor_family, own_law, path_of, value_of
+  use memory_rows, only: memory_names
   use law_texts, only: is_own
   use status, only: exit_bad_case
   use text, only: to_text
@@ -146,6 +147,10 @@ contains
       if (choices(i)%family == effect_family) then
         call fail(error, exit_bad_case, 'effect.'//trim(choices(i)%name)//': found with a table [motor], allowed without: '// &
                   'effects are not part of its equations')
+        return
+      else if (any(memory_names == choices(i)%name)) then
+        call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "'//trim(choices(i)%name)// &
+                  '", allowed without a table [motor]')
         return
       else if (choices(i)%name == own_law) then
         call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "expression", allowed without a table [motor]')

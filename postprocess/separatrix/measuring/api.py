@@ -102,6 +102,10 @@ def measures(
     if starts < 100:
         raise SeparatrixError(f"starts: found {starts}, allowed 100 or more", USAGE)
     result = open_result(result) if isinstance(result, str | Path) else result
+    if not isinstance(result, xr.Dataset):
+        raise SeparatrixError(
+            f"measures: found {type(result).__name__}, allowed the result of basin, or its file", USAGE
+        )
     if result.separatrix.kind == "basin" and "sample" in result.get("attractor", xr.DataArray()).dims:
         if "basin_stability" not in chosen and names is not None:
             raise SeparatrixError(

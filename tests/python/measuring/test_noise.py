@@ -28,7 +28,7 @@ ERRORS = 4
 def test_a_white_force_gives_the_variances_of_its_closed_form():
     """I/(2 c m) and I/(2 c k), which kicks at 64 a period have to within their step."""
     case, intensity, motions = sx.Case.from_text(LINEAR), 0.4, 2000
-    ensemble = sx.noisy(case, 0.0, 0.0, force=intensity, motions=motions, samples=3)
+    ensemble = sx.noisy(case, 0.0, 0.0, intensity=intensity, motions=motions, samples=3)
     assert ensemble.x.sizes == {"motion": motions, "time": 3}
     error = ERRORS * np.sqrt(2 / (motions - 1))
     # four times m/c after the start what is left of it is exp(-15)
@@ -82,7 +82,7 @@ def test_restitution_is_drawn_for_each_impact():
 def test_a_motion_is_the_same_for_any_number_of_motions():
     """And any times at which it is looked at; another seed is another motion."""
     case = sx.Case.from_text(LINEAR + 'contact = { law = "newton", restitution = 0.7, upper = "20 mm" }\n')
-    noise = {"force": 0.1, "impulses": (1.0, 0.1), "restitution": 0.1, "duration": 3}
+    noise = {"intensity": 0.1, "impulses": (1.0, 0.1), "restitution": 0.1, "duration": 3}
     few = sx.noisy(case, 0.0, 0.0, motions=3, samples=3, **noise)
     many = sx.noisy(case, 0.0, 0.0, motions=40, samples=3, **noise)
     assert np.array_equal(few.x, many.x[:3])
@@ -105,7 +105,7 @@ def test_first_passage_over_starts():
         [0.0, 0.2, 2.0],
         (0.0, 0.1, 2),
         leaves=(-1, 1),
-        force=0.0,
+        intensity=0.0,
         impulses=(0.3, 20.0),
         motions=200,
         duration=4.0,
@@ -162,7 +162,7 @@ def test_two_masses_have_the_covariance_of_lyapunovs_equation():
     """Motions are the recursion of their kicks, to rounding; its covariance is that of the white force."""
     case, intensity, step = sx.Case.from_text(TWO_MASSES), 0.4, 0.01
     found = sx.noisy(
-        case, 0.02, 0.0, force=intensity, body="b", motions=3, samples=2, duration=1.0, step=step, seed=5
+        case, 0.02, 0.0, intensity=intensity, body="b", motions=3, samples=2, duration=1.0, step=step, seed=5
     )
     system, impulse = linear_system()
     flow = linalg.expm(step * system)
@@ -188,7 +188,7 @@ def test_a_motor_without_noise_moves_as_in_the_case(source_dir):
     motion = sx.trajectory(case, duration=2)
     for name in ("x", "v", "crank_speed"):
         assert still[name].values[0, -1] == pytest.approx(float(motion[name][-1]), abs=1e-8), name
-    noisy = sx.noisy(case, motions=3, duration=2, samples=2, force=0.5, leaves="impact")
+    noisy = sx.noisy(case, motions=3, duration=2, samples=2, intensity=0.5, leaves="impact")
     assert len(set(noisy.crank_speed.values[:, -1])) == 3
     longer = sx.trajectory(case, 0.0, 5.0, duration=1)
     first = longer.event_time.values[
@@ -204,7 +204,7 @@ def test_a_body_at_rest_on_a_stop_is_kicked_off_it():
         "body.a = { mass = 1, load = -9.81 }\n"
         'contact.floor = { between = ["a"], law = "newton", restitution = 0.5, lower = 0 }\n'
     )
-    found = sx.noisy(case, 0.0, 0.0, force=0.5, motions=4, duration=1, samples=50)
+    found = sx.noisy(case, 0.0, 0.0, intensity=0.5, motions=4, duration=1, samples=50)
     assert float(found.x.min()) > -1e-12 and float(found.x.max()) > 1e-4
 
 
@@ -212,7 +212,7 @@ def test_threads_resume_and_file_keep_the_bits(tmp_path, monkeypatch):
     """Pieces are the same on any thread, and in a run that was stopped between them."""
     monkeypatch.setattr(noise, "PIECE", 16)
     case = sx.Case.from_text(LINEAR)
-    given = {"leaves": (-0.1, 0.1), "force": 0.5, "motions": 12, "duration": 1.0}
+    given = {"leaves": (-0.1, 0.1), "intensity": 0.5, "motions": 12, "duration": 1.0}
     one = sx.first_passage(case, (-0.05, 0.05, 2), [0.0, 0.1], threads=1, **given)
     path = tmp_path / "starts.h5"
     flown = []
@@ -228,7 +228,7 @@ def test_threads_resume_and_file_keep_the_bits(tmp_path, monkeypatch):
         sx.first_passage(case, (-0.05, 0.05, 2), [0.0, 0.1], threads=1, output=path, **given)
     with pytest.raises(sx.SeparatrixError, match="other noise"):
         sx.first_passage(
-            case, (-0.05, 0.05, 2), [0.0, 0.1], output=path, resume=True, **(given | {"force": 0.4})
+            case, (-0.05, 0.05, 2), [0.0, 0.1], output=path, resume=True, **(given | {"intensity": 0.4})
         )
     two = sx.first_passage(case, (-0.05, 0.05, 2), [0.0, 0.1], threads=2, output=path, resume=True, **given)
     # the third again
@@ -253,7 +253,14 @@ def test_the_command_writes_what_the_function_returns(tmp_path, capsys):
     assert "4 starts, 10 motions of 1 s from each" in capsys.readouterr().out
     case = sx.Case.from_text(LINEAR.replace("mass = 2.0", "mass = 3"))
     wanted = sx.first_passage(
-        case, (-0.05, 0.05, 2), (0.0, 0.1, 2), leaves=(-0.1, 0.1), force=0.5, motions=10, duration=1, seed=4
+        case,
+        (-0.05, 0.05, 2),
+        (0.0, 0.1, 2),
+        leaves=(-0.1, 0.1),
+        intensity=0.5,
+        motions=10,
+        duration=1,
+        seed=4,
     )
     with sx.open_result(path) as written:
         xr.testing.assert_equal(written.load(), wanted)
@@ -276,11 +283,11 @@ def test_the_command_writes_what_the_function_returns(tmp_path, capsys):
 @pytest.mark.parametrize(
     "text, more, message",
     [
-        (LINEAR, {"force": -1.0}, "force: found -1.0, allowed a number of 0 or more"),
-        (LINEAR, {"force": np.nan}, "force: found nan"),
-        (LINEAR, {"force": "1 N"}, "force: found '1 N', allowed a number"),
-        (LINEAR, {"force": None}, "force: found None"),
-        (LINEAR, {"force": {"a": 1.0}}, "force: found {'a': 1.0}"),
+        (LINEAR, {"intensity": -1.0}, "intensity: found -1.0, allowed a number of 0 or more"),
+        (LINEAR, {"intensity": np.nan}, "intensity: found nan"),
+        (LINEAR, {"intensity": "1 N"}, "intensity: found '1 N', allowed a number"),
+        (LINEAR, {"intensity": None}, "intensity: found None"),
+        (LINEAR, {"intensity": {"a": 1.0}}, "intensity: found {'a': 1.0}"),
         (LINEAR, {"impulses": (1.0, np.inf)}, "impulses: deviation: found inf"),
         (LINEAR, {"impulses": (0.0, 1.0)}, "impulses: rate: found 0.0, allowed a number above 0"),
         (LINEAR, {"impulses": 1.0}, "impulses: found 1.0, allowed .rate"),
@@ -305,7 +312,7 @@ def test_the_command_writes_what_the_function_returns(tmp_path, capsys):
         (LINEAR, {"leaves": "rest"}, 'allowed "impact"'),
         (LINEAR, {"leaves": "impact"}, "without a contact"),
         (LINEAR, {"motions": 0}, "motions: found 0, allowed a whole number from 1 on"),
-        (f"{LINEAR}{EXPRESSION}", {"force": 0.1}, "trajectory, basin and sweep"),
+        (f"{LINEAR}{EXPRESSION}", {"intensity": 0.1}, "trajectory, basin and sweep"),
     ],
 )
 def test_what_is_not_allowed_is_refused(text, more, message):

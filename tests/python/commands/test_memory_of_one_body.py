@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: The Separatrix developers
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Friction with memory in a case of one body: the laws that several bodies have."""
+
+import h5py
+import pytest
+from program import run, succeed
+
+LAWS = {
+    "dahl": "exponent = 1.5",
+    "bouc_wen": "exponent = 1.5\nshape = 0.6",
+    "lugre": "static_force = 1.5\nstribeck_velocity = 0.05\nbristle_damping = 3\ndamping = 0.1",
+}
+FRICTION = 'law = "{law}"\nvelocity = 0.1\nstiffness = 100\nforce = 1\n'
+ONE = """
+[body]
+mass = 1
+[restoring]
+law = "linear"
+stiffness = 2
+[drive]
+law = "force"
+amplitude = 1.5
+frequency = 1.1
+[start]
+v0 = 0.3
+[run]
+duration = 6
+average = "window"
+[friction]
+"""
+PARTS = """
+[body.m]
+mass = 1
+[spring.k]
+between = ["m"]
+stiffness = 2
+[drive.f]
+law = "force"
+body = "m"
+amplitude = 1.5
+frequency = 1.1
+[start]
+v0 = 0.3
+[run]
+duration = 6
+average = "window"
+[friction.f]
+between = ["m"]
+"""
+PENDULUM = """
+[body]
+mass = 1
+[restoring]
+law = "pendulum"
+moment = "9 N m"
+[start]
+x0 = "30 deg"
+[run]
+duration = 2
+[friction]
+law = "dahl"
+stiffness = "100 N m/rad"
+force = "0.1 N m"
+exponent = 2
+"""
+
+
+def last(separatrix, folder, text: str, *more: str) -> tuple[float, float]:
+    """Position and velocity at the end of a trajectory."""
+    (folder / "case.toml").write_text(text)
+    succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", *more, folder=folder)
+    with h5py.File(folder / "out.h5") as file:
+        return float(file["x"][-1]), float(file["v"][-1])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_one_body_moves_like_a_body_with_a_joint(separatrix, tmp_path, law):
+    """To rounding, with the belt of the friction."""
+    friction = FRICTION.format(law=law) + LAWS[law] + "\n"
+    one = last(separatrix, tmp_path, ONE + friction)
+    assert one == pytest.approx(last(separatrix, tmp_path, PARTS + friction), abs=1e-10)
+    assert one != pytest.approx(
+        last(separatrix, tmp_path, ONE + friction, "--set", "friction.force=0.9"), abs=1e-3
+    )
+
+
+def test_a_pendulum_has_moments(separatrix, tmp_path):
+    """Units of the keys, and of the deflection."""
+    last(separatrix, tmp_path, PENDULUM)
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert file["state_deflection"].attrs["units"] in ("rad", b"rad")
+        assert 9e-4 < float(abs(file["state_deflection"][()]).max()) <= 1e-3
+
+
+def test_maps_over_the_friction_and_the_deflection(separatrix, tmp_path):
+    """Axes of both. The force that holds a block depends on where its bristles begin."""
+    axes = "".join(
+        f'\n[[axis]]\nname = "{name}"\nvalues = {values}\n'
+        for name, values in (
+            ("friction.force", [1, 2]),
+            ("state.deflection.start", [0, 0.005]),
+            ("x0", [0, 0.2]),
+        )
+    )
+    (tmp_path / "map.toml").write_text(ONE + FRICTION.format(law="dahl") + axes)
+    succeed(separatrix, "basin", "map.toml", "--set", "attractors.sample=4", "-o", "map.h5", folder=tmp_path)
+    with h5py.File(tmp_path / "map.h5") as file:
+        resolved = file["provenance"].attrs["resolved_case"]
+        assert file["attractor"].size == 8
+    resolved = resolved.decode() if isinstance(resolved, bytes) else str(resolved)
+    assert 'law = "dahl"' in resolved
+    assert "deflection]" not in resolved
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        ('[state.deflection]\nrate = "v"\n', "key 'state.deflection': found the name"),
+        (
+            '[force.friction]\nforce = "v"\n',
+            "key 'force.friction': found the name that friction with memory has",
+        ),
+        ("[effect.coulomb]\nforce = 1\n", "key 'effect.coulomb': not allowed with laws by expressions"),
+    ],
+)
+def test_what_does_not_go_with_it(separatrix, tmp_path, more, problem):
+    """Names that are taken, and effects."""
+    (tmp_path / "case.toml").write_text(ONE + FRICTION.format(law="dahl") + more)
+    found = run(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
+    assert found.code == 65
+    assert problem in found.err
