@@ -192,5 +192,10 @@ def test_the_order_far_from_the_base_is_that_of_a_few_steps_from_it(monkeypatch)
     data = SimpleNamespace(last=0, problem=lambda *_: None)
     assert refit.rough_total(data, base, candidate, screened) == 3 * 50.0 + 400.0
     assert begun == [([8.0, 0.0], FIT.fit_fewest)]
+    # without a linear estimate it begins at its usual size
+    begun.clear()
+    screened.origin["viscous"], screened.live["viscous"] = np.array([7.0]), np.zeros(1) > 0
+    assert refit.rough_total(data, base, candidate, screened) == 3 * 50.0 + 400.0
+    assert begun == [([8.0, 7.0], FIT.fit_fewest)]
     curved = SimpleNamespace(step={}, origin={}, live={})
     assert refit.rough_total(data, base, candidate, curved) == np.inf

@@ -111,18 +111,20 @@ def leaves_noise(rival: Fitted, base: Fitted) -> bool:
 
 
 def rough_total(data: Data, base: Fitted, candidate: Candidate, screened: Screened) -> float:
-    """Sum of squares after a few steps from the base; infinite where an effect has no linear estimate.
+    """Sum of squares after a few steps from the base, without the effect or, if it has no linear estimate,
+    with its usual size.
 
-    That estimate itself may be far out. Segments that the base follows and the candidate does not count as
-    the base leaves them.
+    The linear estimate itself may be far out. Segments that the base follows and the candidate does not
+    count as the base leaves them.
     """
-    kind, start = next(iter(_starts(candidate, screened)), ("", None))
-    if kind != "linear":
+    starts = _starts(candidate, screened)
+    if not starts:
         return np.inf
+    kind, start = starts[0]
     values = _base_values(base, candidate)
     values[list(candidate.added)] = start
     problem = data.problem(candidate.model, data.last, candidate.free)
-    begun = _absent(values, candidate)
+    begun = _absent(values, candidate) if kind == "linear" else values
     fit = minimise(problem, begun, base.fit.starts, most=FIT.fit_fewest, rough=True)
     lost = base.fit.good & ~fit.good
     return fit.total + float(base.fit.chi2[lost].sum())
