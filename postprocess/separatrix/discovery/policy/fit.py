@@ -161,6 +161,8 @@ class Fit:
     alike_near: float = row(0.02, "1", "campaign", "the same of two fits of the base that are nearer")
     near_base: float = row(10.0, "1", "campaign",
         "reduced chi^2 of the base up to which a start from it is trusted")
+    hardly_closed: float = row(0.1, "1", "campaign",
+        "share of the gap of a base farther off than that below which a start closes nothing")
     nearly_noise: float = row(4.0, "1", "test",
         "standard deviations of chi^2 within which a machine nearly leaves noise")
     nothing_left: float = row(1e-3, "1", "campaign", "share of a gap that is next to nothing of it")
