@@ -20,6 +20,7 @@ from separatrix.discovery.decision.stages import (
 from separatrix.discovery.decision.state import Choice, SearchState
 from separatrix.discovery.decision.where import benjamini_hochberg
 from separatrix.discovery.fitting import base as base_module
+from separatrix.discovery.fitting import fit as fit_module
 from separatrix.discovery.fitting import screen as screen_module
 from separatrix.discovery.fitting.base import measure_noise
 from separatrix.discovery.fitting.catalogue import names_of_body
@@ -38,6 +39,7 @@ from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.measured.smoother import impact_table, smooth
 from separatrix.discovery.options import Options
+from separatrix.discovery.policy import FIT
 
 SEGMENTS, SAMPLES, PARAMETERS = 7, 12, 4
 
@@ -84,6 +86,26 @@ def test_a_closed_parameter_stays(table):
     )
     assert step[1] == 0
     assert step[open_] == pytest.approx(other, abs=1e-12)
+
+
+def test_a_step_that_would_leave_a_bound_ends_there_and_the_others_go_on_from_it(table):
+    """Clipped alone, it leaves the others a step that belongs to another one, and a fit creeps to a bound."""
+    by_start, by_parameter, residual, weights = table
+    blocks, open_ = blocks_of(by_start, by_parameter, residual, weights), np.ones(PARAMETERS, bool)
+    _, free, _ = gauss_newton_step(blocks, open_)
+    room = -np.full(PARAMETERS, np.inf), np.full(PARAMETERS, np.inf)
+    side = 0 if free[1] < 0 else 1
+    room[side][1] = 0.1 * free[1]
+    starts, step, promised = gauss_newton_step(blocks, open_, room=room)
+    assert step[1] == pytest.approx(0.1 * free[1])
+    kept = np.array([True, False, True, True])
+    left = residual - by_parameter[:, :, 1] * step[1]
+    _, others, _ = gauss_newton_step(
+        blocks_of(by_start, by_parameter[:, :, kept], left, weights), open_[kept]
+    )
+    assert step[kept] == pytest.approx(others, abs=1e-12)
+    ends = residual - np.einsum("klq,kq->kl", by_start, starts) - by_parameter @ step
+    assert promised == pytest.approx(np.sum(weights * (residual**2 - ends**2)), rel=1e-9)
 
 
 def test_an_inverse_does_not_depend_on_the_units_and_leaves_out_what_is_not_known():
@@ -241,6 +263,39 @@ def test_a_fit_ends_at_a_kink_only_after_steps_of_every_length():
     fit = minimise(lost, np.array([0.7]), np.zeros((1, 2)))
     assert fit.exhausted
     assert not fit.converged
+
+
+class Valley:
+    """Two values: their difference from a curve counts a hundred times as much as the position along it."""
+
+    free = (Free("effect.stribeck.excess", 0.0), Free("effect.stribeck.velocity", 0.0))
+
+    def evaluate(self, values, starts, derivatives=True):
+        a, b = values
+        across, along = np.linspace(1, 3, 60) * 300, np.linspace(-1, 1, 60)
+        across[:2] = along[:2] = 0
+        residual = ((b - np.sin(4 * a) - a**2) * across + 20 * (a - 3) * along)[None]
+        slope = -np.stack([(-4 * np.cos(4 * a) - 2 * a) * across + 20 * along, across], axis=1)[None]
+        no, by_start = np.zeros(1, bool), np.zeros((1, 60, 2))
+        by_start[0, [0, 1], [0, 1]] = 1
+        return Evaluation(
+            residual, np.ones_like(residual), no, ~no, residual, residual, [], 0, by_start, slope
+        )
+
+    def left_over(self) -> tuple[np.ndarray, np.ndarray]:
+        """No condensed blocks."""
+        return np.zeros(1), np.zeros(1)
+
+
+def test_a_step_follows_a_bent_valley(monkeypatch):
+    """Of laws of friction that nearly imitate each other the straight steps only creep."""
+    begin = np.array([0.0, 0.0])
+    found = minimise(Valley(), begin, np.zeros((1, 2)), most=200, patient=True)
+    assert found.converged
+    assert found.values == pytest.approx([3, 9 + np.sin(12)], abs=0.01)
+    monkeypatch.setattr(fit_module, "FIT", replace(FIT, fit_curved_most=0.0))
+    straight = minimise(Valley(), begin, np.zeros((1, 2)), most=found.iterations, patient=True)
+    assert not straight.converged
 
 
 def test_derivatives_are_kept_while_steps_gain_what_they_promise():

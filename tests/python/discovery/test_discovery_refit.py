@@ -192,5 +192,36 @@ def test_the_order_far_from_the_base_is_that_of_a_few_steps_from_it(monkeypatch)
     data = SimpleNamespace(last=0, problem=lambda *_: None)
     assert refit.rough_total(data, base, candidate, screened) == 3 * 50.0 + 400.0
     assert begun == [([8.0, 0.0], FIT.fit_fewest)]
+    # without a linear estimate it begins at its usual size
+    begun.clear()
+    screened.origin["viscous"], screened.live["viscous"] = np.array([7.0]), np.zeros(1) > 0
+    assert refit.rough_total(data, base, candidate, screened) == 3 * 50.0 + 400.0
+    assert begun == [([8.0, 7.0], FIT.fit_fewest)]
     curved = SimpleNamespace(step={}, origin={}, live={})
     assert refit.rough_total(data, base, candidate, curved) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("of_base", "left", "spared"), [(2000.0, 1900.0, True), (2000.0, 1500.0, False), (250.0, 245.0, False)]
+)
+def test_a_start_that_closes_nothing_in_short_segments_is_not_followed(monkeypatch, of_base, left, spared):
+    """Only where the base is far from the records: near it a start from afar may find another minimum."""
+    asked = []
+
+    def minimise(problem, values, starts, **how):
+        asked.append(problem)
+        return fit(list(values), left if problem == "candidate" else of_base)
+
+    monkeypatch.setattr(refit, "minimise", minimise)
+    base = Fitted((), "base", SimpleNamespace(free=FREE[:1]), fit([8.0], of_base), ())
+    candidate = SimpleNamespace(names=("stribeck",), model="candidate", free=FREE, added=(1,))
+    data = SimpleNamespace(
+        last=2,
+        problem=lambda model, *_: model,
+        carried_starts=lambda *_: None,
+        smoothed_starts=lambda *_: None,
+    )
+    for _ in range(2):
+        assert refit._closes_nothing(data, base, candidate, "far", np.array([8.0, 1.0])) == spared
+    # the base in short segments is fitted once
+    assert asked == ([] if base.fit.reduced_chi2 < FIT.near_base else ["base", "candidate", "candidate"])

@@ -3,10 +3,12 @@
 """Ten machines that are not the published one: their cases, what they hide, and a record in closed form."""
 
 import json
+import time
 from types import ModuleType
 
 import numpy as np
 import pytest
+from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.observations import observation_of
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.library import Model
@@ -33,6 +35,20 @@ def test_every_case_is_a_machine_and_what_it_hides_has_a_name(rigs: ModuleType) 
         # another number draws another machine, the same one the same
         again = draw(np.random.default_rng([SEED, 15, 0]))
         assert again.machine(rig.drives[0]).mass == rig.machine(rig.drives[0]).mass
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("machine", ["belt", "play", "chain", "duffing", "decay", "force"])
+def test_what_a_machine_hides_is_named_within_a_minute_of_processor_time(
+    rigs: ModuleType, tmp_path, machine: str
+) -> None:
+    hidden = rigs.write_rig(tmp_path, SEED, 0, machine).hidden
+    training, held_out = [tmp_path / name for name in rigs.RECORDS[:2]], [tmp_path / rigs.RECORDS[2]]
+    begun = time.process_time()
+    verdict = discover(tmp_path / rigs.BASE, training, held_out, Options(seed=1))
+    assert (verdict["outcome"], verdict["effects"]) == ("named", list(hidden))
+    assert time.process_time() - begun < 60
 
 
 def test_a_decay_is_that_of_dry_and_viscous_friction(rigs: ModuleType, tmp_path) -> None:

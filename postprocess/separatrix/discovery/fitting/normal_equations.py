@@ -113,15 +113,47 @@ def inverse_scaled(matrix: np.ndarray, known: np.ndarray, smallest: float = 1e-1
 
 
 def gauss_newton_step(
-    blocks: Blocks, open_: np.ndarray, damping: float = 0.0
+    blocks: Blocks,
+    open_: np.ndarray,
+    damping: float = 0.0,
+    room: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Steps of the starts and the parameters, and the decrease of chi^2 that the linear model promises."""
+    """Steps of the starts and the parameters, and the decrease of chi^2 that the linear model promises.
+
+    `room`: lowest and highest steps of the parameters; one that would go farther ends there, and the others
+    step as belongs to that.
+    """
     reduced, inverse, coupling = eliminate(blocks, damping)
     matrix, gradient = reduced.total()
-    step = solve_scaled(matrix, gradient, open_, damping)
+    if room is None:
+        step = solve_scaled(matrix, gradient, open_, damping)
+    else:
+        step = _within(matrix, gradient, open_, damping, room)
     back = blocks.gradient[:, : blocks.starts] - (coupling @ step[None, :, None])[:, :, 0]
     starts = (inverse @ back[:, :, None])[:, :, 0]
     whole = np.concatenate([starts, np.broadcast_to(step, (starts.shape[0], step.size))], axis=1)
     bent = (blocks.matrix @ whole[:, :, None])[:, :, 0]
     promised = float(np.sum(whole * (2 * blocks.gradient - bent)))
     return starts, step, promised
+
+
+def _within(
+    matrix: np.ndarray,
+    gradient: np.ndarray,
+    open_: np.ndarray,
+    damping: float,
+    room: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """The step to the ends of the room: on a way each part of which lowers the linear model."""
+    step, free = np.zeros(gradient.size), open_.copy()
+    while True:
+        onward = solve_scaled(matrix, gradient - matrix @ step, free, damping)
+        ends = np.where(onward < 0, *room)
+        left = np.full(step.size, np.inf)
+        np.divide(ends - step, onward, out=left, where=onward != 0)
+        share = max(0.0, left.min(initial=np.inf))
+        if share >= 1:
+            return step + onward
+        out = left <= share
+        step = np.where(out, ends, step + share * onward)
+        free &= ~out

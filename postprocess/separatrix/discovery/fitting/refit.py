@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A candidate fitted with everything else free, from several starts; and two fits compared fairly."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class Fitted:
     tries: int = 1
     # the same function on more knots, where one was tried, converged or not
     finer: "Fitted | None" = None
+    # squares by segment of the earlier stages, where they were asked for
+    short: dict[int, np.ndarray] = field(default_factory=dict)
 
     @property
     def unseen(self) -> np.ndarray:
@@ -74,9 +76,11 @@ def refit(
             rough = Fitted(candidate.names, candidate.model, problem, fit, candidate.added)
             if beaten(rough, rival):
                 return rough
+        elif best is not None and kind != "linear" and _closes_nothing(data, base, candidate, kind, tried):
+            continue
         else:
             problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
-        if kind == "linear" and not fit.far_off(hopeless(base)):
+        if kind == "linear" and not fit.far_off(hopeless(base)) and not _as_far(fit, base):
             # of other kinds it was done with the last stage
             fit = polished(data, problem, fit, data.last, 8, rival=base.fit)
             if not settled and not fit.converged and fit.excess < (1 - FIT.most_closed) * base.fit.excess:
@@ -102,6 +106,46 @@ def refit(
     return _above_base(data, best, base, candidate)
 
 
+def _as_far(fit: Fit, base: Fitted) -> bool:
+    """Whether a fit leaves nearly all that a base far from the records leaves: in the same segments."""
+    far = base.fit.reduced_chi2 > FIT.near_base and fit.converged
+    return far and fit.excess > (1 - FIT.hardly_closed) * base.fit.excess
+
+
+def _closes_nothing(data: Data, base: Fitted, candidate: Candidate, kind: str, values: np.ndarray) -> bool:
+    """Whether a start leaves nearly all that a base far from the records leaves in short segments.
+
+    There every machine is nearly linear, so that the right one closes its part of the gap.
+    """
+    if base.fit.reduced_chi2 <= FIT.near_base or data.last == 0:
+        return False
+    stage = 0 if kind == "far" else 1
+    if stage not in base.short:
+        problem = data.problem(base.model, stage, base.problem.free)
+        starts = data.carried_starts(stage, data.last, base.fit)
+        base.short[stage] = _squares(
+            minimise(problem, base.fit.values, starts, robust=True, most=12, rough=True)
+        )
+    values = _nominal(values, candidate) if kind == "far" else values
+    problem = data.problem(candidate.model, stage, candidate.free)
+    fit = minimise(problem, values, data.smoothed_starts(stage), robust=True, most=12, rough=True)
+    own, known = _squares(fit), base.short[stage]
+    both = np.isfinite(own) & np.isfinite(known)
+    excess = known[both].sum() - fit.counts[both].sum()
+    return excess > 0 and (known - own)[both].sum() < FIT.hardly_closed * excess
+
+
+def _squares(fit: Fit) -> np.ndarray:
+    """Sums of squares of segments, NaN of those that are not followed."""
+    return np.where(fit.good, fit.chi2, np.nan)
+
+
+def _nominal(values: np.ndarray, candidate: Candidate) -> np.ndarray:
+    """The machine of the case with the effect as it is."""
+    nominal = np.array([one.value for one in candidate.free])
+    return np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
+
+
 def leaves_noise(rival: Fitted, base: Fitted) -> bool:
     """Whether a machine leaves noise, or nearly so and next to nothing of a gap that was far larger."""
     fit = rival.fit
@@ -111,18 +155,20 @@ def leaves_noise(rival: Fitted, base: Fitted) -> bool:
 
 
 def rough_total(data: Data, base: Fitted, candidate: Candidate, screened: Screened) -> float:
-    """Sum of squares after a few steps from the base; infinite where an effect has no linear estimate.
+    """Sum of squares after a few steps from the base, without the effect or, if it has no linear estimate,
+    with its usual size.
 
-    That estimate itself may be far out. Segments that the base follows and the candidate does not count as
-    the base leaves them.
+    The linear estimate itself may be far out. Segments that the base follows and the candidate does not
+    count as the base leaves them.
     """
-    kind, start = next(iter(_starts(candidate, screened)), ("", None))
-    if kind != "linear":
+    starts = _starts(candidate, screened)
+    if not starts:
         return np.inf
+    kind, start = starts[0]
     values = _base_values(base, candidate)
     values[list(candidate.added)] = start
     problem = data.problem(candidate.model, data.last, candidate.free)
-    begun = _absent(values, candidate)
+    begun = _absent(values, candidate) if kind == "linear" else values
     fit = minimise(problem, begun, base.fit.starts, most=FIT.fit_fewest, rough=True)
     lost = base.fit.good & ~fit.good
     return fit.total + float(base.fit.chi2[lost].sum())
@@ -265,8 +311,7 @@ def _try(
     stages = [1, data.last]
     if kind == "far":
         stages = list(range(data.last + 1))
-        nominal = np.array([one.value for one in candidate.free])
-        values = np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
+        values = _nominal(values, candidate)
     more = {"most": min(most, 12), "hopeless": hopeless(base), "rival": base.fit}
     return fit_stages(data, candidate.model, candidate.free, values, stages=stages, **more)
 

@@ -75,6 +75,11 @@ class Fit:
     fit_as_promised: float = row(0.25, "1", "campaign",
         "error of a promised gain up to which derivatives are kept")
     fit_falls: float = row(10.0, "1", "campaign", "fall of the decrement for that")
+    fit_bends: float = row(0.5, "1", "campaign",
+        "share of its promise up to which a step is tried along a curve too")
+    fit_curve_share: float = row(0.1, "1", "rounding",
+        "share of a step after which the second derivative along it is taken")
+    fit_curved_most: float = row(1.5, "1", "campaign", "acceleration of such a curve over its step")
     fit_fewest: int = row(3, "1", "effort", "iterations before a fit may be abandoned")
     fit_lost: float = row(100.0, "1", "campaign", "chi^2 by which an abandoned fit is behind")
     fit_over: float = row(5.0, "1", "campaign", "the same in decrements")
@@ -156,6 +161,8 @@ class Fit:
     alike_near: float = row(0.02, "1", "campaign", "the same of two fits of the base that are nearer")
     near_base: float = row(10.0, "1", "campaign",
         "reduced chi^2 of the base up to which a start from it is trusted")
+    hardly_closed: float = row(0.1, "1", "campaign",
+        "share of the gap of a base farther off than that below which a start closes nothing")
     nearly_noise: float = row(4.0, "1", "test",
         "standard deviations of chi^2 within which a machine nearly leaves noise")
     nothing_left: float = row(1e-3, "1", "campaign", "share of a gap that is next to nothing of it")
