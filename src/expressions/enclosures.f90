@@ -42,7 +42,7 @@ module enclosures
     real(wp), allocatable :: first(:), last(:), rest(:)
     !> Steps until a wider box is tried again, and how many it will be then.
     integer :: wait = 0, next_wait = 1
-    real(wp) :: widening = 4
+    real(wp) :: widening = 16
   end type bounds_t
 
   type, public :: enclosure_t

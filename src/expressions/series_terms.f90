@@ -14,15 +14,15 @@ module series_terms
 
   !> Kinds of recurrences: the integral of a rate; a copy; sums; products with something steady, with something linear in time, of
   !> two series; quotients; functions with the derivative a' b, a being linear in time or not; the other functions; of two
-  !> branches, where none is chosen, the larger bound.
+  !> branches, where none is chosen, the larger bound; functions with the derivative a' b of a variable a.
   integer, parameter :: of_rate = 1, copy = 2, minus = 3, add = 4, subtract = 5, scaled = 6, by_linear = 7, multiply = 8, &
     square = 9, over_steady = 10, divide = 11, turn = 12, by_rate = 13, turn_back = 14, by_rate_back = 15, root = 16, power = 17, &
-    log_of = 18, arc = 19, arc_back = 20, angle = 21, larger = 22
+    log_of = 18, arc = 19, arc_back = 20, angle = 21, larger = 22, by_variable = 23, by_variable_back = 24
 
   !> What gives the coefficients of a node: those of nodes a and b.
   type, public :: instruction_t
     integer :: kind = copy, node = 0, a = 0, b = 0
-    !> The partner of a function of two arguments; the node that is divided by, 0 for none.
+    !> The partner of a function of two arguments, or the rate of a variable; the node that is divided by, 0 for none.
     integer :: partner = 0, divisor = 0
     !> Number of the variable that the node is, 0 for none.
     integer :: variable = 0
@@ -83,9 +83,25 @@ contains
         is_linear(i) = chosen%kind == over_steady .and. is_linear(node%first)
       case default
         call choose_function(node, i, is_linear(node%first), chosen)
+        if (tape%nodes(node%first)%operation == op_variable) call choose_variable(rates(tape%nodes(node%first)%first), chosen)
       end select
     end associate
   end subroutine choose
+
+  !> Of a variable the rate is at hand: its series, not the derivative of that of the variable.
+  pure subroutine choose_variable(rate, chosen)
+    integer, intent(in) :: rate
+    type(instruction_t), intent(inout) :: chosen
+    select case (chosen%kind)
+    case (by_rate)
+      chosen%kind = by_variable
+    case (by_rate_back)
+      chosen%kind = by_variable_back
+    case default
+      return
+    end select
+    chosen%partner = rate
+  end subroutine choose_variable
 
   !> A sum or difference: of what is steady only the first coefficient is not zero.
   pure subroutine choose_sum(tape, node, chosen)
@@ -210,6 +226,10 @@ contains
             y = rate_products(c(0, a), c(0, b), k, k)/k
           case (by_rate_back)
             y = sign*rate_products(c(0, a), c(0, b), k, k)/k
+          case (by_variable)
+            y = unit*product_term(c(0, it%partner), c(0, b), k - 1)/k
+          case (by_variable_back)
+            y = sign*unit*product_term(c(0, it%partner), c(0, b), k - 1)/k
           case default
             y = function_term(it, k, sign, divisor, order, c)
           end select

@@ -17,7 +17,9 @@ module step_length
   !> Products cost less than quotients.
   integer, parameter :: most_order = 64
   real(wp), parameter :: inverse(most_order) = [(1.0_wp/i, i=1, most_order)]
-  real(wp), parameter :: log_epsilon = (exponent(epsilon(1.0_wp)) + 2*fraction(epsilon(1.0_wp)) - 2)*0.693147180559945_wp
+  !> Logarithms are rough: double precision serves them in quadruple precision, too, where its arithmetic is slow.
+  real(real64), parameter :: rough_inverse(most_order) = [(1.0_real64/i, i=1, most_order)]
+  real(real64), parameter :: log_epsilon = (exponent(epsilon(1.0_wp)) - 1)*0.693147180559945_real64
 
 contains
 
@@ -26,10 +28,11 @@ contains
     type(series_t), intent(in) :: series
     real(wp), intent(in) :: state(:)
     integer, intent(in) :: others(:)
-    real(wp) :: terms(0:series%order), reach
+    real(wp) :: terms(0:series%order)
+    real(real64) :: reach
     integer :: i, k
     ! Its powers must not overflow.
-    real(wp), parameter :: most = 30
+    real(real64), parameter :: most = 30
     reach = most
     do i = 1, size(state)
       associate (rate => series%c(:, series%rates(i)), n => series%order)
@@ -44,7 +47,7 @@ contains
     do i = 1, size(others)
       call shorten(series%c(:, others(i)), series%order, reach)
     end do
-    step = exponential(reach)*series%unit
+    step = exponential(real(reach, wp))*series%unit
   end function natural_step
 
   !> Shortens the logarithm of a length to that for one series. Symmetric motions lack some of the last orders: those before count
@@ -52,11 +55,11 @@ contains
   pure subroutine shorten(terms, order, reach)
     integer, intent(in) :: order
     real(wp), intent(in) :: terms(0:order)
-    real(wp), intent(inout) :: reach
-    real(wp) :: size_of(0:most_order/2), last, longest
+    real(real64), intent(inout) :: reach
+    real(real64) :: size_of(0:most_order/2), last, longest
     integer :: k, j
     logical :: is_known
-    real(wp), parameter :: none = -1e30_wp
+    real(real64), parameter :: none = -1e30_real64
     is_known = .false.
     do k = order - 4, order
       if (.not. abs(terms(k)) > 0) cycle
@@ -69,9 +72,9 @@ contains
         is_known = .true.
       end if
       last = rough_logarithm(abs(terms(k)))
-      longest = -huge(1.0_wp)
+      longest = -huge(longest)
       do j = 0, order/2
-        longest = max(longest, log_epsilon*inverse(order - j) + (size_of(j) - last)*inverse(k - j))
+        longest = max(longest, log_epsilon*rough_inverse(order - j) + (size_of(j) - last)*rough_inverse(k - j))
       end do
       reach = min(reach, longest)
     end do
@@ -92,20 +95,20 @@ contains
   end function is_plain
 
   !> Logarithm of x > 0 to 0.06, by the exponent and a line; in double precision from the bits of normal numbers, without a call.
-  pure elemental real(wp) function rough_logarithm(x)
+  pure elemental real(real64) function rough_logarithm(x)
     real(wp), intent(in) :: x
     integer(int64) :: bits
-    real(wp) :: mantissa
+    real(real64) :: mantissa
     integer :: power
     if (digits(x) == 53) then
       bits = transfer(real(x, real64), 0_int64)
       mantissa = transfer(ior(iand(bits, ishft(1_int64, 52) - 1), ishft(1022_int64, 52)), 0.0_real64)
       power = int(ishft(bits, -52)) - 1022
     else
-      mantissa = fraction(x)
+      mantissa = real(fraction(x), real64)
       power = exponent(x)
     end if
-    rough_logarithm = (power + 2*mantissa - 2)*0.693147180559945_wp
+    rough_logarithm = (power + 2*mantissa - 2)*0.693147180559945_real64
   end function rough_logarithm
 
 end module step_length

@@ -115,11 +115,20 @@ inline mask stop_or_pass_clock(const tape_machine &m, const tape_batch &batch, m
   put(end[tape_phase], goes, end[tape_phase] - two_pi);
 }
 
+// Values that events need: nodes come after those that they are made of.
+inline void evaluate_for_events(const tape_machine &m, const vec *z, vec slip, tape_values &t) {
+  int last = m.hold;
+  const int others[] = {m.level, m.bounce, m.throws};
+  for (int node : others)
+    last = node > last ? node : last;
+  evaluate(m, m.by_slip, last + 1, z, slip, 0, t);
+}
+
 // What an impact throws the speed of the phase by, and the velocity after it.
 inline vec bounce(const tape_machine &m, const tape_event &e, vec *end, tape_group &g) {
   vec before = end[tape_v], restitution = m.restitution;
   if (m.bounce >= 0 || m.throws >= 0)
-    evaluate(m, m.by_slip, end, g.s.slip, 0, g.t);
+    evaluate_for_events(m, end, g.s.slip, g.t);
   if (m.bounce >= 0)
     restitution = g.t.first[m.bounce];
   vec after = pick((restitution >= 0.0) & (restitution <= 1.0), before * -restitution, undefined);
@@ -136,7 +145,7 @@ inline mask forces_at_rest(const tape_machine &m, const vec *end, tape_group &g,
   mask moves = ~mask{};
   vec same = 0;
   for (int sign = m.branches_by_slip ? -1 : 1; sign <= 1; sign += 2) {
-    evaluate(m, m.by_slip, end, g.s.slip * double(sign), 0, g.t);
+    evaluate_for_events(m, end, g.s.slip * double(sign), g.t);
     force = g.t.first[m.hold];
     if (m.level >= 0)
       level = g.t.first[m.level];

@@ -118,9 +118,21 @@ LANE_LEAF vec sum_of_parts(int k, const tape_machine &m, int first, int count, c
   return y;
 }
 
+// Sine and cosine of the node that either was taken of last (-1: none): mostly both are needed.
+struct tape_circle {
+  int of = -1;
+  vec sine, cosine;
+};
+
+LANE_LEAF void turn_to(const tape_node &n, vec a, tape_circle &c) {
+  if (c.of != n.first)
+    sine_cosine(a, c.sine, c.cosine);
+  c.of = n.first;
+}
+
 // Value of a function at the state, and what its series is divided by.
-inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &inverse) {
-  vec y, other;
+inline vec function_value(const tape_node &n, vec a, const tape_values &t, tape_circle &c, vec &inverse) {
+  vec y;
   switch (n.operation) {
   case tape_power:
     inverse = 1.0 / a;
@@ -136,15 +148,15 @@ inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &
     return logarithm_or_none(a);
   case tape_sin:
   case tape_sin_even:
-    sine_cosine(a, y, other);
-    return y;
+    turn_to(n, a, c);
+    return c.sine;
   case tape_cos:
   case tape_cos_even:
-    sine_cosine(a, other, y);
-    return y;
+    turn_to(n, a, c);
+    return c.cosine;
   case tape_tan:
-    sine_cosine(a, y, other);
-    return y / other;
+    turn_to(n, a, c);
+    return c.sine / c.cosine;
   case tape_atan:
     inverse = 1.0 / t.first[n.second];
     return arc_tangent(a);
@@ -160,7 +172,8 @@ inline vec function_value(const tape_node &n, vec a, const tape_values &t, vec &
 }
 
 // Value of a node at the state. Where a switching function crosses zero, `crossed` states its side.
-inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec crossed, tape_values &t) {
+inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec crossed, tape_circle &c,
+                    tape_values &t) {
   const tape_node &n = m.node[i];
   if (n.operation == tape_sum)
     return sum_of_terms(m, n, t.first);
@@ -193,7 +206,7 @@ inline vec value_of(const tape_machine &m, int i, const vec *z, vec slip, vec cr
   case tape_select_slip:
     return pick(slip > 0.0, a, b);
   default:
-    return function_value(n, a, t, t.inverse[i]);
+    return function_value(n, a, t, c, t.inverse[i]);
   }
 }
 
@@ -204,12 +217,14 @@ inline void set_steady(const tape_node &n, int i, tape_values &t) {
     t.of[n.series][k] = 0;
 }
 
-// Values at the state of the nodes from one number on.
-inline void evaluate(const tape_machine &m, int from, const vec *z, vec slip, vec crossed, tape_values &t) {
+// Values at the state of the nodes from one number on, up to another.
+inline void evaluate(const tape_machine &m, int from, int until, const vec *z, vec slip, vec crossed,
+                     tape_values &t) {
+  tape_circle c;
   t.slip = slip;
-  for (int i = from; i < m.nodes; i++) {
+  for (int i = from; i < until; i++) {
     const tape_node &n = m.node[i];
-    vec y = value_of(m, i, z, slip, crossed, t);
+    vec y = value_of(m, i, z, slip, crossed, c, t);
     t.first[i] = y;
     if (n.series >= 0)
       t.of[n.series][0] = y;
@@ -353,7 +368,7 @@ template <bool bounds> LANE_LEAF void raise_all(const tape_machine &m, bool fres
 // nothing is known of numbers.
 [[gnu::noinline]] inline void expand(const tape_machine &m, bool fresh, const vec *z, vec slip, vec crossed,
                                      tape_values &t) {
-  evaluate(m, fresh ? 0 : m.by_slip, z, slip, crossed, t);
+  evaluate(m, fresh ? 0 : m.by_slip, m.nodes, z, slip, crossed, t);
   for (int s = 0; s < m.switches; s++)
     t.of[m.decider_series[s]][tape_order] = 0;
   raise_all<false>(m, fresh, t);

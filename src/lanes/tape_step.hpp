@@ -62,15 +62,12 @@ struct tape_group {
   vec error[most_tape_variables], decider_error[most_tape_switches];
 };
 
-// Number of the first of `count` sizes above `need`, or of the last, for every lane.
-inline void find_size(const double *sizes, int count, vec need, int *found) {
-  double needs[vec_size];
-  memcpy(needs, &need, sizeof need);
-  for (int i = 0; i < vec_size; i++) {
-    found[i] = 0;
-    while (found[i] < count - 1 && !(needs[i] < sizes[found[i]]))
-      found[i]++;
-  }
+// Number of the first of `count` rising sizes above `need`, or of the last, for every lane.
+inline vec find_size(const double *sizes, int count, vec need) {
+  vec found = 0;
+  for (int i = 0; i < count - 1; i++)
+    found += pick(need < sizes[i], 0, 1);
+  return found;
 }
 
 inline vec by_box(const double *table, int stride, const int *box) {
@@ -119,11 +116,13 @@ inline void look_up(const tape_machine &m, vec length, const vec *size, tape_pro
   vec need = 0, speed = m.clock ? vec(0) : size[tape_speed] * (inside / m.box[tape_speed]);
   for (int i = tape_x; i < m.variables; i++)
     need = larger(need, size[i] * (inside / m.box[i]));
-  int box[vec_size], level[vec_size];
-  find_size(m.speed, tape_speeds, speed, box);
-  find_size(m.level_size, tape_levels, need, level);
+  vec number = find_size(m.speed, tape_speeds, speed) * double(tape_levels) +
+               find_size(m.level_size, tape_levels, need);
+  double numbers[vec_size];
+  int box[vec_size];
+  memcpy(numbers, &number, sizeof number);
   for (int i = 0; i < vec_size; i++)
-    box[i] = box[i] * tape_levels + level[i];
+    box[i] = int(numbers[i]);
   vec longest = by_box(m.longest, 1, box);
   mask held = (need < m.level_size[tape_levels - 1]) & (longest > 0.0);
   if (!m.clock)

@@ -163,8 +163,10 @@ contains
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log
     real(wp) :: until, at_switch
-    integer :: status, fault, idle
-    call begin_mode(moving%system, state, crank, tally%needs_v_max, merge(1, 0, present(log)), flight, fault)
+    integer :: status, fault, idle, kept
+    kept = 0
+    if (present(log)) kept = merge(1, 0, log%balance%kept)
+    call begin_mode(moving%system, state, crank, tally%needs_v_max, kept, flight, fault)
     status = merge(flight_left_domain, flight_reached, fault > 0)
     if (fault < 0) status = flight_wrong_branch
     if (fault == 0) call add_jump(moving%system, flight, state, crank, log)
@@ -230,6 +232,7 @@ contains
     if (system%control%has_own) crank%own(1) = flight%state(y_at)
     if (system%control%supply > 0) crank%supply = flight%state(system%control%supply)
     if (.not. present(log)) return
+    if (.not. log%balance%kept) return
     log%balance%work = log%balance%work + flight%state(n + 1)
     log%balance%friction = log%balance%friction + flight%state(n + 2)
     log%balance%damping = log%balance%damping + flight%state(n + 3)

@@ -25,7 +25,7 @@ contains
     type(log_t), intent(inout), optional :: log
     real(wp) :: values(system%sheet%tape%count)
     if (.not. present(log)) return
-    if (.not. may_jump(system)) return
+    if (.not. (may_jump(system) .and. log%balance%kept)) return
     if (.not. log%has_stored) then
       values = node_values(system, state, crank)
       log%stored = values(system%stored)
