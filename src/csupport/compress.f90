@@ -9,16 +9,16 @@ module compress
   implicit none
   private
 
-  public :: compressed
+  public :: compress_bytes
 
 contains
 
   !> The bytes, deflated (zlib); before that, with `width` above 1, the first bytes of all values of that many bytes come
   !> first, then all second ones and so on. No bytes at all where memory is short.
-  function compressed(bytes, level, width) result(out)
+  subroutine compress_bytes(bytes, level, width, out)
     integer(int8), intent(in), contiguous, target :: bytes(:)
     integer, intent(in) :: level, width
-    integer(int8), allocatable :: out(:)
+    integer(int8), allocatable, intent(out) :: out(:)
     integer(int8), allocatable, target :: room(:), shuffled(:)
     integer(int64) :: length
     allocate (room(c_compress_bound(size(bytes, kind=int64))))
@@ -30,6 +30,6 @@ contains
       length = c_compress(c_loc(bytes), size(bytes, kind=int64), int(level, c_int), c_loc(room), size(room, kind=int64))
     end if
     out = room(:max(length, 0_int64))
-  end function compressed
+  end subroutine compress_bytes
 
 end module compress

@@ -8,7 +8,7 @@ module map_packing
   use boxes, only: copy_common
   use byte_file, only: byte_file_t
   use checksum, only: crc32, crc32_combine
-  use compress, only: compressed
+  use compress, only: compress_bytes
   use errors, only: error_t, fail
   use h5, only: deflate_level, h5_close, h5_close_dataset, h5_dataset_t, h5_file_t, h5_open, h5_open_dataset, h5_shuffles
   use h5_chunks, only: h5_read_chunk, h5_reserve_chunk
@@ -184,9 +184,11 @@ contains
       words(size(words, 1), v) = crc32(values(v)%bytes, 0_int64)
       do k = 1, int(chunk_count(self%chunk, extent))
         corner = chunk_corner(self%chunk, lower, extent, k)
-        allocate (chunk(product(self%chunk)*width), source=0_int8)
+        allocate (chunk(product(self%chunk)*width))
+        ! What lies beyond the map.
+        if (any(corner + self%chunk > lower + extent)) chunk = 0
         call copy_common(width, lower, extent, values(v)%bytes, corner, self%chunk, chunk)
-        parts(k, v)%bytes = compressed(chunk, deflate_level, merge(width, 1, h5_shuffles(self%types(v))))
+        call compress_bytes(chunk, deflate_level, merge(width, 1, h5_shuffles(self%types(v))), parts(k, v)%bytes)
         deallocate (chunk)
         if (size(parts(k, v)%bytes) == 0) then
           call fail(error, exit_io, 'there is no memory to compress '''//trim(self%names(v))//'''')
