@@ -12,13 +12,14 @@ import sys
 
 from evidence_rows import COLUMNS, Row, arguments, show, table_of, version_of
 from validation_public_closed import COMPUTED as IN_CLOSED_FORM
+from validation_public_forms import COMPUTED as OTHER_FORMS
 from validation_public_machines import COMPUTED as MACHINES
 from validation_public_printed import COMPUTED as PRINTED
 from validation_public_program import Program
 from validation_public_steps import COMPUTED as BY_STEPS
 from validation_sections import write_section
 
-COMPUTED = (*PRINTED, *IN_CLOSED_FORM, *BY_STEPS, *MACHINES)
+COMPUTED = (*PRINTED, *IN_CLOSED_FORM, *OTHER_FORMS, *BY_STEPS, *MACHINES)
 #: The heading of the section in the page.
 HEADING = "Public problems"
 

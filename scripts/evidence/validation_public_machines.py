@@ -302,6 +302,20 @@ def rocking(program: Program) -> list[Row]:
     return compared(program, "rocking_base", source, "block on a base that shakes", ("x", "v"), end, 1e-8)
 
 
+def flat_wheel(program: Program) -> list[Row]:
+    """A wheel whose flat meets the rail once per turn."""
+
+    def slope(t: float, y: np.ndarray) -> list[float]:
+        deep = y[1] - y[0] - 6e-4 * exp((cos(30 * t - pi) - 1) / 0.1**2)
+        force = 9e10 * max(deep, 0) ** 1.5
+        return [y[2], y[3], (force - 6e4) / 600, (-force - 7e7 * y[1] - 5e4 * y[3]) / 150]
+
+    end = solve_ivp(slope, (0, 0.3), [-1e-3, 0, 0, 0], **TIGHT).y[:2, -1]
+    source = "S. G. Newton, R. A. Clark (1979), equations, by scipy's DOP853"
+    return compared(program, "flat_wheel", source, "wheel with a flat", ("wheel_x", "rail_x"), end, 1e-9)
+
+
 COMPUTED = (
+    flat_wheel,
     relief_valve, slack_mooring, tapping, pantograph, percussion, judder, yaw, valve_train, rocking,
 )  # fmt: skip

@@ -63,8 +63,8 @@ contains
     character(len=:), allocatable :: text
     select case (law)
     case ('dahl')
-      ! The deflection does not exceed F/s0.
-      text = u//'*max(1 - sign('//u//')*'//share//', 0)^friction.exponent'
+      ! The deflection does not exceed F/s0, which it only approaches: the power keeps off its singularity there.
+      text = u//'*if('//u//' > 0, '//left('-')//', '//left('+')//')'
     case ('bouc_wen')
       text = u//'*(1 - (friction.shape*sign('//u//'*'//z//') + 1 - friction.shape)*abs('//share//')^friction.exponent)'
     case default
@@ -72,6 +72,14 @@ contains
         '*exp(-(abs('//u//')/friction.stribeck_velocity)^friction.stribeck_exponent))'
     end select
   end function rate_text
+
+  !> (1 -+ z/z_m)^n.
+  pure function left(sign) result(text)
+    character(len=1), intent(in) :: sign
+    character(len=:), allocatable :: text
+    text = '(1 '//sign//' '//share//')'
+    text = text//'*max('//text//', 1e-9)^(friction.exponent - 1)'
+  end function left
 
   pure function force_text(law) result(text)
     character(len=*), intent(in) :: law

@@ -114,16 +114,18 @@ contains
     branch_value = value(merge(node%third, node%second, side > 0))
   end subroutine take_branch
 
-  !> Sizes of what the nodes are sums of, for their rounding.
-  pure function sizes_of_nodes(tape, value) result(sizes)
+  !> Sizes of what the nodes are sums of, for their rounding; `of_variables` those of the variables.
+  pure function sizes_of_nodes(tape, value, of_variables) result(sizes)
     type(tape_t), intent(in) :: tape
-    real(wp), intent(in) :: value(:)
+    real(wp), intent(in) :: value(:), of_variables(:)
     real(wp) :: sizes(tape%count)
     integer :: i
     do i = 1, tape%count
       sizes(i) = abs(value(i))
       associate (a => tape%nodes(i)%first, b => tape%nodes(i)%second, c => tape%nodes(i)%third)
         select case (tape%nodes(i)%operation)
+        case (op_variable)
+          sizes(i) = max(sizes(i), of_variables(a))
         case (op_add, op_subtract)
           sizes(i) = sizes(a) + sizes(b)
         case (op_negative)

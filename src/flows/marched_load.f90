@@ -7,7 +7,7 @@ module marched_load
   use joint_forces, only: joint_force
   use kinds, only: wp
   use multibody, only: joint_t, load_t, multibody_t, wave_t
-  use multibody_state, only: load_branches, load_variables, multibody_state_t
+  use multibody_state, only: load_branches, load_variables, multibody_state_t, sizes_of_variables
   use tape_value, only: evaluate, sizes_of_nodes
   implicit none
   private
@@ -25,6 +25,8 @@ module marched_load
     integer, allocatable :: phase(:)
     real(wp), allocatable :: touch_speed(:)
     real(wp) :: frequency = 0
+    !> Sizes of its variables at the start.
+    real(wp), allocatable :: of_variables(:)
     !> Time of the section, where the time is counted from the start [s].
     real(wp) :: clock = 0
   end type marched_load_t
@@ -41,6 +43,7 @@ contains
     marched%load = machine%joints(j)%load
     marched%frequency = machine%frequency
     if (marched%load%by_clock) marched%clock = state%clock
+    marched%of_variables = sizes_of_variables(machine, marched%load, state)
     associate (sources => marched%load%sources)
       allocate (marched%position(size_of_rows, size(sources)), marched%speed(size_of_rows, size(sources)), source=0.0_wp)
       allocate (marched%contacts(size(sources)), marched%phase(size(sources)), marched%touch_speed(size(sources)))
@@ -90,7 +93,7 @@ contains
     real(wp) :: variables(size(marched%load%rates))
     call load_variables(machine, marched%load, state, turning, variables, a)
     if (.not. allocated(marched%branches)) allocate (marched%branches(size(marched%load%tape%switches)))
-    call load_branches(marched%load, variables, marched%branches)
+    call load_branches(marched%load, variables, marched%of_variables, marched%branches)
   end subroutine choose_branches
 
   !> Values of the nodes of a normal force at a `time` since the section [s].
@@ -144,7 +147,7 @@ contains
     real(wp), dimension(marched%load%tape%count) :: value, sizes
     integer :: fault(marched%load%tape%count)
     call values_at(marched, time, z, value, fault)
-    sizes = sizes_of_nodes(marched%load%tape, value)
+    sizes = sizes_of_nodes(marched%load%tape, value, marched%of_variables)
     associate (argument => marched%load%tape%switches(number)%argument)
       associate (node => marched%load%tape%nodes(argument))
         total = max(sizes(argument), maxval(abs(value([argument, max(node%first, 1), max(node%second, 1)]))))

@@ -15,7 +15,7 @@ module multibody_state
 
   public :: turning_at, joint_motion, joint_force, spring_force, spring_terms, strength_now, joint_energy, free_force, &
     running_control, rounding_of_speed, key_of, is_held, acts_as_spring, is_curved, is_marched, factor_now, load_branches, &
-    load_variables
+    load_variables, sizes_of_variables
 
   !> Phases of a joint. Friction, elastic or not: sticks (0), slides up or down (+1, -1). Contact: open (0), closed at its
   !> upper or lower stop (+1, -1). Soft contact: open (0), pressed (+1, -1), without force but not yet free (+2, -2). Section: not
@@ -129,7 +129,7 @@ contains
         integer :: branches(size(load%tape%switches)), fault
         real(wp) :: variables(size(load%rates))
         call load_variables(machine, load, state, turning, variables, a, jerk)
-        call load_branches(load, variables, branches)
+        call load_branches(load, variables, sizes_of_variables(machine, load, state), branches)
         call prepare_series(load%tape, 2, load%rates, [load%node], branches, series)
         call expand(load%tape, variables, load%parameters, series, fault)
         factor = series%c(:, load%node)*[1, 1, 2]
@@ -165,6 +165,25 @@ contains
     end do
   end subroutine load_variables
 
+  !> Sizes of what positions and velocities of the sources are sums of: bodies that are close to each other may be far from their
+  !> origins.
+  pure function sizes_of_variables(machine, load, state) result(sizes)
+    type(multibody_t), intent(in) :: machine
+    type(load_t), intent(in) :: load
+    type(multibody_state_t), intent(in) :: state
+    real(wp) :: sizes(size(load%rates))
+    integer :: i, n
+    n = machine%n
+    sizes = 0
+    do i = 1, size(load%sources)
+      associate (source => load%sources(i))
+        if (source%joint > 0) cycle
+        sizes(4*i - 1) = sum(abs(source%row*state%q(:n))) + abs(source%offset%mean)
+        sizes(4*i) = sum(abs(source%row*state%v(:n)))
+      end associate
+    end do
+  end function sizes_of_variables
+
   !> Makes the force of a contact [N] and its first two derivatives, the law taken as linear, of the `motion` of its coordinate.
   pure subroutine press_by(machine, source, state, motion)
     type(multibody_t), intent(in) :: machine
@@ -180,10 +199,11 @@ contains
     end associate
   end subroutine press_by
 
-  !> Branches of the switching functions of a normal force: where one is zero to rounding, its derivatives decide.
-  pure subroutine load_branches(load, variables, branches)
+  !> Branches of the switching functions of a normal force: where one is zero to rounding, its derivatives decide. `of_variables`
+  !> are the sizes of the variables.
+  pure subroutine load_branches(load, variables, of_variables, branches)
     type(load_t), intent(in) :: load
-    real(wp), intent(in) :: variables(:)
+    real(wp), intent(in) :: variables(:), of_variables(:)
     integer, intent(out) :: branches(:)
     type(series_t) :: series
     real(wp), dimension(load%tape%count) :: value, sizes
@@ -193,7 +213,7 @@ contains
     ! Copied: GNU Fortran 12 takes an associated component of an array for contiguous where that is a subscript.
     nodes = load%tape%switches%argument
     branches = merge(1, -1, value(nodes) >= 0)
-    sizes = sizes_of_nodes(load%tape, value)
+    sizes = sizes_of_nodes(load%tape, value, of_variables)
     do i = 1, size(branches)
       associate (node => load%tape%nodes(nodes(i)))
         size_of = max(sizes(nodes(i)), maxval(abs(value([nodes(i), max(node%first, 1), max(node%second, 1)]))))

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from program import succeed
+from scipy.integrate import solve_ivp
 
 ON_STOP = """
 [body]
@@ -85,3 +86,38 @@ def test_a_body_that_starts_on_a_stop_hits_it_if_it_moves_towards_it(
 )
 def test_the_time_of_a_rate_goes_on(separatrix, tmp_path, rate, x):
     assert motion(separatrix, tmp_path, IN_TIME.format(rate=rate))["x"] == pytest.approx(x, abs=1e-9)
+
+
+WHEEL = """
+[body.wheel]
+mass = 600
+load = -6e4
+[body.rail]
+mass = 150
+[spring.track]
+between = ["rail"]
+stiffness = 7e7
+damping = 5e4
+[spring.contact]
+law = "expression"
+between = ["rail", "wheel"]
+force = "9e10*max(-x, 0)^1.5"
+[start]
+x0 = -1e-3
+[run]
+duration = 5e-3
+window = 5e-3
+average = "window"
+"""
+
+
+def test_bodies_that_part_far_from_their_origins(separatrix, tmp_path):
+    """Their distance has fewer digits than its size: the corner of a contact ended in `mode_cycle`."""
+
+    def slope(_: float, y: np.ndarray) -> list[float]:
+        force = 9e10 * max(y[1] - y[0], 0) ** 1.5
+        return [y[2], y[3], (force - 6e4) / 600, (-force - 7e7 * y[1] - 5e4 * y[3]) / 150]
+
+    end = solve_ivp(slope, (0, 5e-3), [-1e-3, 0, 0, 0], method="DOP853", rtol=1e-11, atol=1e-14).y[:, -1]
+    found = motion(separatrix, tmp_path, WHEEL)
+    assert [found["x"], found["v"]] == pytest.approx([end[0], end[2]], rel=1e-7)

@@ -59,7 +59,8 @@ def public(rows):
 @pytest.mark.parametrize(
     ("name", "count"),
     [("siconos", 7), ("modelica_force", 5), ("modelica_stop", 2), ("modelica_clutch", 5), ("rao", 3)]
-    + [("sciml", 1), ("pendulum", 2), ("hertz", 4), ("rocking", 2), ("springs", 2), ("stacked", 2)],
+    + [("sciml", 1), ("pendulum", 2), ("hertz", 4), ("rocking", 2), ("springs", 2), ("stacked", 2)]
+    + [("vibrated_ball", 3), ("bungee", 2)],
 )
 def test_public_problems_agree_and_stand_in_the_page(
     public, separatrix, build_dir, tmp_path, source_dir, name, count
