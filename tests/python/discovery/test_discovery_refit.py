@@ -225,3 +225,28 @@ def test_a_start_that_closes_nothing_in_short_segments_is_not_followed(monkeypat
         assert refit._closes_nothing(data, base, candidate, "far", np.array([8.0, 1.0])) == spared
     # the base in short segments is fitted once
     assert asked == ([] if base.fit.reduced_chi2 < FIT.near_base else ["base", "candidate", "candidate"])
+
+
+def test_far_from_the_base_one_start_from_afar_settles_that_an_effect_closes_nothing(monkeypatch):
+    """Without a linear estimate, too, the first start is that of the base at full length."""
+    tried, checked = [], []
+
+    def closes_nothing(data, base, candidate, kind, values):
+        checked.append(kind)
+        return True
+
+    monkeypatch.setattr(refit, "_try", lambda *given: (tried.append(given[3]), fit([8.0, 0.1], 1990.0)))
+    monkeypatch.setattr(refit, "_closes_nothing", closes_nothing)
+    monkeypatch.setattr(refit, "polished", lambda *_, **__: pytest.fail("the base left the same segments"))
+    base = Fitted((), None, SimpleNamespace(free=FREE[:1]), fit([8.0], 2000.0), ())
+    starts = [np.array([0.5]), np.array([2.0])]
+    candidate = SimpleNamespace(
+        names=("backlash",), model=None, free=FREE, added=(1,), linear=np.zeros(1) > 0, starts=starts
+    )
+    screened = SimpleNamespace(
+        step={"backlash": np.ones(1)}, origin={"backlash": np.ones(1)}, live={"backlash": np.zeros(1) > 0},
+        gain={},
+    )  # fmt: skip
+    refit.refit(SimpleNamespace(last=2), base, candidate, screened)
+    assert tried == ["linear"]
+    assert checked == ["far"]

@@ -51,6 +51,30 @@ def test_what_a_machine_hides_is_named_within_a_minute_of_processor_time(
     assert time.process_time() - begun < 60
 
 
+@pytest.mark.long
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("machine", ["decay", "pendulum", "force"])
+def test_four_times_as_many_samples_have_the_same_verdict(
+    rigs: ModuleType, tmp_path, monkeypatch, machine: str
+) -> None:
+    draw = rigs.RIGS[machine]
+
+    def denser(random: np.random.Generator):
+        rig = draw(random)
+        rig.rate *= 4
+        return rig
+
+    monkeypatch.setitem(rigs.RIGS, "denser", denser)
+    verdicts = []
+    for name in (machine, "denser"):
+        folder = tmp_path / name
+        rigs.write_rig(folder, SEED, 0, name)
+        paths = [folder / record for record in rigs.RECORDS]
+        verdict = discover(folder / rigs.BASE, paths[:2], paths[2:], Options(seed=1))
+        verdicts.append((verdict["outcome"], verdict["effects"]))
+    assert verdicts[0] == verdicts[1] == ("named", list(draw(np.random.default_rng(1)).hidden))
+
+
 def test_a_decay_is_that_of_dry_and_viscous_friction(rigs: ModuleType, tmp_path) -> None:
     rigs.write_rig(tmp_path, SEED, 0, "decay")
     assert json.loads((tmp_path / "truth.json").read_text())["effects"] == ["coulomb"]

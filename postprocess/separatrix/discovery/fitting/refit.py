@@ -77,8 +77,13 @@ def refit(
             if beaten(rough, rival):
                 return rough
         elif best is not None and kind != "linear" and _closes_nothing(data, base, candidate, kind, tried):
+            if _as_far(best.fit, base):
+                break
             continue
         else:
+            if best is None and base.fit.reduced_chi2 > FIT.near_base:
+                # through short segments it would cost more than the start from afar
+                kind = "linear"
             problem, fit = _try(data, base, candidate, kind, tried, 8 if settled else 20)
         if kind == "linear" and not fit.far_off(hopeless(base)) and not _as_far(fit, base):
             # of other kinds it was done with the last stage
