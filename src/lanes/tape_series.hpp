@@ -121,7 +121,7 @@ LANE_LEAF vec sum_of_parts(int k, const tape_machine &m, int first, int count, c
 // Sine and cosine of the node that either was taken of last (-1: none): mostly both are needed.
 struct tape_circle {
   int of = -1;
-  vec sine, cosine;
+  vec sine = 0, cosine = 0;
 };
 
 LANE_LEAF void turn_to(const tape_node &n, vec a, tape_circle &c) {
