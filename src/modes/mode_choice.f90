@@ -125,6 +125,7 @@ contains
     real(wp) :: force(machine%n), rate(machine%n)
     integer :: j
     call free_force(machine, state, turning, force)
+    lcp%count = 0
     do j = 1, size(machine%joints)
       if (is_held(machine%joints(j), state%phase(j))) call add_constraint(lcp, j, -huge(1.0_wp), huge(1.0_wp))
     end do
@@ -185,6 +186,7 @@ contains
     integer :: side(most_joints)
     verdict = 0
     trial = state
+    lcp%count = 0
     call ask_all(machine, at_rest, touching, before, lcp, trial%phase, side)
     ok = .true.
     if (lcp%count == 0) return
@@ -325,6 +327,7 @@ contains
     real(wp) :: s, u
     integer :: side(most_joints), i, j
     logical :: ok
+    lcp%count = 0
     do j = 1, size(machine%joints)
       if (is_held(machine%joints(j), state%phase(j))) call add_constraint(lcp, j, -huge(1.0_wp), huge(1.0_wp))
     end do
