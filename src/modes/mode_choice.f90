@@ -186,7 +186,6 @@ contains
     integer :: side(most_joints)
     verdict = 0
     trial = state
-    lcp%count = 0
     call ask_all(machine, at_rest, touching, before, lcp, trial%phase, side)
     ok = .true.
     if (lcp%count == 0) return
@@ -282,6 +281,7 @@ contains
     integer, intent(out) :: side(:)
     integer :: j
     side = 0
+    lcp%count = 0
     do j = 1, size(machine%joints)
       if (at_rest(j)) then
         associate (level => machine%joints(j)%friction%break_away)
