@@ -15,7 +15,6 @@ module stability_driver
   use files, only: file_exists, is_empty, is_special, is_text
   use journal, only: json_number, json_text
   use kinds, only: wp
-  use launcher, only: launched_rank
   use machine_family, only: machine_neighbourhood
   use more_periods, only: periods_needed
   use session, only: open_session, session_t
@@ -36,7 +35,7 @@ contains
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
     if (is_map(command%path)) then
-      if (launched_rank() == 0) call run_stability_of_map(command, error)
+      call run_stability_of_map(command, error)
     else
       call run_stability_of_case(command)
     end if

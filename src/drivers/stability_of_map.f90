@@ -3,25 +3,25 @@
 
 !> `separatrix stability MAP`: what the entries of a map's catalogue are that have no period.
 module stability_of_map
-  use attractors, only: kind_family, kind_rest
   use body_family, only: family_t
-  use case_reader, only: load_case_text
-  use case_setup, only: grid_of
   use case_type, only: case_t
   use command_line, only: command_t
   use endings, only: assess_given_up
   use errors, only: error_t, fail
   use exponents, only: most_points, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
     motion_transient, period_of_section, spectrum_t, type_of_motion, zero_one_test
-  use grid, only: grid_t, point_laws, point_slice, point_start
+  use grid, only: grid_t, point_laws, point_start
   use journal, only: journal_t, json_number, json_text
   use kinds, only: int64, wp
+  use launcher, only: launched_ranks
   use machine_family, only: machine_neighbourhood
-  use map_reader, only: open_final, reader_t
-  use map_verify, only: probe_file, verify_file
+  use map_entries, only: entry_t, read_entries
   use more_periods, only: periods_needed, test_is_open
-  use status, only: exit_bad_case, exit_usage, is_given_up, reason_left_domain, reason_name
+  use parallel, only: start_team
+  use serial_team, only: serial_team_t
+  use status, only: exit_usage, is_given_up, reason_left_domain, reason_name
   use structure_exponents, only: exponents_of_machine
+  use team, only: team_t
   use text, only: replace_all, to_text
   use variations, only: neighbourhood_t
   implicit none
@@ -38,13 +38,6 @@ module stability_of_map
   character(len=*), parameter :: type_names(0:4) = [character(len=22) :: 'not_known', 'chaotic', 'quasi_periodic', &
     'long_transient', 'period_above_the_limit']
 
-  !> An entry without a period, and a start of the map that converged to it.
-  type :: entry_t
-    integer :: label = 0
-    integer(int64) :: slice = 0
-    integer, allocatable :: index(:)
-  end type entry_t
-
   !> What was found of an entry.
   type :: finding_t
     type(spectrum_t) :: spectrum
@@ -54,168 +47,90 @@ module stability_of_map
 
 contains
 
-  !> Reports the type of every entry of period 0 with its exponents. Code 65 for a file that is no map of attractors.
+  !> Reports the type of every entry of period 0 with its exponents; the ranks share the entries. Code 65 for a file that is no map
+  !> of attractors.
   subroutine run_stability_of_map(command, error)
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
+    class(team_t), allocatable :: team
     type(journal_t) :: journal
-    type(reader_t) :: reader
     type(case_t) :: the_case
     type(grid_t) :: grid
     type(entry_t), allocatable :: entries(:)
-    type(error_t), allocatable :: ignored
-    integer :: i, total, datasets
-    integer(int64) :: given_up
+    integer :: total
     if (size(command%overrides) > 0) call fail(error, exit_usage, '--set belongs to a case: stability takes that of its map')
     if (len(command%draw) > 0) call fail(error, exit_usage, '--draw belongs to a case: stability MAP draws none')
     if (allocated(error)) return
-    call journal%open(.true., command%json, command%quiet)
+    if (launched_ranks() == 1) then
+      allocate (serial_team_t :: team)
+    else
+      call start_team(team)
+    end if
+    call journal%open(team%is_root(), command%json, command%quiet)
     call journal%open_copy(command%log, error)
-    if (.not. allocated(error)) call probe_file(command%path, error)
-    ! What is no file of Separatrix is not called damaged.
-    if (.not. allocated(error)) call open_final(command%path, reader, error)
-    if (.not. allocated(error)) call reader%close(error)
-    if (.not. allocated(error)) call verify_file(command%path, error, datasets)
-    if (.not. allocated(error)) call open_final(command%path, reader, error)
-    if (allocated(error)) return
-    call read_map(reader, the_case, grid, entries, total, error)
-    call reader%close(ignored)
-    if (allocated(error)) return
-    call journal%line('entries', to_text(size(entries))//' of '//to_text(total)//' entries of the catalogue have no known period', &
-                      '"without_period": '//to_text(size(entries))//', "attractors": '//to_text(total))
-    if (command%validate .or. command%dry_run) return
-    given_up = 0
-    do i = 1, size(entries)
-      call report_stability(journal, grid, the_case, entries(i), command%periods, given_up)
-    end do
-    call assess_given_up(journal, given_up, size(entries, kind=int64), 'entries', command%partial, error)
+    call team%agree(error)
+    if (.not. allocated(error)) call read_entries(command%path, team, the_case, grid, entries, total, error)
+    if (.not. allocated(error)) then
+      call journal%line('entries', to_text(size(entries))//' of '//to_text(total)//' entries of the catalogue have no known '// &
+                        'period', '"without_period": '//to_text(size(entries))//', "attractors": '//to_text(total))
+      if (.not. (command%validate .or. command%dry_run)) call report_entries(team, journal, grid, the_case, entries, command, error)
+    end if
+    call team%close()
   end subroutine run_stability_of_map
 
-  !> The case of a map, its grid, and the entries without a period among the `total`.
-  subroutine read_map(reader, the_case, grid, entries, total, error)
-    type(reader_t), intent(in) :: reader
-    type(case_t), intent(out) :: the_case
-    type(grid_t), intent(out) :: grid
-    type(entry_t), allocatable, intent(out) :: entries(:)
-    integer, intent(out) :: total
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: kind, resolved
-    character(len=128) :: no_overrides(0)
-    real(wp), allocatable :: columns(:, :), kinds(:)
-    logical, allocatable :: wanted(:)
-    logical :: has_catalogue
-    integer :: i
-    integer, allocatable :: rows(:)
-    total = 0
-    call reader%text_attribute('/', 'kind', kind, error)
-    if (allocated(error)) return
-    has_catalogue = reader%has('/catalogue/period')
-    if (kind /= 'basin' .or. .not. has_catalogue) then
-      call fail(error, exit_bad_case, ''''//reader%path//''' is a file of kind '//kind// &
-                ', allowed a map (basin) with a catalogue, or a case')
-      return
-    end if
-    call reader%read_text('/provenance/resolved_case', resolved, error)
-    if (.not. allocated(error)) call load_case_text(resolved, reader%path//' (resolved case)', no_overrides, the_case, error)
-    if (.not. allocated(error)) call reader%read_columns([character(len=20) :: '/catalogue/slice', '/catalogue/attractor', &
-                                                          '/catalogue/period'], columns, error)
-    if (allocated(error)) return
-    grid = grid_of(the_case, the_case%axes)
-    total = size(columns, 1)
-    wanted = nint(columns(:, 3)) == 0
-    if (reader%has('/catalogue/kind')) then
-      call reader%read_values('/catalogue/kind', kinds, error)
-      if (allocated(error)) return
-      wanted = wanted .and. nint(kinds) /= kind_rest .and. nint(kinds) /= kind_family
-    end if
-    rows = pack([(i, i=1, total)], wanted)
-    allocate (entries(size(rows)))
-    do i = 1, size(rows)
-      entries(i)%slice = nint(columns(rows(i), 1), int64)
-      entries(i)%label = nint(columns(rows(i), 2))
-    end do
-    if (size(entries) > 0) call find_starts(reader, grid, entries, error)
-  end subroutine read_map
-
-  !> For each entry the first point of the map that converged to it; none is left without an index where there is one.
-  subroutine find_starts(reader, grid, entries, error)
-    type(reader_t), intent(in) :: reader
-    type(grid_t), intent(in) :: grid
-    type(entry_t), intent(inout) :: entries(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer(int64), allocatable :: lengths(:), lower(:), extent(:)
-    real(wp), allocatable :: labels(:)
-    integer :: row, i, n, left
-    integer, allocatable :: index(:)
-    call reader%lengths('/attractor', lengths, error)
-    if (allocated(error)) return
-    n = size(lengths)
-    if (n /= size(grid%axes)) then
-      call fail(error, exit_bad_case, ''''//reader%path//''' has not the axes of its case')
-      return
-    end if
-    lower = 0*lengths
-    extent = lengths
-    extent(1) = 1
-    left = size(entries)
-    do row = 0, int(lengths(1)) - 1
-      lower(1) = row
-      call reader%read_block('/attractor', lower, extent, labels, error)
-      if (allocated(error)) return
-      do i = 1, size(entries)
-        if (allocated(entries(i)%index)) cycle
-        call look_for(entries(i), grid, labels, int(lengths), row, index)
-        if (.not. allocated(index)) cycle
-        entries(i)%index = index
-        left = left - 1
-      end do
-      if (left == 0) return
-    end do
-  end subroutine find_starts
-
-  !> The index of the first of the `labels` of a row of the first axis that is the entry's, in its slice; not allocated without.
-  pure subroutine look_for(entry, grid, labels, lengths, row, index)
-    type(entry_t), intent(in) :: entry
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: labels(:)
-    integer, intent(in) :: lengths(:), row
-    integer, allocatable, intent(out) :: index(:)
-    integer :: here(size(lengths)), k, at, rest
-    do at = 1, size(labels)
-      if (nint(labels(at)) /= entry%label) cycle
-      rest = at - 1
-      do k = size(lengths), 2, -1
-        here(k) = 1 + modulo(rest, lengths(k))
-        rest = rest/lengths(k)
-      end do
-      here(1) = row + 1
-      if (point_slice(grid, here) /= entry%slice) cycle
-      index = here
-      return
-    end do
-  end subroutine look_for
-
-  !> Computes and reports what an entry is; counts those whose motion was given up.
-  subroutine report_stability(journal, grid, the_case, entry, periods, given_up)
+  !> Entries in turn, one for each rank at a time; the lines come in the order of the entries.
+  subroutine report_entries(team, journal, grid, the_case, entries, command, error)
+    class(team_t), intent(in) :: team
     type(journal_t), intent(inout) :: journal
+    type(grid_t), intent(in) :: grid
+    type(case_t), intent(in) :: the_case
+    type(entry_t), intent(in) :: entries(:)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: words, data, others_words, others_data
+    integer(int64) :: given_up(1)
+    integer :: first, mine, rank
+    given_up = 0
+    do first = 1, size(entries), team%size()
+      words = ''
+      data = ''
+      mine = first + team%rank()
+      if (mine <= size(entries)) call describe(grid, the_case, entries(mine), command%periods, words, data, given_up(1))
+      do rank = 0, min(team%size(), size(entries) - first + 1) - 1
+        others_words = words
+        others_data = data
+        call team%broadcast_text(others_words, rank)
+        call team%broadcast_text(others_data, rank)
+        call journal%line('entry', others_words, others_data)
+      end do
+    end do
+    call team%sum(given_up)
+    call assess_given_up(journal, given_up(1), size(entries, kind=int64), 'entries', command%partial, error)
+  end subroutine report_entries
+
+  !> Computes what an entry is, as `words` and as `data` of JSON; counts those whose motion was given up.
+  subroutine describe(grid, the_case, entry, periods, words, data, given_up)
     type(grid_t), intent(in) :: grid
     type(case_t), intent(in) :: the_case
     type(entry_t), intent(in) :: entry
     integer, intent(in) :: periods
+    character(len=:), allocatable, intent(out) :: words, data
     integer(int64), intent(inout) :: given_up
     type(finding_t) :: found
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: name, words, data
+    character(len=:), allocatable :: name
     name = 'attractor '//to_text(entry%label)
     if (grid%slices > 1) name = name//' of slice '//to_text(entry%slice)
     data = '"attractor": '//to_text(entry%label)//', "slice": '//to_text(entry%slice)
     if (.not. allocated(entry%index)) then
-      call journal%line('entry', name//': not known: no point of the map was captured by it', data//', "type": "not_known"')
+      words = name//': not known: no point of the map was captured by it'
+      data = data//', "type": "not_known"'
       return
     end if
     call examine(grid, entry%index, periods, the_case%attractors%max_period, found, error)
     if (allocated(error)) then
-      call journal%line('entry', name//': not known: '//error%message, data//', "type": "not_known"')
+      words = name//': not known: '//error%message
+      data = data//', "type": "not_known"'
       return
     end if
     if (is_given_up(found%spectrum%reason)) given_up = given_up + 1
@@ -234,8 +149,7 @@ contains
         data = data//', "periods_needed": '//to_text(periods_needed(found%spectrum, found%zero_one))
       end if
     end if
-    call journal%line('entry', words, data)
-  end subroutine report_stability
+  end subroutine describe
 
   !> What more periods would do for a motion that is not known, by the 0-1 test `k`; '' if that is not known either.
   pure function needed_text(spectrum, k) result(text)

@@ -360,10 +360,10 @@ contains
     type(watch_t), intent(inout) :: watch
     real(wp) :: p(0:degree)
     p = path%step(:, machine%watched)
-    watch%extremes(2) = max(watch%extremes(2), maximum_until(p, fraction))
-    watch%extremes(1) = min(watch%extremes(1), -maximum_until(-p, fraction))
+    watch%extremes(2) = maximum_until(p, fraction, watch%extremes(2))
+    watch%extremes(1) = -maximum_until(-p, fraction, -watch%extremes(1))
     if (.not. watch%needs_speed) return
-    watch%top_speed = max(watch%top_speed, maximum_until(path%step(:, machine%n + machine%watched), fraction))
+    watch%top_speed = maximum_until(path%step(:, machine%n + machine%watched), fraction, watch%top_speed)
   end subroutine look_along
 
 end module marched_flight

@@ -8,7 +8,8 @@ module marched_system
   use elementary, only: sine_cosine
   use flight_path, only: path_t
   use guarded_march, only: watched_system_t
-  use multibody, only: joint_soft, joint_spring, joint_t, memory_t, multibody_t, most_joints
+  use friction_law, only: sliding_friction
+  use multibody, only: joint_friction, joint_soft, joint_spring, joint_t, memory_t, multibody_t, most_joints
   use marched_load, only: choose_branches, load_at, marched_load_t, set_load, set_rows, switch_at
   use multibody_state, only: factor_now, is_curved, joint_force, joint_motion, multibody_state_t, spring_terms
   use kinds, only: wp
@@ -30,6 +31,8 @@ module marched_system
     integer :: phase(most_joints) = 0
     real(wp) :: touch_speed(most_joints) = 0
     real(wp), allocatable :: position(:, :), speed(:, :), strength(:, :), push(:, :), lean(:, :)
+    !> Sliding friction under a constant normal force: its speed is all that is looked at.
+    logical :: is_plain(most_joints) = .false.
     !> Normal forces of friction, and which of them a joint has, 0 for none.
     type(marched_load_t), allocatable :: loads(:)
     integer :: load_of(most_joints) = 0
@@ -80,6 +83,8 @@ contains
       system%touch_speed(k) = state%touch_speed(j)
       system%push(:, k) = held_push(machine, flow, machine%joints(j)%row)
       call set_strength(machine%joints(j), one, system%strength(:, k))
+      system%is_plain(k) = machine%joints(j)%kind == joint_friction .and. .not. allocated(machine%joints(j)%load) .and. &
+        .not. allocated(machine%joints(j)%strength)
       system%position(:, k) = flow%position_row(:, j)
       system%speed(:, k) = flow%speed_row(:, j)
       system%position(one + 1, k) = machine%joints(j)%offset%rate
@@ -211,10 +216,21 @@ contains
     real(wp) :: force(self%count_joints)
     integer :: k
     do k = 1, self%count_joints
-      call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), position_now(self, k, z), &
-                       sum(self%speed(:, k)*z), factor_at(self, k, z), force(k))
+      if (self%is_plain(k)) then
+        force(k) = sliding_friction(self%joints(k)%friction, product_of(size(z), self%speed(:, k), z), real(self%phase(k), wp))
+      else
+        call joint_force(self%joints(k), self%phase(k), 0.0_wp, self%touch_speed(k), position_now(self, k, z), &
+                         sum(self%speed(:, k)*z), factor_at(self, k, z), force(k))
+      end if
     end do
   end function forces_at
+
+  !> A row times what it refers to; arrays of known size, which sections are not.
+  pure real(wp) function product_of(n, row, z)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: row(n), z(n)
+    product_of = sum(row*z)
+  end function product_of
 
   !> Coordinate of joint number `k` of the system [m]. The part that is given changes by sum of amplitude (exp(i m Omega t) - 1),
   !> with exp(i x) - 1 = 2 i sin(x/2) exp(i x/2): a stiff contact is so thin that differences of positions have no digits of it.
@@ -241,17 +257,25 @@ contains
     class(marched_t), intent(in) :: self
     real(wp), intent(in) :: time, y(:)
     real(wp) :: slope(size(y)), z(2*self%n + 2 + 2*self%harmonics), force(self%count_joints)
-    integer :: i
     z = unknowns(self, time, y)
     force = forces_at(self, z)
-    slope(:self%n) = y(self%n + 1:)
-    do i = 1, self%n
-      slope(self%n + i) = sum(self%acceleration(:, i)*z)
-    end do
-    do i = 1, self%count_joints
-      slope(self%n + 1:) = slope(self%n + 1:) + self%push(:, i)*force(i)
-    end do
+    slope(:self%n) = z(self%n + 1:2*self%n)
+    call accelerate(self%n, size(z), self%count_joints, self%acceleration, z, self%push, force, slope(self%n + 1:))
   end function marched_slope
+
+  !> What is linear of the accelerations, and the other forces.
+  pure subroutine accelerate(n, terms, joints, rows, z, push, force, acceleration)
+    integer, intent(in) :: n, terms, joints
+    real(wp), intent(in) :: rows(terms, n), z(terms), push(n, joints), force(joints)
+    real(wp), intent(out) :: acceleration(n)
+    integer :: i, k
+    do i = 1, n
+      acceleration(i) = sum(rows(:, i)*z)
+    end do
+    do k = 1, joints
+      acceleration = acceleration + push(:, k)*force(k)
+    end do
+  end subroutine accelerate
 
   !> Accelerations with each term replaced by its size, those of a nonlinear force and what its slopes make of the sizes of its
   !> coordinate and speed: near an equilibrium the terms cancel, and their rounding is left. `origin` are the coordinates at the

@@ -183,7 +183,7 @@ contains
     type(state_t) :: sample
     real(wp) :: t, done
     if (tally%needs_v_max .and. march%context%direction > 0) then
-      tally%v_max = max(tally%v_max, march%path(0, 2), maximum_until(march%path(:, 2), march%fraction))
+      tally%v_max = maximum_until(march%path(:, 2), march%fraction, max(tally%v_max, march%path(0, 2)))
     end if
     if (.not. present(log)) return
     done = 0

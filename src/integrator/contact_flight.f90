@@ -245,7 +245,7 @@ contains
     real(wp) :: t, done
     if (.not. march%fraction > 0) return
     if (tally%needs_v_max .and. pressed%direction > 0) then
-      tally%v_max = max(tally%v_max, maximum_until(pressed%side*march%path(:, 2), march%fraction))
+      tally%v_max = maximum_until(pressed%side*march%path(:, 2), march%fraction, tally%v_max)
     end if
     if (.not. present(log)) return
     log%peak_penetration = max(log%peak_penetration, march%y(1))

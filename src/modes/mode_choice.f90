@@ -125,6 +125,7 @@ contains
     real(wp) :: force(machine%n), rate(machine%n)
     integer :: j
     call free_force(machine, state, turning, force)
+    lcp%count = 0
     do j = 1, size(machine%joints)
       if (is_held(machine%joints(j), state%phase(j))) call add_constraint(lcp, j, -huge(1.0_wp), huge(1.0_wp))
     end do
@@ -280,6 +281,7 @@ contains
     integer, intent(out) :: side(:)
     integer :: j
     side = 0
+    lcp%count = 0
     do j = 1, size(machine%joints)
       if (at_rest(j)) then
         associate (level => machine%joints(j)%friction%break_away)
@@ -325,6 +327,7 @@ contains
     real(wp) :: s, u
     integer :: side(most_joints), i, j
     logical :: ok
+    lcp%count = 0
     do j = 1, size(machine%joints)
       if (is_held(machine%joints(j), state%phase(j))) call add_constraint(lcp, j, -huge(1.0_wp), huge(1.0_wp))
     end do

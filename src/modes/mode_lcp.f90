@@ -16,13 +16,13 @@ module mode_lcp
 
   !> What the choice is made of: the joints of the problem, their rows, and the drift of the free structure along them.
   type, public :: mode_lcp_t
-    integer :: count = 0
-    integer :: joint(most_joints) = 0
-    real(wp), dimension(most_joints) :: lower = 0, upper = 0
+    ! No component has an initial value: the whole of it would be copied wherever a mode is chosen.
+    integer :: count
+    integer :: joint(most_joints)
+    real(wp), dimension(most_joints) :: lower, upper
     !> No longer part of the problem: no force is sought.
-    logical :: fixed(most_joints) = .false.
+    logical :: fixed(most_joints)
     real(wp) :: g(most_joints, most_joints)
-    real(wp) :: tolerance = 0
   end type mode_lcp_t
 
 contains
@@ -35,6 +35,7 @@ contains
     lcp%joint(lcp%count) = j
     lcp%lower(lcp%count) = lower
     lcp%upper(lcp%count) = upper
+    lcp%fixed(lcp%count) = .false.
   end subroutine add_constraint
 
   !> W' M^-1 W.

@@ -34,6 +34,9 @@ contains
     real(wp) :: b(0:degree, deepest + 1), right(0:degree), from(deepest + 1), width(deepest + 1)
     integer :: top, changes
     logical :: low
+    t = 2
+    ! What falls is outweighed by what it begins with; twice, for rounding.
+    if (p(0) + 2*sum(min(p(1:), 0.0_wp)) > 0) return
     b(:, 1) = bernstein(p)
     from(1) = 0
     width(1) = 1
@@ -83,13 +86,16 @@ contains
     t = b
   end function zero_between
 
-  !> Largest value on [0, last], to a relative 1e-14 of the spread, by branch and bound.
-  pure real(wp) function maximum_until(p, last) result(best)
-    real(wp), intent(in) :: p(0:degree), last
+  !> Largest value on [0, last], to a relative 1e-14 of the spread, by branch and bound; `least`, where that is more.
+  pure real(wp) function maximum_until(p, last, least) result(best)
+    real(wp), intent(in) :: p(0:degree), last, least
     real(wp) :: b(0:degree, deepest + 1), right(0:degree), scaled(0:degree), slack
     integer :: top, i
-    scaled = [(p(i)*last**i, i=0, degree)]
+    scaled = p
+    if (last < 1) scaled = [(p(i)*last**i, i=0, degree)]
     b(:, 1) = bernstein(scaled)
+    best = least
+    if (maxval(b(:, 1)) <= least) return
     best = max(b(0, 1), b(degree, 1))
     slack = 1e-14_wp*(maxval(b(:, 1)) - minval(b(:, 1)))
     top = 1
@@ -104,6 +110,7 @@ contains
       b(:, top) = right
       top = top + 1
     end do
+    best = max(best, least)
   end function maximum_until
 
   !> The polynomial with given values at given fractions (Newton's divided differences).
