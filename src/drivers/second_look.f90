@@ -317,6 +317,8 @@ contains
     file%done = open_points == 0
     call prepare_counts(work)
     work%again = .true.
+    call limit_time(session%journal, session%command%time_limit, error)
+    call session%stop_if(error)
     call run_tiles(session, file, work, complete)
     ! Each rank knows only the tiles that it computed.
     if (complete) file%done = .true.

@@ -26,7 +26,6 @@ module tiled_run
   use spread_order, only: new_spread_order, spread_order_t, spread_subscripts
   use signals, only: end_time_limit, set_farewell
   use status, only: exit_resumable
-  use stop_check, only: limit_time
   use system, only: monotonic_seconds
   use text, only: to_text
   use tile_times, only: write_tile_times
@@ -140,7 +139,6 @@ contains
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
-    if (.not. allocated(error)) call limit_time(session%journal, session%command%time_limit, error)
     call session%stop_if(error)
     watch%scheduler => scheduler
     watch%session => session
