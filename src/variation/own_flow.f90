@@ -98,11 +98,19 @@ contains
     type(own_flow_t), intent(in) :: flow
     real(wp), intent(in) :: z(:), parameters(:)
     integer, intent(in) :: direction
-    integer :: branches(size(flow%tape%switches)), zeros(size(branches))
+    integer :: branches(size(flow%tape%switches)), zeros(size(flow%plain%tape%switches)), faults(flow%tape%count), own
+    real(wp) :: all(size(flow%states)), value(flow%tape%count)
     logical :: fits
-    call choose_branches(flow%plain, z, parameters, branches, zeros, fits)
+    own = size(zeros)
+    call choose_branches(flow%plain, z, parameters, branches(:own), zeros, fits)
     ! Back in time a zero of odd order is left to the other side.
-    if (direction < 0) where (zeros > 0 .and. modulo(zeros, 2) == 1) branches = -branches
+    if (direction < 0) where (zeros > 0 .and. modulo(zeros, 2) == 1) branches(:own) = -branches(:own)
+    if (size(branches) == own) return
+    ! Derivatives of powers have switches of their own.
+    all = 0
+    all(:flow%n) = z
+    call evaluate(flow%tape, all, parameters, value, faults)
+    branches(own + 1:) = merge(1, -1, value(flow%tape%switches(own + 1:)%argument) >= 0)
   end function branches_at
 
   !> Moves the variables by a `duration` [s] of either sign; `sizes` set how small an error is. With `slopes` their derivatives by
@@ -141,13 +149,13 @@ contains
     real(wp), intent(inout) :: z(:)
     type(series_t) :: series
     real(wp) :: left, step, before(flow%n), crossing(size(tape%switches))
-    integer :: fault, i, k
+    integer :: branches(size(flow%tape%switches)), fault, i, k
     logical :: crossed(size(tape%switches))
     associate (arguments => tape%switches%argument)
       left = duration
       if (.not. abs(left) > 0) return
-      call prepare_series(tape, series_order, flow%rates(:count), arguments, &
-                          branches_at(flow, z(:flow%n), parameters, merge(1, -1, left > 0)), series)
+      branches = branches_at(flow, z(:flow%n), parameters, merge(1, -1, left > 0))
+      call prepare_series(tape, series_order, flow%rates(:count), arguments, branches(:size(crossed)), series)
       do i = 1, most_steps
         if (.not. abs(left) > 0) return
         call expand(tape, z, parameters, series, fault)

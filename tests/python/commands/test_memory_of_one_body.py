@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Friction with memory in a case of one body: the laws that several bodies have."""
 
+import json
+
 import h5py
 import pytest
 from program import run, succeed
@@ -131,3 +133,15 @@ def test_what_does_not_go_with_it(separatrix, tmp_path, more, problem):
     found = run(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
     assert found.code == 65
     assert problem in found.err
+
+
+@pytest.mark.parametrize("law", ["dahl", "bouc_wen"])
+def test_exponents(separatrix, tmp_path, law):
+    """Derivatives of powers have switches of their own: the command ended in a fault of memory."""
+    (tmp_path / "case.toml").write_text(ONE + FRICTION.format(law=law))
+    out = succeed(separatrix, "stability", "case.toml", "--periods", "64", "--json", folder=tmp_path).out
+    found = [json.loads(line) for line in out.splitlines() if '"event": "exponent"' in line]
+    assert [one["number"] for one in found] == [1, 2, 3]
+    # Both of the oscillation, and the fast one of the deflection.
+    assert found[0]["value"] == pytest.approx(-0.34, abs=0.03)
+    assert found[1]["value"] == pytest.approx(found[0]["value"], abs=0.03)
