@@ -15,6 +15,7 @@ module session
   use device_choice, only: choose_device, device_text
   use errors, only: error_t, fail
   use files, only: file_exists, give_lock, take_lock
+  use h5, only: h5_read_alignment
   use journal, only: journal_t, json_text
   use lane_gpu, only: use_gpu
   use launcher, only: launched_ranks
@@ -74,6 +75,7 @@ contains
     type(session_t), intent(out) :: session
     type(command_row_t) :: row
     type(error_t), allocatable :: error
+    integer :: bytes
     session%command = command
     session%alone = launched_ranks() == 1
     if (session%alone) then
@@ -89,6 +91,7 @@ contains
     call set_farewell('stopped within one long trajectory; nothing was written yet, the same command starts again')
     if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
+    if (.not. allocated(error)) call h5_read_alignment(bytes, error)
     if (.not. allocated(error)) call load_case(command%path, command%overrides, session%the_case, error, &
                                                    needs_sweep=command%name == 'sweep', structure_file=read_structure_file)
     call session%stop_if(error)

@@ -17,25 +17,27 @@ module h5
     h5fcreate_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, &
     h5lexists_f, h5open_f, H5P_CRT_ORDER_INDEXED_F, H5P_CRT_ORDER_TRACKED_F, &
     H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, h5pclose_f, &
-    h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
+    h5pcreate_f, h5pset_alignment_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_time_f, &
     h5pset_libver_bounds_f, h5pset_link_creation_order_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
     h5pset_small_data_block_size_f, H5S_SCALAR_F, &
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
     h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, hsize_t
   use kinds, only: int64, int8
-  use status, only: exit_cannot_create, exit_io
-  use text, only: to_text
+  use status, only: exit_cannot_create, exit_io, exit_usage
+  use text, only: parse_integer, to_text
   use value_types, only: is_float
   implicit none
   private
 
   public :: h5_create, h5_open, h5_close, h5_exists, h5_create_group, h5_create_dataset, &
-    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_failed, h5_version, h5_shuffles
+    h5_open_dataset, h5_close_dataset, h5_write, h5_read, h5_failed, h5_read_alignment, h5_version, h5_shuffles
 
   !> An open file.
   type, public :: h5_file_t
     integer(hid_t) :: id = -1
     character(len=:), allocatable :: path
+    !> Pieces of at least so many bytes get their space at multiples of it.
+    integer(int64) :: alignment = 1
   end type h5_file_t
 
   !> An open dataset. A scalar has no lengths.
@@ -59,6 +61,9 @@ module h5
 
   !> Space that is taken at once for what describes the data, and for small data, when a file is opened for writing.
   integer(hsize_t), parameter :: front_bytes = 2**18
+  !> The alignment of files that are written, in bytes, and the most that it may be.
+  character(len=*), parameter :: alignment_variable = 'SEPARATRIX_ALIGNMENT'
+  integer, parameter :: most_alignment = 2**30
 
 contains
 
@@ -125,6 +130,7 @@ contains
     if (status >= 0) call h5pset_libver_bounds_f(access, oldest, H5F_LIBVER_V110_F, status)
     ! Data gets its space at the end of the file, each piece by itself (module h5_chunks).
     if (status >= 0) call h5pset_small_data_block_size_f(access, 0_hsize_t, status)
+    if (status >= 0) call align(access, file, status, error)
     if (status >= 0) call h5pset_link_creation_order_f(creation, ior(H5P_CRT_ORDER_TRACKED_F, H5P_CRT_ORDER_INDEXED_F), status)
     if (status >= 0) call h5fcreate_f(path, H5F_ACC_TRUNC_F, file%id, status, creation, access)
     if (h5_failed(status, 'create the file', '', path, error)) return
@@ -134,6 +140,36 @@ contains
     call h5_close(file, error)
     if (.not. allocated(error)) call h5_open(path, file, error, writable=.true.)
   end subroutine h5_create
+
+  !> The alignment that the environment asks for, in bytes; 1: none. Code 64 for one that is no number of bytes.
+  subroutine h5_read_alignment(bytes, error)
+    integer, intent(out) :: bytes
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=32) :: text
+    integer :: length, absent, status
+    bytes = 1
+    call get_environment_variable(alignment_variable, text, length, absent)
+    if (absent == 1 .or. length == 0) return
+    call parse_integer(trim(text), bytes, status)
+    if (absent /= 0 .or. status /= 0 .or. bytes < 1 .or. bytes > most_alignment) then
+      call fail(error, exit_usage, alignment_variable//': found '//trim(text)//', allowed a number of bytes from 1 to '// &
+                to_text(most_alignment))
+    end if
+  end subroutine h5_read_alignment
+
+  !> Sets that alignment for a file that is written.
+  subroutine align(access, file, status, error)
+    integer(hid_t), intent(in) :: access
+    type(h5_file_t), intent(inout) :: file
+    integer, intent(out) :: status
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: bytes
+    status = -1
+    call h5_read_alignment(bytes, error)
+    if (allocated(error)) return
+    file%alignment = bytes
+    call h5pset_alignment_f(access, int(bytes, hsize_t), int(bytes, hsize_t), status)
+  end subroutine align
 
   !> Opens a file in this process alone. Code 74.
   subroutine h5_open(path, file, error, writable)
@@ -152,6 +188,7 @@ contains
     if (status >= 0) call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, status)
     if (status >= 0) call h5pset_meta_block_size_f(access, front_bytes, status)
     if (status >= 0) call h5pset_small_data_block_size_f(access, front_bytes, status)
+    if (status >= 0 .and. flags == H5F_ACC_RDWR_F) call align(access, file, status, error)
     call trap('its beginning', path, endless=.true.)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
     call end_guard()

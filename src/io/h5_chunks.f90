@@ -77,6 +77,7 @@ contains
     integer(int64), intent(out) :: offset
     type(error_t), allocatable, intent(out) :: error
     integer(hsize_t) :: before, after
+    integer(int64) :: gap
     integer :: status
     offset = 0
     call h5fget_filesize_f(file%id, before, status)
@@ -84,9 +85,11 @@ contains
                                               c_loc(bytes))
     if (status >= 0) call h5fget_filesize_f(file%id, after, status)
     if (h5_failed(status, 'write', dataset%name, dataset%path, error)) return
-    if (after - before == size(bytes)) then
+    gap = 0
+    if (size(bytes) >= file%alignment) gap = modulo(-before, file%alignment)
+    if (after - before == gap + size(bytes)) then
       ! The file has grown by just that. Asking would take longer with every chunk.
-      offset = before
+      offset = before + gap
     else
       call h5_chunk_offset(dataset, corner, offset, error)
     end if
