@@ -11,6 +11,7 @@ module stored_map
   use command_line, only: command_t
   use errors, only: error_t, fail
   use grid, only: grid_t
+  use h5, only: h5_read_alignment
   use journal, only: journal_t
   use kinds, only: int64, wp
   use launcher, only: launched_ranks
@@ -41,6 +42,7 @@ contains
     type(reader_t), intent(out) :: reader
     type(error_t), allocatable :: error
     character(len=:), allocatable :: resolved, raw
+    integer :: bytes
     character(len=128) :: no_overrides(0)
     session%command = command
     session%alone = launched_ranks() == 1
@@ -52,6 +54,7 @@ contains
     call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
+    if (.not. allocated(error)) call h5_read_alignment(bytes, error)
     if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     call session%stop_if(error)
     if (session%team%is_root()) call check_map_file(command%path, session%alone, error)

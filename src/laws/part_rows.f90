@@ -169,7 +169,7 @@ module part_rows
     (parameter_row_t('part', frictions(i), 'force', 'N', positive, 'friction while sliding on; at high speed'), i=9, 11), &
     (parameter_row_t('part', frictions(i), 'exponent', '1', range_t(1.0_wp, 100.0_wp), 'n', optional=.true., &
                      default=1.0_wp), i=9, 10), &
-    parameter_row_t('part', frictions(10), 'shape', '1', zero_to_one, 'a; 1: unloading along the stiffness', optional=.true., &
+    parameter_row_t('part', frictions(10), 'shape', '1', zero_to_one, 'a; 0.5: linear unloading', optional=.true., &
                     default=0.5_wp), &
     parameter_row_t('part', frictions(11), 'static_force', 'N', range_t(-1.0_wp, none_above), &
                     'F_s of g; the force if absent, never below it', optional=.true., default=-1.0_wp), &

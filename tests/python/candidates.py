@@ -9,8 +9,8 @@ from separatrix.discovery.decision.scoring import (
     ScoredCandidate,
 )
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import Free
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.options import Options
 
 COUNT = 20

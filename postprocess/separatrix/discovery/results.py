@@ -16,8 +16,8 @@ import numpy as np
 
 from separatrix.discovery.decision.verdict import Findings
 from separatrix.discovery.fitting.catalogue import within_barriers
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.wording import units_of, with_error
 from separatrix.errors import CANNOT_CREATE, SeparatrixError
 

@@ -14,9 +14,9 @@ from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.decision.verdict import Findings, verdict_of
 from separatrix.discovery.fitting.base import copy_noise, find_phases, fit_base, measure_noise
 from separatrix.discovery.fitting.data import Data, fit_stages
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import on_other_records, with_values
 from separatrix.discovery.fitting.observations import Observation, observation_of
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.time_limit import OutOfTimeError, TimeLimit, kept
 from separatrix.discovery.measured.records import Record, read_record, unique_names
 from separatrix.discovery.options import Options

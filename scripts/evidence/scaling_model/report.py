@@ -71,9 +71,9 @@ def remark(results: Results) -> str:
     if not busy(results):
         return ""
     return (
-        "**This machine was busy with other work: two simultaneous independent programs gained "
-        f"{ceiling(results, 2):.2f} x over one alone. The times of this run do not apply to two free cores; "
-        "the idle shares do.**\n\n"
+        "**This machine was busy with other work: two simultaneous independent programs reached "
+        f"{ceiling(results, 2):.2f} times\nthe rate of one alone. The times of this run do not apply to two "
+        "free cores; the idle shares do.**\n\n"
     )
 
 
@@ -283,7 +283,9 @@ def bar_table(results: Results) -> str:
         [
             f"the final file, of a run on {packing.RANKS} ranks",
             f"<= {100 * BAR_FINISH:.0f} %",
-            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points",
+            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points; simulated "
+            f"{number(simulation.MANY_RANKS)} ranks with writing and it: "
+            f"{percent(simulated.with_file[index])}",
             met[finish <= BAR_FINISH] if finish <= BAR_FINISH or not busy(results) else "machine busy",
         ],
         [

@@ -101,17 +101,17 @@ def test_the_entries_of_a_map_get_a_type(separatrix: Path, source_dir: Path, tmp
     assert (first["without_period"], entries) == (0, [])
 
 
-def test_ranks_share_the_entries_of_a_map(separatrix: Path, source_dir: Path, tmp_path: Path):
+def test_ranks_share_the_entries_of_a_map(mpi_separatrix: Path, source_dir: Path, tmp_path: Path):
     """Three slices with chaos, on two ranks and on one: the same lines, in the same order."""
     case = source_dir / "examples" / "validation" / "budd_dux.toml"
     axes = """axis=[{name='x0', from=-3, to=-0.1, count=4}, {name='v0', from=-2, to=2, count=4},
     {name='drive.ratio', from=2.79, to=2.81, count=3}]"""
     wanted = ("--set", "contact.upper=0.0", "--set", "attractors.sample=4", "--set", axes)
-    succeed(separatrix, "basin", case, *wanted, "-o", "map.h5", "-q", folder=tmp_path)
+    succeed(mpi_separatrix, "basin", case, *wanted, "-o", "map.h5", "-q", folder=tmp_path)
     asked = ("stability", "map.h5", "--periods", 400, "--json")
 
     def report(ranks: int) -> list[dict]:
-        lines = succeed(separatrix, *asked, folder=tmp_path, ranks=ranks).out.splitlines()
+        lines = succeed(mpi_separatrix, *asked, folder=tmp_path, ranks=ranks).out.splitlines()
         clocks = ("time", "seconds")
         return [
             {key: value for key, value in json.loads(line).items() if key not in clocks} for line in lines

@@ -11,9 +11,9 @@ from separatrix.discovery import Options, discover
 from separatrix.discovery.fitting.base import _follows_better, fit_base
 from separatrix.discovery.fitting.curves import begun_at, fit_member, knots_at, with_table
 from separatrix.discovery.fitting.data import gather, scales_of
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, friction_at
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.shapes import closed_forms, through
 from separatrix.discovery.fitting.smooth import function_of, roughness, smoothed
 from separatrix.discovery.measured.preflight import prepare

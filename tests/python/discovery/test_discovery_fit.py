@@ -26,6 +26,7 @@ from separatrix.discovery.fitting.base import measure_noise
 from separatrix.discovery.fitting.catalogue import names_of_body
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import blocking, minimise
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.noise import Noise
 from separatrix.discovery.fitting.normal_equations import (
@@ -34,7 +35,6 @@ from separatrix.discovery.fitting.normal_equations import (
     gauss_newton_step,
     inverse_scaled,
 )
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import project
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.measured.smoother import impact_table, smooth

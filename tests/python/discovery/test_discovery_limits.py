@@ -10,9 +10,9 @@ from program import CASE
 from separatrix.discovery.decision.experiments import d_primes, experiments
 from separatrix.discovery.decision.limits import detectable
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import Free, base_parameters
 from separatrix.discovery.fitting.one_body import BodyInMotion
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded

@@ -10,6 +10,7 @@ from program import CASE
 from separatrix.discovery.decision.where import where_maps
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import (
     base_parameters,
     drive_nuisances,
@@ -17,7 +18,6 @@ from separatrix.discovery.fitting.machine import (
     sensor_zeros,
 )
 from separatrix.discovery.fitting.one_body import BodyInMotion, flight_tolerance
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import Prepared, prepare
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.measured.segments import padded

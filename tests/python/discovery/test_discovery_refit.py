@@ -10,8 +10,8 @@ import pytest
 from separatrix.discovery.fitting import data as data_module
 from separatrix.discovery.fitting import refit
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.machine import IMPERFECTION, Free
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import FIT
 
 FREE = [Free("restoring.stiffness", 9.0), Free("effect.viscous.damping", 0.5, lower=0.0)]

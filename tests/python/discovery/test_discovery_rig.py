@@ -18,9 +18,9 @@ from separatrix.discovery.fitting.catalogue import candidate
 from separatrix.discovery.fitting.ceiling import ceiling
 from separatrix.discovery.fitting.data import gather, scales_of
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.fitted import Fitted, values_of
 from separatrix.discovery.fitting.heldout import Known, predict
 from separatrix.discovery.fitting.one_body import BodyInMotion
-from separatrix.discovery.fitting.refit import Fitted, values_of
 from separatrix.discovery.fitting.rig import (
     Contest,
     cleaned,

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import FIT, SEARCH
 from separatrix.errors import SeparatrixError
 

@@ -10,9 +10,9 @@ from separatrix.discovery.decision.scoring import ScoredCandidate, admissible, c
 from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.curves import fit_member, fits_machine, knots_at
+from separatrix.discovery.fitting.fitted import Fitted, gain_over
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.policy import FIT, SEARCH
 
 

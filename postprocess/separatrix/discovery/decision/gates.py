@@ -23,8 +23,8 @@ from separatrix.discovery.decision.scoring import (
     stable,
 )
 from separatrix.discovery.fitting.ceiling import ceiling
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.heldout import Prediction, gained_together
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import (
     share_with_imperfections,
     shares_with_imperfections,

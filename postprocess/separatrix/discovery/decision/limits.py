@@ -8,8 +8,8 @@ import numpy as np
 
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.fitting.catalogue import Candidate
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.joint_effects import effect_of
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.screen import screen, signature
 from separatrix.discovery.policy import SEARCH
 from separatrix.discovery.wording import unit_of

@@ -7,9 +7,9 @@ from scipy.signal import get_window
 
 from separatrix.discovery.decision.misfit import record_chi2
 from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.forces import force_needed
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH

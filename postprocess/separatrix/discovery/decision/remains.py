@@ -15,8 +15,8 @@ from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.heldout import Prediction
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import SEARCH
 
 

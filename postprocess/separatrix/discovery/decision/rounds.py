@@ -9,23 +9,14 @@ import numpy as np
 from separatrix.discovery.decision.scoring import ScoredCandidate, scored
 from separatrix.discovery.fitting.catalogue import ON_REQUEST, Candidate, Scales
 from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.fitted import Fitted, beaten, gain_over, leaves_noise
 from separatrix.discovery.fitting.halves import halves
 from separatrix.discovery.fitting.heldout import Known, Prediction, predict
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.locations import SensedScales
 from separatrix.discovery.fitting.machine import with_values
 from separatrix.discovery.fitting.normal_equations import solve_scaled
-from separatrix.discovery.fitting.refit import (
-    Fitted,
-    beaten,
-    carried_on,
-    crossed,
-    gain_over,
-    imitating,
-    leaves_noise,
-    refit,
-    rough_total,
-)
+from separatrix.discovery.fitting.refit import carried_on, crossed, imitating, refit, rough_total
 from separatrix.discovery.fitting.rig import cleaned, with_imperfections
 from separatrix.discovery.fitting.screen import Screened, Signature, project, screen, signature
 from separatrix.discovery.fitting.time_limit import TimeLimit

@@ -11,10 +11,10 @@ from scipy.stats import binom, chi2
 from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.fitting.ceiling import Ceiling
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.fitted import Fitted, gain_over
 from separatrix.discovery.fitting.heldout import Prediction, ahead, gained_together
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.locations import usual_speed
-from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.rig import share_with_imperfections
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH

@@ -17,10 +17,11 @@ from separatrix.discovery.decision.gates import (
 from separatrix.discovery.decision.remains import closed_share
 from separatrix.discovery.decision.rounds import Round, SearchContext, pair_gains, run_round
 from separatrix.discovery.decision.scoring import ScoredCandidate, admissible, beyond_doubt, scored
+from separatrix.discovery.fitting.fitted import Fitted, hopeless
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import candidate_of, effect_of
 from separatrix.discovery.fitting.machine import with_values
-from separatrix.discovery.fitting.refit import Fitted, hopeless, refit, warm_started_by
+from separatrix.discovery.fitting.refit import refit, warm_started_by
 from separatrix.discovery.fitting.screen import screen, signature
 from separatrix.discovery.policy import SEARCH
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from separatrix.discovery.decision.rounds import Round, SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.fitting.ceiling import Ceiling
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.smooth import Function
 
 

@@ -20,12 +20,12 @@ from separatrix.discovery.decision.table_range import within_tables
 from separatrix.discovery.decision.where import Map, sentences, where_maps
 from separatrix.discovery.fitting.curves import table_of
 from separatrix.discovery.fitting.data import Data
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.function_part import Part
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.machine import SENSOR_BIAS
 from separatrix.discovery.fitting.members import MEMBERS, friction_at
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import with_imperfections
 from separatrix.discovery.fitting.shapes import FORM_OF
 from separatrix.discovery.fitting.smooth import Function

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.joint_effects import effect_of
 from separatrix.discovery.fitting.normal_equations import inverse_scaled, solve_scaled
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.regions import (
     IMPACT_SPEED,
     LOW,

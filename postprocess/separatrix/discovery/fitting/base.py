@@ -6,10 +6,10 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, fit_stages
 from separatrix.discovery.fitting.fit import Fit, again, minimise
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.noise import noise_of
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import cleaned
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.policy import FIT

@@ -11,10 +11,10 @@ import numpy as np
 
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
+from separatrix.discovery.fitting.fitted import Fitted, beaten, values_of
 from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import Free
 from separatrix.discovery.fitting.members import MEMBERS, Member
-from separatrix.discovery.fitting.refit import Fitted, beaten, values_of
 from separatrix.discovery.fitting.shapes import through
 from separatrix.discovery.policy import FIT
 from separatrix.errors import SeparatrixError

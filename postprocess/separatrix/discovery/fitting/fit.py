@@ -214,6 +214,7 @@ class _Descent:
         self.current = problem.evaluate(self.values, starts) if begun is None else begun
         self.damping = FIT.fit_mild
         self.gain = self.before = self.decrement = 0.0
+        self.steps = 0
         # decrement of the step before, where the derivatives are those of an earlier point
         self.kept: float | None = None
 
@@ -223,9 +224,14 @@ class _Descent:
             self.current, self.kept = self.problem.evaluate(self.values, self.starts), None
 
     @property
-    def room(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest steps of the parameters."""
-        return self.lower - self.values, self.upper - self.values
+    def creeps(self) -> bool:
+        """Whether so many steps were needed that bounds and bends of the valley may be in their way."""
+        return self.steps > FIT.fit_creeps
+
+    @property
+    def room(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Lowest and highest steps of the parameters, where they are looked at in advance."""
+        return (self.lower - self.values, self.upper - self.values) if self.creeps else None
 
     def look(self, tolerance: float, rough: bool) -> bool:
         """Whether a further step promises more than `tolerance`."""
@@ -247,13 +253,15 @@ class _Descent:
 
     def step(self) -> bool:
         """Go a step that lowers the loss; false where none of any length does."""
+        self.steps += 1
         while True:
             while self.damping < FIT.fit_strongest:
                 start_step, step, promised = gauss_newton_step(
                     self.blocks, self.open, self.damping, self.room
                 )
                 trial = self._tried(start_step, step)
-                if self.kept is None and not (trial.lower and trial.gain > FIT.fit_bends * promised):
+                straight = trial.lower and trial.gain > FIT.fit_bends * promised
+                if self.creeps and self.kept is None and not straight:
                     trial = self._tried_along_a_curve(start_step, step, trial)
                 self.gain = trial.gain
                 if trial.lower:
@@ -351,7 +359,7 @@ def blocking(problem: Likelihood, values: np.ndarray, starts: np.ndarray) -> np.
     """Segments that lose more by a Gauss-Newton step than it promises in total, and so block it."""
     descent = _Descent(problem, values, starts, np.ones(values.size, bool), False, None)
     descent.look(0.0, rough=False)
-    start_step, step, promised = gauss_newton_step(descent.blocks, descent.open, FIT.fit_mild, descent.room)
+    start_step, step, promised = gauss_newton_step(descent.blocks, descent.open, FIT.fit_mild)
     tried = np.clip(descent.values + step, descent.lower, descent.upper)
     trial = problem.evaluate(tried, starts + start_step, derivatives=False)
     lost = _costs(trial, 1.0, robust=False) - _costs(descent.current, 1.0, robust=False)
@@ -377,7 +385,7 @@ def _finished(problem, values, starts, current, movable, iterations) -> Fit:
     upper = np.array([one.upper for one in problem.free])
     weights = _weights(current, robust=False)[0]
     blocks = blocks_of(current.by_start, current.by_parameter, current.residual, weights)
-    room = lower - values, upper - values
+    room = (lower - values, upper - values) if iterations > FIT.fit_creeps else None
     _, _, decrement = gauss_newton_step(blocks, _open(blocks, values, lower, upper, movable), room=room)
     at_bound = (values <= lower) | (values >= upper)
     reduced, _, _ = eliminate(blocks)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.members import Member
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import FIT
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import minimise
-from separatrix.discovery.fitting.refit import Fitted, gain_over
+from separatrix.discovery.fitting.fitted import Fitted, gain_over
 from separatrix.discovery.policy import FIT
 from separatrix.library import effects
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.motions import extensions
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import FIT
 from separatrix.library import effects
 

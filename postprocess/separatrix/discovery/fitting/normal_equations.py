@@ -152,7 +152,7 @@ def _within(
         left = np.full(step.size, np.inf)
         np.divide(ends - step, onward, out=left, where=onward != 0)
         share = max(0.0, left.min(initial=np.inf))
-        if share >= 1:
+        if not (share < 1 and np.isfinite(onward).all()):
             return step + onward
         out = left <= share
         step = np.where(out, ends, step + share * onward)

@@ -8,10 +8,10 @@ from typing import Protocol
 from separatrix.discovery.fitting.catalogue import Scales, names_of_body
 from separatrix.discovery.fitting.crank_data import CrankData
 from separatrix.discovery.fitting.data import Data, gather, scales_of
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.joint_effects import names_at_joints
 from separatrix.discovery.fitting.locations import SensedScales, location_scales
 from separatrix.discovery.fitting.motor_effects import names_with_motor
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.sensed import gather_sensed
 from separatrix.discovery.measured.bodies import (
     has_motor,

@@ -1,47 +1,26 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A candidate fitted with everything else free, from several starts; and two fits compared fairly."""
+"""A candidate fitted with everything else free, from several starts."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from separatrix.discovery.fitting.catalogue import Candidate
 from separatrix.discovery.fitting.data import Data, fit_stages, polished
 from separatrix.discovery.fitting.fit import Fit, blocking, minimise
+from separatrix.discovery.fitting.fitted import (
+    Fitted,
+    beaten,
+    gain_over,
+    hopeless,
+    leaves_noise,
+    shared_values,
+    values_of,
+)
 from separatrix.discovery.fitting.likelihood import Likelihood
-from separatrix.discovery.fitting.machine import Free
-from separatrix.discovery.fitting.normal_equations import inverse_scaled
 from separatrix.discovery.fitting.screen import Screened
 from separatrix.discovery.policy import FIT
-
-
-@dataclass
-class Fitted:
-    """A machine with all its free parameters at their best values."""
-
-    names: tuple[str, ...]
-    model: object
-    problem: Likelihood
-    fit: Fit
-    added: tuple[int, ...]
-    tries: int = 1
-    # the same function on more knots, where one was tried, converged or not
-    finer: "Fitted | None" = None
-    # squares by segment of the earlier stages, where they were asked for
-    short: dict[int, np.ndarray] = field(default_factory=dict)
-
-    @property
-    def unseen(self) -> np.ndarray:
-        """Which free parameters the records do not determine."""
-        return np.diag(self.fit.reduced.matrix[self.fit.good].sum(axis=0)) <= 0
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """Of all free parameters, starts projected out, enlarged where the fit is worse than the noise."""
-        matrix = self.fit.reduced.matrix[self.fit.good].sum(axis=0)
-        open_ = ~self.fit.at_bound & (np.diag(matrix) > 0)
-        return inverse_scaled(matrix, open_) * max(1.0, self.fit.reduced_chi2)
 
 
 def refit(
@@ -105,7 +84,7 @@ def refit(
             break
         if _enough(best, base, candidate, rival):
             break
-        if known is not None or ((quick or base.added) and tries == 2):
+        if known is not None or ((quick or base.added) and tries >= 2):
             # the other starts of a known fit were tried before
             break
     return _above_base(data, best, base, candidate)
@@ -151,14 +130,6 @@ def _nominal(values: np.ndarray, candidate: Candidate) -> np.ndarray:
     return np.where(np.isin(np.arange(values.size), candidate.added), values, nominal)
 
 
-def leaves_noise(rival: Fitted, base: Fitted) -> bool:
-    """Whether a machine leaves noise, or nearly so and next to nothing of a gap that was far larger."""
-    fit = rival.fit
-    if fit.like_noise(2):
-        return True
-    return fit.like_noise(FIT.nearly_noise) and fit.excess < FIT.nothing_left * base.fit.excess
-
-
 def rough_total(data: Data, base: Fitted, candidate: Candidate, screened: Screened) -> float:
     """Sum of squares after a few steps from the base, without the effect or, if it has no linear estimate,
     with its usual size.
@@ -201,11 +172,6 @@ def _enough(found: Fitted, base: Fitted, candidate: Candidate, rival: Fitted | N
     return closed and gain_over(found, rival)[0] < -2 * FIT.beaten
 
 
-def hopeless(base: Fitted) -> float:
-    """Reduced chi^2 from which on a candidate is abandoned."""
-    return FIT.hopeless * max(1.0, base.fit.reduced_chi2)
-
-
 def _above_base(data: Data, best: Fitted, base: Fitted, candidate: Candidate) -> Fitted:
     """The fit, or a better one from the base: a machine that contains the base cannot be worse.
 
@@ -228,12 +194,6 @@ def _absent(values: np.ndarray, candidate: Candidate) -> np.ndarray:
     values = values.copy()
     values[np.array(candidate.added)[candidate.linear]] = 0.0
     return values
-
-
-def beaten(one: Fitted, rival: Fitted) -> bool:
-    """Whether a fit is far behind even without the segments in which it is furthest behind."""
-    parts = np.sort(gain_over(one, rival)[1])
-    return bool(parts[FIT.spared :].sum() < -2 * FIT.beaten)
 
 
 def carried_on(data: Data, candidate: Candidate, known: Fitted, patient: bool = False) -> Fitted:
@@ -389,21 +349,6 @@ def _base_values(base: Fitted, candidate: Candidate) -> np.ndarray:
     return values_of(base, candidate.free)
 
 
-def shared_values(base: Fitted, other: Fitted) -> np.ndarray:
-    """Values of the base's parameters as another machine has them, its own where that has none."""
-    own = [replace(one, value=value) for one, value in zip(base.problem.free, base.fit.values, strict=True)]
-    return values_of(other, own)
-
-
-def values_of(fitted: Fitted, free: list[Free]) -> np.ndarray:
-    """Values of free parameters as a fitted machine has them, their own where it has none."""
-    known = {
-        (one.path, one.record): value
-        for one, value in zip(fitted.problem.free, fitted.fit.values, strict=True)
-    }
-    return np.array([known.get((one.path, one.record), one.value) for one in free])
-
-
 def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, np.ndarray]]:
     name = candidate.names[-1]
     lower = np.array([candidate.free[i].lower for i in candidate.added])
@@ -431,29 +376,3 @@ def _starts(candidate: Candidate, screened: Screened | None) -> list[tuple[str, 
     starts += [("near", start) for start in candidate.starts[1:2] if not candidate.linear.all()]
     starts += far[1:]
     return [(kind, np.clip(start, lower, upper)) for kind, start in starts]
-
-
-def common(one: Fitted, other: Fitted) -> np.ndarray:
-    """Segments that both fits can be scored by."""
-    return one.fit.good & other.fit.good
-
-
-def gain_over(one: Fitted, other: Fitted) -> tuple[float, np.ndarray]:
-    """Log-likelihood of `one` over that of `other`, and its parts by segment.
-
-    A segment that one of them simulates without steady impacts could not be fitted: its chi^2 is an upper
-    bound, which counts as far as it favours that one.
-    """
-    parts = 0.5 * (other.fit.chi2 - one.fit.chi2)
-    proven = [
-        _bounded_by(one) & other.fit.good & (parts > 0),
-        one.fit.good & _bounded_by(other) & (parts < 0),
-    ]
-    parts = np.where(common(one, other) | proven[0] | proven[1], parts, 0.0)
-    return float(parts.sum()), parts
-
-
-def _bounded_by(fitted: Fitted) -> np.ndarray:
-    """Segments that are simulated to their end, but without steady impacts."""
-    evaluation = fitted.fit.evaluation
-    return ~evaluation.failed & ~evaluation.steady & (fitted.fit.counts > 0)

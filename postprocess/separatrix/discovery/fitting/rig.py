@@ -14,11 +14,11 @@ import numpy as np
 
 from separatrix.discovery.fitting.evaluation import Evaluation
 from separatrix.discovery.fitting.fit import Fit
+from separatrix.discovery.fitting.fitted import Fitted, common
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.fitting.machine import IMPERFECTION, Free
 from separatrix.discovery.fitting.normal_equations import blocks_of, eliminate, inverse_scaled, solve_scaled
-from separatrix.discovery.fitting.refit import Fitted, common
 from separatrix.discovery.policy import FIT
 
 

@@ -22,10 +22,10 @@ from separatrix.discovery.fitting.curves import (
 )
 from separatrix.discovery.fitting.data import Data, polished
 from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.fitted import Fitted, gain_over
 from separatrix.discovery.fitting.function_part import Part, misfit_rows, series_part
 from separatrix.discovery.fitting.members import Member, friction_at
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
-from separatrix.discovery.fitting.refit import Fitted, gain_over
 from separatrix.discovery.fitting.shapes import FORM_OF, closed_forms
 from separatrix.discovery.fitting.spline import roughness, smoothed
 from separatrix.discovery.policy import FIT

@@ -75,6 +75,8 @@ class Fit:
     fit_as_promised: float = row(0.25, "1", "campaign",
         "error of a promised gain up to which derivatives are kept")
     fit_falls: float = row(10.0, "1", "campaign", "fall of the decrement for that")
+    fit_creeps: int = row(12, "1", "campaign",
+        "steps after which a fit looks at bounds in advance and follows bent valleys")
     fit_bends: float = row(0.5, "1", "campaign",
         "share of its promise up to which a step is tried along a curve too")
     fit_curve_share: float = row(0.1, "1", "rounding",

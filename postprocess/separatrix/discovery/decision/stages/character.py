@@ -14,11 +14,11 @@ import numpy as np
 from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import family_wise
 from separatrix.discovery.decision.state import Decision, SearchState
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.hypotheses import Hypothesis, Motion
 from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.fitting.normal_equations import inverse_scaled
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.policy import SEARCH
 
 

@@ -30,7 +30,7 @@ from separatrix.discovery.decision.scoring import (
 from separatrix.discovery.decision.several import fit_set, over_base, without
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.ceiling import ceiling
-from separatrix.discovery.fitting.refit import Fitted
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.options import Options
 from separatrix.discovery.policy import SEARCH
 

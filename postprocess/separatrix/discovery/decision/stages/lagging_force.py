@@ -11,8 +11,8 @@ import numpy as np
 
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.curves import fit_member
+from separatrix.discovery.fitting.fitted import Fitted, gain_over, values_of
 from separatrix.discovery.fitting.members import MEMBERS
-from separatrix.discovery.fitting.refit import Fitted, gain_over, values_of
 from separatrix.discovery.policy import SEARCH
 
 _STIFFNESS = "restoring.stiffness"

@@ -12,7 +12,7 @@ from separatrix.discovery.decision.state import Choice, SearchState
 from separatrix.discovery.fitting.base import copy_noise, limit_noise, renew_noise
 from separatrix.discovery.fitting.ceiling import Ceiling, ceiling
 from separatrix.discovery.fitting.fit import minimise
-from separatrix.discovery.fitting.refit import Fitted, shared_values
+from separatrix.discovery.fitting.fitted import Fitted, shared_values
 from separatrix.discovery.policy import SEARCH
 
 

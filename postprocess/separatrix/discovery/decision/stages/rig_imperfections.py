@@ -15,9 +15,9 @@ from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.decision.state import Decision, SearchState
 from separatrix.discovery.fitting.fit import Fit, minimise
+from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.heldout import Prediction
 from separatrix.discovery.fitting.likelihood import Likelihood
-from separatrix.discovery.fitting.refit import Fitted
 from separatrix.discovery.fitting.rig import (
     as_nuisances,
     imperfections_of,
