@@ -62,7 +62,9 @@ def searched(separatrix, folder, text: str) -> dict[str, np.ndarray]:
 
 
 # The force of the spring is at most 20/(3 sqrt(3)) N = 3.849 N between the wells.
-@pytest.mark.parametrize(("force", "sets"), [(0.5, 3), (3.8, 3), (3.9, 1)])
+@pytest.mark.parametrize(
+    ("force", "sets"), [pytest.param(0.5, 3, marks=pytest.mark.long), (3.8, 3), (3.9, 1)]
+)
 def test_friction_holds_a_body_in_each_well_and_between(separatrix, tmp_path, force, sets):
     found = searched(separatrix, tmp_path, WELLS.format(force=force))
     assert len(found["x"]) == sets

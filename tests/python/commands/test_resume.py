@@ -112,7 +112,7 @@ def test_a_killed_run_goes_on(mpi_separatrix, tmp_path, reference, ranks):
     finish(mpi_separatrix, tmp_path, reference, 2 - ranks)
 
 
-@pytest.mark.parametrize("stops", [["0.000001"], ["0.5", "0.6"]])
+@pytest.mark.parametrize("stops", [pytest.param(["0.000001"], marks=pytest.mark.long), ["0.5", "0.6"]])
 def test_a_run_can_be_stopped_again_and_again(separatrix, tmp_path, reference, stops):
     write_case(tmp_path)
     before = 0

@@ -141,7 +141,9 @@ def test_regimes_along_a_sweep(separatrix, source_dir, tmp_path):
     ("example", "names"),
     [
         ("pair_free", ["history", "energy", "phase"]),
-        ("contact_hunt_crossley", ["history", "energy", "contact", "phase"]),
+        pytest.param(
+            "contact_hunt_crossley", ["history", "energy", "contact", "phase"], marks=pytest.mark.long
+        ),
     ],
 )
 def test_figures_are_written(separatrix, source_dir, tmp_path, example, names):

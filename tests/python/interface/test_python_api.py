@@ -317,7 +317,12 @@ result.to_netcdf(sys.argv[4], engine="h5netcdf")
 
 
 @pytest.mark.parametrize(
-    "options", ["{'threads': 2}", pytest.param("{'workers': 1}", marks=pytest.mark.long), "{'workers': 2}"]
+    "options",
+    [
+        pytest.param("{'threads': 2}", marks=pytest.mark.long),
+        pytest.param("{'workers': 1}", marks=pytest.mark.long),
+        "{'workers': 2}",
+    ],
 )
 def test_an_interrupt_stops_and_resume_goes_on(case: sx.Case, tmp_path: Path, options: str) -> None:
     """Ctrl-C as a terminal sends it; the resumed result is that of a run that was not stopped."""

@@ -56,7 +56,7 @@ def model_of(law: str, drive: str, stop: str = "newton", contact: str = RIGID, h
     ("backlash_pair", SINE),
     ("friction_pair", SINE, "kelvin_voigt_restitution", SOFT),
     ("backlash_pair", PID),
-    ("backlash_pair", FORCE, "hunt_crossley_exact", SOFT),
+    pytest.param(("backlash_pair", FORCE, "hunt_crossley_exact", SOFT), marks=pytest.mark.long),
 ], ids=["force", "hammer", "shaken", "soft", "controller", "soft-carried"])  # fmt: skip
 def test_a_pair_that_is_written_out_moves_like_the_pair(model: tuple[str, ...]) -> None:
     pair = model_of(*model)

@@ -34,8 +34,10 @@ HEAVY = {
     "parameters",
     "reasons",
     "structure",
+    "studies",
     "sweep",
     "through-resonance",
+    "two-bodies",
 }
 """Pages that take longest."""
 RUN = [pytest.param(page, marks=[pytest.mark.long] if page.stem in HEAVY else []) for page in TEACHING]
