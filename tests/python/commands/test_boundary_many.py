@@ -45,6 +45,7 @@ def woven(separatrix: Path, tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_every_point_is_known_to_1e_10_and_has_the_labels_of_its_piece(separatrix, woven):
     with open_result(woven) as result:
         across, error = result["across"].values, result["error"].values
@@ -64,6 +65,7 @@ def test_every_point_is_known_to_1e_10_and_has_the_labels_of_its_piece(separatri
     assert "30 points run again: 0 differ from the file" in ended.stdout, ended.stderr
 
 
+@pytest.mark.long
 def test_a_motion_from_a_named_point_comes_to_its_saddle(woven):
     with open_result(woven) as result:
         names, numbers = decode_flags(result["name"]).values, result["saddle"].values

@@ -237,6 +237,7 @@ def test_harmonics_of_the_drive_are_found_as_a_function():
     assert np.max(np.abs(value - right)) < 2e-4
 
 
+@pytest.mark.long
 def test_three_effects_are_found_one_by_one():
     without = base(upper=0.6, amplitude=0.2)
     true = without.with_effect("quadratic_drag", {"coefficient": 0.06})

@@ -251,6 +251,7 @@ def test_the_record_that_a_set_asks_for_is_made_and_asked_with(campaign, source_
     assert (again / "page.md").read_text() == page
 
 
+@pytest.mark.long
 def test_another_truth_than_the_sealed_one_is_noticed(campaign, source_dir, tmp_path):
     assert start(source_dir, tmp_path, 0.0).wait(timeout=300) == 0
     sealed = tmp_path / "out" / f"seed_{SEED}" / "sealed" / "0001.json"

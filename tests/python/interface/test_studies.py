@@ -112,6 +112,7 @@ def test_a_film_has_the_frames_of_its_time(case, tmp_path):
         assert np.abs(np.asarray(film.convert("L"), float) - first).mean() > 0.2
 
 
+@pytest.mark.long
 def test_a_film_of_several_bodies_and_of_an_angle(separatrix, library, source_dir, tmp_path, monkeypatch):
     monkeypatch.setenv("SEPARATRIX_PROGRAM", str(separatrix))
     for name in ("structure_impact_damper", "basin_pendulum"):

@@ -27,6 +27,8 @@ HEAVY = {
     "compare",
     "duffing",
     "figures",
+    "noise",
+    "friction",
     "measures",
     "motor",
     "oscillator",
@@ -99,7 +101,19 @@ def test_every_picture_of_the_gallery_is_there() -> None:
     assert scripts == {path.stem for path in (DOCS / "gallery").glob("*.txt")}
 
 
-@pytest.mark.parametrize("options", [["--no-fortran"], pytest.param([], marks=pytest.mark.long)])
+def test_the_pages_of_reference_and_gallery_are_those_of_the_program(
+    build_dir: Path, separatrix: Path, library: Path
+) -> None:
+    """`scripts/docs --pages` changes nothing."""
+    made = [*(DOCS / "reference").glob("*.md"), *(DOCS / "gallery").glob("*.md")]
+    kept = {path: path.read_text() for path in made}
+    command = [sys.executable, DOCS.parent / "scripts" / "docs", "--pages", "--build", build_dir]
+    subprocess.run(command, capture_output=True, text=True, check=True)
+    assert [path.name for path in made if path.read_text() != kept[path]] == [], "scripts/docs --pages"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("options", [["--no-fortran"], []])
 def test_the_site_builds_without_a_warning(
     options: list[str], build_dir: Path, separatrix: Path, library: Path, tmp_path: Path
 ) -> None:
