@@ -18,6 +18,9 @@ from types import SimpleNamespace
 import pytest
 from separatrix.library import effects
 
+pytestmark = pytest.mark.long
+"""Pages of evidence, which change with their scripts alone."""
+
 CASES = 3
 SEED = 3
 # what discovery answers in the campaigns of these tests, which are about the campaign

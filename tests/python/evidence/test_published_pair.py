@@ -7,6 +7,9 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.long
+"""Pages of evidence, which change with their scripts alone."""
+
 # the contacts are in tests/integrator/test_contact_flight.pf, and take longer here
 SECTIONS = ("pair", "impacts", "books", "hard")
 

@@ -9,6 +9,9 @@ import sys
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.long
+"""Pages of evidence, which change with their scripts alone."""
+
 
 @pytest.fixture(scope="module")
 def rows(source_dir):
