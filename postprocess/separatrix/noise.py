@@ -63,7 +63,7 @@ def noisy(
     motions
         How many, each with random numbers of its own.
     intensity
-        I of a white random force F [N^2 s]: <F(t) F(t')> = I delta(t - t'). It acts as a kick at
+        I [N^2 s] of a white random force F: <F(t) F(t')> = I delta(t - t'). It acts as a kick at
         the end of each `step`, normally distributed with the variance I step / m^2.
     impulses
         (rate [1/s], deviation [m/s]): changes of velocity at the instants of a Poisson process, normally

@@ -50,7 +50,8 @@ int64_t separatrix_compress(const void *bytes, int64_t size, int level, void *ou
   return compress2(out, &length, bytes, (uLong)size, level) == Z_OK ? (int64_t)length : -1;
 }
 
-#ifdef __GNUC__
+#if defined(__GNUC__) && !defined(__clang__)
+#define VECTORS
 enum { lanes = 16 };
 typedef unsigned char vector __attribute__((vector_size(lanes)));
 
@@ -93,7 +94,7 @@ static inline int64_t shuffle(const unsigned char *restrict bytes, int64_t value
 /* The first bytes of all values, then the second ones and so on; values of `width` bytes. */
 void separatrix_shuffle(const unsigned char *bytes, int64_t values, int width, unsigned char *out) {
   int64_t done = 0;
-#ifdef __GNUC__
+#ifdef VECTORS
   if (width == 4)
     done = shuffle(bytes, values, 4, out);
   else if (width == 8)

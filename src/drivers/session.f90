@@ -18,13 +18,13 @@ module session
   use h5, only: h5_read_alignment
   use journal, only: journal_t, json_text
   use lane_gpu, only: use_gpu
+  use launched_team, only: start_launched_team
   use launcher, only: launched_ranks
   use map_schema, only: schema_t
   use output_check, only: check_create, check_result, check_resume, check_table, working_path
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
   use restoring_law, only: position_is_angle
-  use serial_team, only: serial_team_t
   use signals, only: ignore_file_limit, install_signals, set_farewell, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
   use stop_check, only: limit_time
@@ -78,11 +78,7 @@ contains
     integer :: bytes
     session%command = command
     session%alone = launched_ranks() == 1
-    if (session%alone) then
-      allocate (serial_team_t :: session%team)
-    else
-      call start_team(session%team)
-    end if
+    call start_launched_team(session%team)
     call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     call session%stop_if(error)

@@ -13,12 +13,10 @@ module stability_of_map
   use grid, only: grid_t, point_laws, point_start
   use journal, only: journal_t, json_number, json_text
   use kinds, only: int64, wp
-  use launcher, only: launched_ranks
+  use launched_team, only: start_launched_team
   use machine_family, only: machine_neighbourhood
   use map_entries, only: entry_t, read_entries
   use more_periods, only: periods_needed, test_is_open
-  use parallel, only: start_team
-  use serial_team, only: serial_team_t
   use status, only: exit_usage, is_given_up, reason_left_domain, reason_name
   use structure_exponents, only: exponents_of_machine
   use team, only: team_t
@@ -61,11 +59,7 @@ contains
     if (size(command%overrides) > 0) call fail(error, exit_usage, '--set belongs to a case: stability takes that of its map')
     if (len(command%draw) > 0) call fail(error, exit_usage, '--draw belongs to a case: stability MAP draws none')
     if (allocated(error)) return
-    if (launched_ranks() == 1) then
-      allocate (serial_team_t :: team)
-    else
-      call start_team(team)
-    end if
+    call start_launched_team(team)
     call journal%open(team%is_root(), command%json, command%quiet)
     call journal%open_copy(command%log, error)
     call team%agree(error)

@@ -14,13 +14,12 @@ module stored_map
   use h5, only: h5_read_alignment
   use journal, only: journal_t
   use kinds, only: int64, wp
+  use launched_team, only: start_launched_team
   use launcher, only: launched_ranks
   use map_reader, only: open_final, reader_t
   use map_verify, only: probe_file, verify_file
-  use parallel, only: start_team
   use refinement, only: origin_contradicted
   use second_look, only: recall_second_look
-  use serial_team, only: serial_team_t
   use session, only: session_t
   use signals, only: ignore_file_limit
   use start_label, only: label_left_domain
@@ -46,11 +45,7 @@ contains
     character(len=128) :: no_overrides(0)
     session%command = command
     session%alone = launched_ranks() == 1
-    if (session%alone) then
-      allocate (serial_team_t :: session%team)
-    else
-      call start_team(session%team)
-    end if
+    call start_launched_team(session%team)
     call session%journal%open(session%team%is_root(), command%json, command%quiet, command%progress)
     call session%journal%open_copy(command%log, error)
     if (.not. allocated(error)) call ignore_file_limit(error)

@@ -88,7 +88,7 @@ module scheduler
 
 contains
 
-  !> Whether a signal came or the time is over.
+  !> Whether a signal came or the time is over; that is noticed here, so that no timer has to end the process.
   logical function stop_is_due(self)
     class(scheduler_t), intent(in) :: self
     stop_is_due = signal_count() > 0

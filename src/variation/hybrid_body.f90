@@ -16,7 +16,7 @@ module hybrid_body
   implicit none
   private
 
-  public :: event_of_section, guard_of_body, jump_of_body, rests_on_barrier
+  public :: event_of_section, guard_of_body, jump_of_body, no_jump, rests_on_barrier
 
   !> How far a force may be from what releases the body, in sizes, for its instant to follow from it: a force that jumps releases it
   !> at another one.
@@ -161,13 +161,7 @@ contains
     type(event_t), intent(in) :: event
     real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
-    integer :: k
-    by_time = 0
-    by_state = 0
-    do k = 1, self%n
-      by_state(k, k) = 1
-    end do
-    after = y
+    call no_jump(y, after, by_state, by_time)
     associate (v_of => self%positions + 1)
       select case (event%kind)
       case (event_impact_upper, event_impact_lower)
@@ -188,6 +182,19 @@ contains
       after(1) = merge(self%upper, self%lower, event%after == mode_upper_barrier)
     end if
   end subroutine jump_of_body
+
+  !> A state that goes on as it is, and its derivatives.
+  pure subroutine no_jump(y, after, by_state, by_time)
+    real(wp), intent(in) :: y(:)
+    real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
+    integer :: k
+    after = y
+    by_time = 0
+    by_state = 0
+    do k = 1, size(y)
+      by_state(k, k) = 1
+    end do
+  end subroutine no_jump
 
   pure subroutine begin_body(self, point, section, ok)
     class(hybrid_body_t), intent(in) :: self

@@ -18,7 +18,7 @@ module motor_body
   use motor_now, only: parameters_now
   use motor_rest, only: slips
   use motor_state, only: motor_state_t
-  use hybrid_body, only: event_of_section, guard_of_body, jump_of_body, rests_on_barrier, hybrid_body_t
+  use hybrid_body, only: event_of_section, guard_of_body, hybrid_body_t, jump_of_body, no_jump, rests_on_barrier
   use tape_value, only: evaluate
   implicit none
   private
@@ -150,8 +150,8 @@ contains
     real(wp), intent(out), optional :: flight(:, :)
     real(wp) :: z(self%n), slopes(self%n, self%n), sizes(self%n)
     integer :: k
-    associate (flow => self%flows(merge(1, 2, slips(mode))), order => self%order)
-      k = merge(1, 2, slips(mode))
+    k = merge(1, 2, slips(mode))
+    associate (flow => self%flows(k), order => self%order)
       y1 = self%at_rest(mode, y0)
       z(order) = y1
       sizes(order) = self%size_of
@@ -216,17 +216,11 @@ contains
     type(event_t), intent(in) :: event
     real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
-    integer :: k
     if (event%guard /= turns_round) then
       call jump_of_body(self, event, t, y, after, by_state, by_time)
       return
     end if
-    by_time = 0
-    by_state = 0
-    do k = 1, self%n
-      by_state(k, k) = 1
-    end do
-    after = y
+    call no_jump(y, after, by_state, by_time)
     after(angle_of) = y(angle_of) - sign(two_pi, y(speed_of))
   end subroutine jump_of_motor
 

@@ -99,7 +99,7 @@ contains
     real(wp), intent(in) :: z(:), parameters(:)
     integer, intent(in) :: direction
     integer :: branches(size(flow%tape%switches)), zeros(size(flow%plain%tape%switches)), faults(flow%tape%count), own
-    real(wp) :: all(size(flow%states)), value(flow%tape%count)
+    real(wp) :: whole(size(flow%states)), value(flow%tape%count)
     logical :: fits
     own = size(zeros)
     call choose_branches(flow%plain, z, parameters, branches(:own), zeros, fits)
@@ -107,9 +107,9 @@ contains
     if (direction < 0) where (zeros > 0 .and. modulo(zeros, 2) == 1) branches(:own) = -branches(:own)
     if (size(branches) == own) return
     ! Derivatives of powers have switches of their own.
-    all = 0
-    all(:flow%n) = z
-    call evaluate(flow%tape, all, parameters, value, faults)
+    whole = 0
+    whole(:flow%n) = z
+    call evaluate(flow%tape, whole, parameters, value, faults)
     branches(own + 1:) = merge(1, -1, value(flow%tape%switches(own + 1:)%argument) >= 0)
   end function branches_at
 

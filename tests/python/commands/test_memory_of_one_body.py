@@ -15,14 +15,7 @@ LAWS = {
     "lugre": ("static_force = 1.5\nstribeck_velocity = 0.05\nbristle_damping = 3\ndamping = 0.1", ""),
 }
 FRICTION = 'law = "{law}"\nvelocity = 0.1\nstiffness = 100\nforce = 1\n'
-ONE = """
-[body]
-mass = 1
-[restoring]
-law = "linear"
-stiffness = 2
-[drive]
-law = "force"
+MOTION = """\
 amplitude = 1.5
 frequency = 1.1
 [start]
@@ -30,9 +23,18 @@ v0 = 0.3
 [run]
 duration = 6
 average = "window"
-[friction]
 """
-PARTS = """
+ONE = f"""
+[body]
+mass = 1
+[restoring]
+law = "linear"
+stiffness = 2
+[drive]
+law = "force"
+{MOTION}[friction]
+"""
+PARTS = f"""
 [body.m]
 mass = 1
 [spring.k]
@@ -41,14 +43,7 @@ stiffness = 2
 [drive.f]
 law = "force"
 body = "m"
-amplitude = 1.5
-frequency = 1.1
-[start]
-v0 = 0.3
-[run]
-duration = 6
-average = "window"
-[friction.f]
+{MOTION}[friction.f]
 between = ["m"]
 """
 PENDULUM = """
