@@ -53,6 +53,9 @@ _LAW_NAMES = {
     "viscous": "viscous",
     "coulomb_viscous": "Coulomb-viscous",
     "coulomb_stribeck": "Coulomb-Stribeck",
+    "dahl": "Dahl",
+    "bouc_wen": "Bouc-Wen",
+    "lugre": "LuGre",
 }
 _OF_ROTATION = {
     "kg": "kg m^2", "m": "rad", "m/s": "rad/s", "N": "N m", "N/m": "N m", "N s/m": "N m s",

@@ -61,6 +61,22 @@ def test_captions_use_the_symbols_of_the_documents_and_name_every_unit(library: 
         assert absent not in caption
 
 
+@pytest.mark.parametrize(("law", "name"), [("dahl", "Dahl"), ("bouc_wen", "Bouc-Wen"), ("lugre", "LuGre")])
+def test_friction_with_memory_has_the_name_of_its_authors(law: str, name: str, library: Path) -> None:
+    friction = {"law": law, "stiffness": 100, "force": 1}
+    case = sx.Case.from_dict(
+        {
+            "body": {"mass": 0.5},
+            "restoring": {"law": "linear", "stiffness": 200},
+            "friction": friction
+            | ({"static_force": 1.5, "stribeck_velocity": 0.1} if law == "lugre" else {}),
+            "start": {"v0": 1},
+            "run": {"duration": 1.0},
+        }
+    )
+    assert f"{name} friction" in sx.trajectory(case).separatrix.plot("phase").separatrix_caption
+
+
 def test_a_caption_describes_a_measured_force_by_its_samples(library: Path) -> None:
     """How many, of what size, how often, with units; those of a pendulum are a torque."""
     force = (2.0 * np.cos(2 * np.pi * np.arange(40) / 40)).tolist()
