@@ -21,10 +21,10 @@ module stored_map
   use refinement, only: origin_contradicted
   use second_look, only: recall_second_look
   use session, only: session_t
-  use signals, only: ignore_file_limit
+  use signals, only: ignore_file_limit, set_farewell
   use start_label, only: label_left_domain
   use status, only: exit_bad_case, exit_io, exit_resumable, reason_left_domain
-  use stop_check, only: limit_time
+  use stop_check, only: limit_time, nothing_kept
   use team, only: team_t
   implicit none
   private
@@ -50,6 +50,7 @@ contains
     call session%journal%open_copy(command%log, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call h5_read_alignment(bytes, error)
+    call set_farewell('stopped while the map was read; '//nothing_kept)
     if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     call session%stop_if(error)
     if (session%team%is_root()) call check_map_file(command%path, session%alone, error)

@@ -23,7 +23,7 @@ module tiled_run
   use session, only: session_t
   use shard, only: in_shard
   use spread_order, only: new_spread_order, spread_order_t
-  use signals, only: end_time_limit, set_farewell
+  use signals, only: end_time_limit, notice_stop, set_farewell
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
@@ -153,6 +153,7 @@ contains
       computed = computed + 1
     end do
     call end_time_limit()
+    if (scheduler%stop_requested()) call notice_stop()
     call file%flush(error)
     call session%abort_if(error)
     if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
