@@ -17,7 +17,7 @@ module stored_map
   use launched_team, only: start_launched_team
   use launcher, only: launched_ranks
   use map_reader, only: open_final, reader_t
-  use map_verify, only: probe_file, verify_file
+  use map_verify, only: probe_file, verify_file, verify_plain
   use refinement, only: origin_contradicted
   use second_look, only: recall_second_look
   use session, only: session_t
@@ -81,6 +81,8 @@ contains
     call reader%text_attribute('/', 'kind', kind, error)
     if (.not. allocated(error)) call reader%number_attribute('/', 'complete', complete, error)
     call reader%close(ignored)
+    ! A damaged attribute is no kind of file.
+    if (.not. allocated(error) .and. (kind /= 'basin' .or. nint(complete) /= 1)) call verify_plain(path, error)
     if (allocated(error)) return
     if (kind /= 'basin') then
       call fail(error, exit_bad_case, "'"//path//"': found a file of the kind '"//kind//"', allowed a map that basin wrote")

@@ -98,5 +98,5 @@ def test_the_timer_is_that_of_what_is_due(program) -> None:
         assert end_of(program, number) == (0, str(seconds), ""), words
 
 
-def test_the_end_is_told_while_standard_error_is_silent(program) -> None:
+def test_the_end_is_reported_while_standard_error_is_silent(program) -> None:
     assert end_of(program, len(TIMERS)) == (75, "", "separatrix: two\n")

@@ -238,7 +238,7 @@ def test_the_time_limit_within_one_long_trajectory(mpi_separatrix, tmp_path, lon
 @pytest.mark.long
 @pytest.mark.parametrize("more", [[], ["--resume"]])
 def test_the_time_limit_while_a_map_is_read(separatrix, faulty_calls, reference, tmp_path, more):
-    """The command says what it did not come to, also while HDF5 is silent."""
+    """The command reports what it did not come to, also while HDF5 is silent."""
     slow = {
         "LD_PRELOAD": str(faulty_calls),
         "FAULT_NAME": reference.name,
