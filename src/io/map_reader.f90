@@ -65,7 +65,8 @@ contains
     if (.not. allocated(error)) call check_version(reader, error)
   end subroutine open_final
 
-  !> What to call a file without the attribute that distinguishes a result: damaged where it has the provenance of one, or cannot be read.
+  !> What to call a file without the attribute that distinguishes a result: damaged where it has the provenance of one, or cannot
+  !> be read.
   subroutine check_foreign(reader, error)
     type(reader_t), intent(in) :: reader
     type(error_t), allocatable, intent(out) :: error

@@ -70,14 +70,17 @@ contains
     integer :: unit, status
     character(len=256) :: message
     open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=status, iomsg=message)
+    found = 0
+    header = 0
+    if (status == 0) then
+      inquire (unit=unit, size=found)
+      read (unit, iostat=status, iomsg=message) header(:min(found, int(superblock_bytes, int64)))
+      close (unit)
+    end if
     if (status /= 0) then
       text = "'"//path//"' cannot be read: "//trim(message)
       return
     end if
-    inquire (unit=unit, size=found)
-    header = 0
-    read (unit, iostat=status) header(:min(found, int(superblock_bytes, int64)))
-    close (unit)
     expected = stated_bytes(header(:min(found, int(superblock_bytes, int64))))
     if (expected > found) then
       text = "'"//path//"' is cut: "//to_text(found)//' of '//to_text(expected)//' bytes are left'

@@ -214,7 +214,7 @@ def test_the_package_calls_damage_damage(final, tmp_path, amount, figures):
     copy = tmp_path / "copy.h5"
     written = [i for i in range(len(original)) if original[i]]
     refused = 0
-    for _ in range(amount(60, 400)):
+    for _ in range(amount(8, 400)):
         copy.write_bytes(original)
         flip(copy, chance.choice(written), chance.randrange(8))
         try:

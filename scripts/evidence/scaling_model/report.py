@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import datetime
 import os
+import re
 import statistics
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -180,9 +182,29 @@ def seconds(value: float) -> str:
     return f"{value:.2g} s"
 
 
-def jobs_section(
-    jobs: dict[int, list[float]], mean: float, before: float, found: packing.Packing, version: dict[str, str]
-) -> str:
+@dataclass
+class KeptJobs:
+    """What a page states of whole jobs."""
+
+    start: float
+    search: float
+    mean: float
+    jobs: dict[int, list[float]]
+    made: str
+
+
+def jobs_made(found: packing.Packing, version: dict[str, str]) -> str:
+    """Return what the table of whole jobs was made from, without the search."""
+    return (
+        f"Obtained with commit {version['commit']}: final file "
+        f"{1000 * found.fixed:.0f} ms, {1e9 * found.alone_per_point:.1f} ns of rank 0 alone for each point, "
+        f"{1e9 * found.shared_per_point:.0f} ns\nfor each point that a rank packs. The final file of "
+        f"{number(found.runs[-1][0].points)} points took {percent(found.middle(-1, 'share'))} of the run on "
+        f"{packing.RANKS} ranks."
+    )
+
+
+def jobs_section(jobs: dict[int, list[float]], mean: float, before: simulation.Before, made: str) -> str:
     """Return the table of whole jobs with what it was made from."""
     means = (mean, *simulation.JOB_TILE_SECONDS)
     header = ["mean time of a tile (of the tiles of a rank)"]
@@ -198,14 +220,45 @@ def jobs_section(
         f"* {number(ranks)} ranks: {reached(jobs[ranks], bar, means)}"
         for ranks, bar in simulation.JOB_RANKS.items()
     ]
-    made = (
-        f"Obtained with commit {version['commit']}: start and search {before:.1f} s; final file "
-        f"{1000 * found.fixed:.0f} ms, {1e9 * found.alone_per_point:.1f} ns of rank 0 alone for each point, "
-        f"{1e9 * found.shared_per_point:.0f} ns\nfor each point that a rank packs. The final file of "
-        f"{number(found.runs[-1][0].points)} points took {percent(found.middle(-1, 'share'))} of the run on "
-        f"{packing.RANKS} ranks."
+    search, points = before.search, before.ranks_points
+    taken = (
+        f"Start {before.start:.2f} s; search {search.seconds(points):.2f} s: {search.per_rank(points):.1f} slices "
+        f"for each rank, {search.whole / search.slices:.3f} s each in the mean,\n"
+        f"and {search.longest:.2f} s for the slice that takes longest (commit {before.commit})."
     )
-    return "\n".join([JOBS_BEGIN, made, "", table(header, rows), "", *lines, JOBS_END])
+    return "\n".join([JOBS_BEGIN, made, "", taken, "", table(header, rows), "", *lines, JOBS_END])
+
+
+def read_jobs(page: str) -> KeptJobs:
+    """Read the section on whole jobs of a page, whose efficiencies have one digit."""
+    section = page.split(JOBS_BEGIN)[1].split(JOBS_END)[0]
+    made = section[: section.index("Start ")].strip()
+    start, search = (float(value) for value in re.findall(r"(?:Start|search) ([\d.]+) s", section))
+    rows = re.findall(r"^\| ([\d.]+) s \(.*?\) \|(.*)\|$", section, re.MULTILINE)
+    columns = zip(
+        *([float(value.strip(" %")) / 100 for value in row.split("|")] for _, row in rows), strict=True
+    )
+    jobs = dict(zip(simulation.JOB_RANKS, map(list, columns), strict=True))
+    return KeptJobs(start, search, float(rows[0][0]), jobs, made)
+
+
+def with_jobs_at_top(page: str) -> str:
+    """Return a page whose first table has the rows of whole jobs that its section on them gives."""
+    kept = read_jobs(page)
+    means = (kept.mean, *simulation.JOB_TILE_SECONDS)
+    rows = []
+    for ranks, bar in list(simulation.JOB_RANKS.items())[1:]:
+        line = kept.jobs[ranks]
+        last = means[-1] * simulation.USUAL
+        rows.append(
+            f"| simulated whole job on {number(ranks)} ranks: start, search, tiles, writing, final file | "
+            f">= {100 * bar:.0f} % | {reached(line, bar, means)}; {percent(line[-1])} with {last:.0f} s | "
+            f"{'met' if max(line) >= bar else '**not met**'} |"
+        )
+    top, rest = page.split("\n## The map", 1)
+    lines = [line for line in top.splitlines() if not line.startswith("| simulated whole job ")]
+    at = next(i for i, line in enumerate(lines) if line.startswith("| memory per rank"))
+    return "\n".join([*lines[:at], *rows, *lines[at:], ""]) + "\n## The map" + rest
 
 
 def reached(line: list[float], bar: float, means: tuple[float, ...]) -> str:
@@ -283,9 +336,7 @@ def bar_table(results: Results) -> str:
         [
             f"the final file, of a run on {packing.RANKS} ranks",
             f"<= {100 * BAR_FINISH:.0f} %",
-            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points; simulated "
-            f"{number(simulation.MANY_RANKS)} ranks with writing and it: "
-            f"{percent(simulated.with_file[index])}",
+            f"{percent(finish)} of a map of {number(results.packing.runs[-1][0].points)} points",
             met[finish <= BAR_FINISH] if finish <= BAR_FINISH or not busy(results) else "machine busy",
         ],
         [
@@ -370,7 +421,9 @@ def page(results: Results, quick: bool) -> str:
         catalogues=memory_table(found.catalogue, found.entries),
         per_tile=f"{found.bytes_per_tile:.0f}",
         per_attractor=f"{found.bytes_per_attractor / 1000:.1f}",
-        jobs=jobs_section(simulated.jobs, simulated.mean, simulated.before, results.packing, results.version),
+        jobs=jobs_section(
+            simulated.jobs, simulated.mean, simulated.before, jobs_made(results.packing, results.version)
+        ),
         rate=max(simulation.STORES, key=simulation.STORES.get),
         conditions=conditions(results),
     )

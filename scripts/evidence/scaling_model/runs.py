@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs of the program and of the bare scheduler on the ranks of this machine."""
 
+import os
 import subprocess
 import sys
 import time
@@ -14,6 +15,8 @@ from evidence_rows import version_of
 SOURCE = Path(__file__).resolve().parents[3]
 CASE = SOURCE / "examples" / "basin_ratio_stack.toml"
 STOPPED = 75
+SEARCHES = 3
+"""Of the same slices, for their time."""
 # A process starts with the peak of the one that forked it, so a small one stands between.
 LARGEST_CHILD = """
 import resource, subprocess, sys
@@ -74,6 +77,30 @@ class Replay:
     idle: float
 
 
+@dataclass
+class Search:
+    """The search for attractors in the slices of a map; seconds of the processor of one rank."""
+
+    whole: float
+    """Of all slices."""
+    longest: float
+    """Of the slice that takes longest."""
+    slices: int
+    starts: int
+    """Of a slice."""
+
+    def per_rank(self, points: float) -> float:
+        """Slices of each rank of a map with so many points for each, and slices like these."""
+        return points / self.starts
+
+    def seconds(self, points: float) -> float:
+        """At most what the search of that map takes: a rank that begins the longest slice last has its share before.
+
+        R. L. Graham (1966).
+        """
+        return self.per_rank(points) * self.whole / self.slices + self.longest
+
+
 class Program:
     """The build that is measured."""
 
@@ -110,6 +137,27 @@ class Program:
         points = ratios * X0_COUNT * v0_count
         return Run(ranks, points, wall, rows["rank"].astype(int), rows["begin"], rows["end"])
 
+    def search(self, ratios: int, v0_count: int) -> Search:
+        """Search the attractors of all slices of that map, and of each slice alone."""
+        values = np.linspace(*RATIOS, ratios).tolist()
+        alone = [self.processor_seconds([value], v0_count) for value in values]
+        whole = self.processor_seconds(values, v0_count)
+        # the start of the program is in each
+        return Search(whole - min(alone), max(alone) - min(alone), ratios, X0_COUNT * v0_count)
+
+    def processor_seconds(self, ratios: list[float], v0_count: int) -> float:
+        """Seconds of the processor of one rank that searches the attractors at these ratios; least of some."""
+        path = self.folder / "search.h5"
+        words = ["-o", path, "--force", "-q", "--search-only", "--shard", "1/1"]
+        command = [str(word) for word in (self.program, "basin", CASE, *uneven_map(ratios, v0_count), *words)]
+        found = []
+        for _ in range(SEARCHES):
+            _, status, used = os.wait4(os.posix_spawn(self.program, command, os.environ), 0)
+            if status != 0:
+                raise RuntimeError(f"the search ended with status {status}")
+            found.append(used.ru_utime + used.ru_stime)
+        return min(found)
+
     def copies(self, count: int, ratios: int, v0_count: int) -> float:
         """Seconds that so many maps take, each on one rank, all at once."""
         began = time.perf_counter()
@@ -141,10 +189,16 @@ class Program:
         return Replay(rows["tiles"].astype(int), rows["questions"].astype(int), makespan, idle)
 
 
-def uneven_map(ratios: int, v0_count: int) -> list[str]:
-    """Return the settings of the map of very uneven cost: around ratio 0.93 the motion is chaotic."""
+def uneven_map(ratios: int | list[float], v0_count: int) -> list[str]:
+    """Return the settings of the map of very uneven cost: around ratio 0.93 the motion is chaotic.
+
+    `ratios`: their number, or some values.
+    """
+    chosen = f"from={RATIOS[0]}, to={RATIOS[1]}, count={ratios}"
+    if isinstance(ratios, list):
+        chosen = f"values={ratios}"
     axes = (
-        f'{{name="ratio", from={RATIOS[0]}, to={RATIOS[1]}, count={ratios}}}, '
+        f'{{name="ratio", {chosen}}}, '
         f'{{name="x0", from=0.0, to=1.1, count={X0_COUNT}}}, '
         f'{{name="v0", from=-6.0, to=6.0, count={v0_count}}}'
     )

@@ -17,7 +17,7 @@ from memory import Memory, measure
 from model import Model, setting
 from packing import Packing, time_files
 from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
-from simulation import TRAJECTORIES_PER_TILE, Simulated, Simulation
+from simulation import TRAJECTORIES_PER_TILE, Before, Simulated, Simulation, jobs_after
 
 BAR = 0.9
 MOST_SECONDS = 240.0
@@ -149,10 +149,34 @@ def only_jobs(build: Path, page: Path) -> None:
         packing = time_files(program, Sizes.packed, Sizes.repetitions)
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
         simulation = Simulation(Model(folder), base.costs, mean, packing)
-        jobs = simulation.whole_jobs(base.around)
-        section = report.jobs_section(jobs, mean, base.around, packing, program.version)
+        before = time_before(program, base, 32 * TILE)
+        jobs = simulation.whole_jobs(before)
+        made = report.jobs_made(packing, program.version)
+        section = report.jobs_section(jobs, mean, before, made)
+    put_jobs(page, section)
+
+
+def only_search(build: Path, page: Path) -> None:
+    """Measure the search again, and change the section on whole jobs by what it takes more or less."""
+    kept = report.read_jobs(page.read_text())
+    with tempfile.TemporaryDirectory(prefix="scaling-") as name:
+        program = Program(build, Path(name))
+        search = program.search(Sizes.ratios, 32 * TILE)
+    before = Before(kept.start, search, program.version["commit"])
+    jobs = jobs_after(kept.jobs, kept.mean, kept.start + kept.search, before.seconds)
+    put_jobs(page, report.jobs_section(jobs, kept.mean, before, kept.made))
+
+
+def time_before(program: Program, base: Run, v0_count: int) -> Before:
+    """What a job does before its first tile; the final file of the base is part of the start."""
+    search = program.search(Sizes.ratios, v0_count)
+    return Before(max(base.around - search.whole, 0.0), search, program.version["commit"])
+
+
+def put_jobs(page: Path, section: str) -> None:
+    """Replace the section on whole jobs and what the table at the top has of it."""
     before, rest = page.read_text().split(report.JOBS_BEGIN)
-    page.write_text(before + section + rest.split(report.JOBS_END)[1])
+    page.write_text(report.with_jobs_at_top(before + section + rest.split(report.JOBS_END)[1]))
     print(section)
 
 
@@ -163,7 +187,13 @@ def main() -> None:
     parser.add_argument("--build", type=Path, default=SOURCE / "build")
     parser.add_argument("--output", type=Path, default=SOURCE / "docs" / "scaling.md")
     parser.add_argument("--jobs", action="store_true", help="only the section on whole jobs")
+    parser.add_argument(
+        "--search", action="store_true", help="only the search for attractors of that section"
+    )
     options = parser.parse_args()
+    if options.search:
+        only_search(options.build, options.output)
+        return
     if options.jobs:
         only_jobs(options.build, options.output)
         return
@@ -184,7 +214,9 @@ def main() -> None:
         progress("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
-        results.simulated = Simulation(model, base.costs, mean, results.packing).everything(BAR, base.around)
+        results.simulated = Simulation(model, base.costs, mean, results.packing).everything(
+            BAR, time_before(program, base, results.v0_count)
+        )
         progress("memory")
         sizes = results.sizes
         results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)
@@ -192,6 +224,7 @@ def main() -> None:
     results.seconds = time.perf_counter() - began
     plots.draw(options.output.parent / "figures", results.simulated, base, results.sizes.ratios, BAR)
     text = report.page(results, options.quick)
+    text = report.with_jobs_at_top(text)
     options.output.write_text(text)
     print(text)
     progress(f"wrote {options.output}")

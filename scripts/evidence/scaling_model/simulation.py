@@ -8,6 +8,7 @@ import numpy as np
 from costs import tiles_for
 from model import Model, Outcome, setting
 from packing import Packing
+from runs import Search
 
 RANKS_PER_NODE = 128
 SPREADS = (1, 10, 100, 1000)
@@ -61,8 +62,37 @@ class Simulated:
     """Tiles per rank from which on the bar holds."""
     jobs: dict[int, list[float]]
     """ranks: efficiency of whole jobs for the mean and each of JOB_TILE_SECONDS"""
-    before: float
-    """Seconds before the first tile of a whole job."""
+    before: "Before"
+    """What is before the first tile of a whole job."""
+
+
+@dataclass
+class Before:
+    """What a job does before its first tile; seconds."""
+
+    start: float
+    search: Search
+    commit: str
+    """Of the search."""
+    ranks_points: float = USUAL * TRAJECTORIES_PER_TILE
+    """Points of a rank."""
+
+    @property
+    def seconds(self) -> float:
+        """Of a job of any number of ranks."""
+        return self.start + self.search.seconds(self.ranks_points)
+
+
+def jobs_after(jobs: dict[int, list[float]], mean: float, old: float, new: float) -> dict[int, list[float]]:
+    """Efficiencies of whole jobs whose first tile begins after `new` instead of `old` seconds.
+
+    `jobs`: for the mean and each of JOB_TILE_SECONDS.
+    """
+    work = [USUAL * value for value in (mean, *JOB_TILE_SECONDS)]
+    return {
+        ranks: [busy / (busy / found - old + new) for busy, found in zip(work, line, strict=True)]
+        for ranks, line in jobs.items()
+    }
 
 
 class Simulation:
@@ -91,11 +121,14 @@ class Simulation:
         finish += ranks * USUAL * RECORD_BYTES / rate
         return float(found.busy.sum() / (ranks * (before + found.makespan + finish)))
 
-    def whole_jobs(self, before: float) -> dict[int, list[float]]:
+    def whole_jobs(self, before: Before) -> dict[int, list[float]]:
         """Efficiency of whole jobs: for each number of ranks the measured mean, then JOB_TILE_SECONDS."""
         rate = max(STORES.values())
         means = (self.mean, *JOB_TILE_SECONDS)
-        return {ranks: [self.with_file(ranks, rate, mean, before) for mean in means] for ranks in JOB_RANKS}
+        return {
+            ranks: [self.with_file(ranks, rate, mean, before.seconds) for mean in means]
+            for ranks in JOB_RANKS
+        }
 
     def problem(self, ranks: int, per_rank: int, spread: float, mean: float, **more):
         """Return the machine and the tiles."""
@@ -111,8 +144,8 @@ class Simulation:
             found = per_rank
         return found
 
-    def everything(self, bar: float, before: float) -> Simulated:
-        """All that the page shows; `before`: seconds before the first tile of a whole job."""
+    def everything(self, bar: float, before: Before) -> Simulated:
+        """All that the page shows; `before`: what a whole job does before its first tile."""
         machine, tiles = self.problem(MANY_RANKS, USUAL, BAR_SPREAD, self.mean)
         many = self.model.run(machine, tiles)
         neighbours = [

@@ -23,6 +23,17 @@ def scaling(source_dir, tmp_path_factory):
     return model, costs, model.Model(tmp_path_factory.mktemp("model"))
 
 
+@pytest.fixture(scope="module")
+def pages(source_dir):
+    """The modules that simulate whole jobs and write the page."""
+    with pytest.MonkeyPatch.context() as patch:
+        for folder in ("scripts/evidence", "scripts/evidence/scaling_model"):
+            patch.syspath_prepend(str(source_dir / folder))
+        import report
+        import simulation
+    return report, simulation
+
+
 def uneven(count: int) -> np.ndarray:
     """Costs over three decades."""
     return 10 ** np.random.default_rng(1).uniform(-3, 0, count)
@@ -114,6 +125,26 @@ def test_costs_get_the_spread_and_keep_their_order_and_neighbours(scaling):
         assert (np.diff(tiles.reshape(100, 10)) == 0).all()
         if spread > 1:
             assert (np.argsort(tiles[::10]) == np.argsort(measured)).all()
+
+
+def test_the_page_has_its_whole_jobs_at_the_top(source_dir, pages):
+    report, _ = pages
+    page = (source_dir / "docs/scaling.md").read_text()
+    assert report.with_jobs_at_top(page) == page
+    kept = report.read_jobs(page)
+    assert len(kept.jobs[10_000]) == 8 and 0 < kept.start < kept.search
+
+
+def test_whole_jobs_with_another_search(pages):
+    _, simulation = pages
+    work = 100 * 0.024
+    jobs = {10_000: [work / (work + 3 + rest) for rest in range(8)]}
+    changed = simulation.jobs_after(jobs, 0.024, 3, 1)
+    assert changed[10_000][0] == pytest.approx(work / (work + 1))
+    back = simulation.jobs_after(changed, 0.024, 1, 3)
+    assert back[10_000] == pytest.approx(jobs[10_000])
+    search = simulation.Search(41.0, 2.0, 41, 1024)
+    assert simulation.Before(0.5, search, "").seconds == pytest.approx(0.5 + 100 + 2)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 10, 49, 64, 1000])
