@@ -33,6 +33,8 @@ module structure_exponents
   !> motion whose turns go on in the rounding.
   real(wp), parameter :: still = 1e-5_wp, died_away = 1e-9_wp
   integer, parameter :: quiet_sections = 8
+  !> And above which it does not come to rest on a cycle.
+  real(wp), parameter :: goes_on = 1e-3_wp
 
 contains
 
@@ -141,7 +143,7 @@ contains
       if (spectrum%reason /= 0) return
       if (i < 1) then
         ! Without a clock it may be coming to rest.
-        if (.not. structure%has_clock) cycle
+        if (.not. (structure%has_clock .or. rate > goes_on)) cycle
         call watch%look(machines, position_of(structure, state), coordinates_of(structure, state))
         if (watch%sections == 0) cycle
         call pass_cycle(machines, structure, watch, state, spectrum, series)
@@ -198,6 +200,11 @@ contains
       call note_events(structure, events, spectrum)
       positions(i) = position_of(structure, state)
     end do
+    if (.not. structure%has_clock) then
+      left = min(left, structure%n - 1)
+      spectrum%exponents = spectrum%exponents(:structure%n - 1)
+      spectrum%errors = spectrum%errors(:structure%n - 1)
+    end if
     call note_cycle_exponents(watch, duration, left, spectrum, ok)
     if (.not. ok) then
       spectrum = before
