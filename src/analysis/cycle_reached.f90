@@ -28,7 +28,7 @@ module cycle_reached
   real(wp), parameter :: least_decay = 0.05_wp
   !> Section points that show the period of a cycle. A cycle is looked for after so many sections, and whenever they have doubled.
   integer, parameter :: last_points = 64
-  !> Moduli from which on a multiplier is known to the digits of an exponent, and up to which it is that of a direction that is lost.
+  !> Moduli from which on a multiplier is known to the digits of an exponent, and up to which it is that of a lost direction.
   real(wp), parameter :: known_from = 1e-6_wp, lost_to = 1e-9_wp
 
   !> A motion that is watched in its transient, until it is on a cycle that attracts.
