@@ -10,7 +10,7 @@ module series_terms
   implicit none
   private
 
-  public :: compile, raise_all
+  public :: compile, put_termwise_last, raise_all
 
   !> Kinds of recurrences: the integral of a rate; a copy; sums; products with something steady, with something linear in time, of
   !> two series; quotients; functions with the derivative a' b, a being linear in time or not; the other functions; of two
@@ -179,9 +179,87 @@ contains
     end select
   end subroutine choose_function
 
+  !> Puts the instructions last whose coefficients depend on those of the same order alone, and which no others need: for them,
+  !> orders need not be raised in turn. `together` is the number of the others.
+  pure subroutine put_termwise_last(program, nodes, together)
+    type(instruction_t), intent(inout) :: program(:)
+    integer, intent(in) :: nodes
+    integer, intent(out) :: together
+    logical :: is_needed(0:nodes), is_first(size(program))
+    integer :: source(0:nodes), at, before
+    source = [(at, at=0, nodes)]
+    is_needed = .false.
+    do at = 1, size(program)
+      associate (it => program(at))
+        ! Beyond order 0 a copy is its original.
+        if (it%kind == copy) source(it%node) = source(it%a)
+        if (any(it%kind == [copy, minus, add, subtract, over_steady])) it%a = source(it%a)
+        if (any(it%kind == [add, subtract, scaled])) it%b = source(it%b)
+        if (.not. is_termwise(it%kind)) is_needed(it%node) = .true.
+      end associate
+    end do
+    do
+      before = count(is_needed)
+      do at = size(program), 1, -1
+        if (is_needed(program(at)%node)) is_needed([program(at)%a, program(at)%b, program(at)%partner]) = .true.
+      end do
+      if (count(is_needed) == before) exit
+    end do
+    is_first = is_needed(program%node)
+    together = count(is_first)
+    program = [pack(program, is_first), pack(program, .not. is_first)]
+  end subroutine put_termwise_last
+
+  pure logical function is_termwise(kind)
+    integer, intent(in) :: kind
+    is_termwise = any(kind == [copy, minus, add, subtract, scaled, over_steady, larger])
+  end function is_termwise
+
   !> Coefficients from order 1 on, from those of order 0; see `raise_orders`. `fault` is 0, or minus the node whose coefficient
   !> is too large.
-  pure subroutine raise_all(program, order, unit, sign, divisor, c, fault)
+  pure subroutine raise_all(program, together, order, unit, sign, divisor, c, fault)
+    type(instruction_t), intent(in) :: program(:)
+    integer, intent(in) :: together, order
+    real(wp), intent(in) :: unit, sign, divisor(:)
+    real(wp), intent(inout) :: c(0:order, size(divisor))
+    integer, intent(out) :: fault
+    integer :: at
+    call raise_together(program(:together), order, unit, sign, divisor, c, fault)
+    do at = together + 1, size(program)
+      if (fault /= 0) return
+      call raise_termwise(program(at), order, sign, divisor, c)
+      if (.not. all(abs(c(1:, program(at)%node)) <= huge(1.0_wp))) fault = -program(at)%node
+    end do
+  end subroutine raise_all
+
+  !> All orders of a node whose coefficients depend on those of the same order alone.
+  pure subroutine raise_termwise(it, order, sign, divisor, c)
+    type(instruction_t), intent(in) :: it
+    integer, intent(in) :: order
+    real(wp), intent(in) :: sign, divisor(:)
+    real(wp), intent(inout) :: c(0:order, size(divisor))
+    associate (a => it%a, b => it%b, i => it%node)
+      select case (it%kind)
+      case (copy)
+        c(1:, i) = c(1:, a)
+      case (minus)
+        c(1:, i) = sign*c(1:, a)
+      case (add)
+        c(1:, i) = c(1:, a) + c(1:, b)
+      case (subtract)
+        c(1:, i) = c(1:, a) + sign*c(1:, b)
+      case (scaled)
+        c(1:, i) = c(0, a)*c(1:, b)
+      case (over_steady)
+        c(1:, i) = c(1:, a)/divisor(b)
+      case (larger)
+        c(1:, i) = max(c(1:, a), c(1:, b))
+      end select
+    end associate
+  end subroutine raise_termwise
+
+  !> The coefficients of nodes that need each other, order by order.
+  pure subroutine raise_together(program, order, unit, sign, divisor, c, fault)
     type(instruction_t), intent(in) :: program(:)
     integer, intent(in) :: order
     real(wp), intent(in) :: unit, sign, divisor(:)
@@ -240,7 +318,7 @@ contains
         return
       end do
     end do
-  end subroutine raise_all
+  end subroutine raise_together
 
   !> The same for roots, powers, logarithms and angles: solutions of linear differential equations of first order in the argument.
   pure real(wp) function function_term(it, k, sign, divisor, order, c) result(y)

@@ -75,6 +75,7 @@ contains
       longest = -huge(longest)
       do j = 0, order/2
         longest = max(longest, log_epsilon*rough_inverse(order - j) + (size_of(j) - last)*rough_inverse(k - j))
+        if (longest >= reach) exit
       end do
       reach = min(reach, longest)
     end do

@@ -12,7 +12,7 @@ module tape_value
   implicit none
   private
 
-  public :: evaluate, fault_text, sizes_of_nodes, starting_branches
+  public :: evaluate, evaluate_some, fault_text, sizes_of_nodes, starting_branches
 
 contains
 
@@ -25,29 +25,54 @@ contains
     real(wp), intent(out) :: value(tape%count)
     integer, intent(out) :: fault(tape%count)
     integer, intent(in), optional :: branches(:)
-    real(wp) :: chosen
-    integer :: i, origin
-    logical :: is_finite
+    integer :: i
     do i = 1, tape%count
-      fault(i) = 0
-      select case (tape%nodes(i)%operation)
-      case (op_constant)
-        value(i) = tape%nodes(i)%value
-      case (op_variable)
-        call take_number(variables(tape%nodes(i)%first), value(i), is_finite)
-        if (.not. is_finite) fault(i) = i
-      case (op_parameter)
-        call take_number(parameters(tape%nodes(i)%first), value(i), is_finite)
-        if (.not. is_finite) fault(i) = i
-      case (op_select)
-        call take_branch(tape, tape%nodes(i), value(:i - 1), fault(:i - 1), chosen, origin, branches)
-        value(i) = chosen
-        fault(i) = origin
-      case default
-        call take_operation(tape, i, value, fault)
-      end select
+      call take_node(tape, i, variables, parameters, value, fault, branches)
     end do
   end subroutine evaluate
+
+  !> The same of the nodes `these` alone, in their order; those that they are made of have their values.
+  pure subroutine evaluate_some(tape, these, variables, parameters, value, fault, branches)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: these(:)
+    real(wp), intent(in) :: variables(:), parameters(:)
+    real(wp), intent(inout) :: value(tape%count)
+    integer, intent(inout) :: fault(tape%count)
+    integer, intent(in) :: branches(:)
+    integer :: i
+    do i = 1, size(these)
+      call take_node(tape, these(i), variables, parameters, value, fault, branches)
+    end do
+  end subroutine evaluate_some
+
+  pure subroutine take_node(tape, i, variables, parameters, value, fault, branches)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: i
+    real(wp), intent(in) :: variables(:), parameters(:)
+    real(wp), intent(inout) :: value(tape%count)
+    integer, intent(inout) :: fault(tape%count)
+    integer, intent(in), optional :: branches(:)
+    real(wp) :: chosen
+    integer :: origin
+    logical :: is_finite
+    fault(i) = 0
+    select case (tape%nodes(i)%operation)
+    case (op_constant)
+      value(i) = tape%nodes(i)%value
+    case (op_variable)
+      call take_number(variables(tape%nodes(i)%first), value(i), is_finite)
+      if (.not. is_finite) fault(i) = i
+    case (op_parameter)
+      call take_number(parameters(tape%nodes(i)%first), value(i), is_finite)
+      if (.not. is_finite) fault(i) = i
+    case (op_select)
+      call take_branch(tape, tape%nodes(i), value(:i - 1), fault(:i - 1), chosen, origin, branches)
+      value(i) = chosen
+      fault(i) = origin
+    case default
+      call take_operation(tape, i, value, fault)
+    end select
+  end subroutine take_node
 
   pure subroutine take_number(given, value, is_finite)
     real(wp), intent(in) :: given
