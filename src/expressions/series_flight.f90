@@ -67,6 +67,8 @@ module series_flight
     !> step.
     integer, allocatable, private :: variables(:)
     real(wp), allocatable, private :: path(:, :)
+    !> Powers of the step, in units of the series.
+    real(wp), private :: powers(0:series_order) = 1
     !> Nodes of the active guards that are more than a variable and a constant.
     integer, allocatable, private :: curved(:)
     !> Length of the last proven step, as a part of that by the last coefficients.
@@ -344,18 +346,16 @@ contains
   pure subroutine set_path(flight, step)
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: step
-    real(wp) :: power(0:series_order)
     integer :: i, k
-    power(0) = 1
     do k = 1, series_order
-      power(k) = power(k - 1)*(step/flight%series%unit)
+      flight%powers(k) = flight%powers(k - 1)*(step/flight%series%unit)
     end do
     do i = 1, size(flight%rates)
       if (flight%variables(i) > 0) then
-        flight%path(:, i) = flight%series%c(:, flight%variables(i))*power
+        flight%path(:, i) = flight%series%c(:, flight%variables(i))*flight%powers
       else
         do k = 1, series_order
-          flight%path(k, i) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k*power(k)
+          flight%path(k, i) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k*flight%powers(k)
         end do
       end if
       flight%path(0, i) = flight%state(i)
@@ -369,15 +369,11 @@ contains
     real(wp), intent(in) :: step
     real(wp), intent(out) :: fraction
     logical, intent(out) :: is_certain
-    real(wp) :: at(size(flight%guards)), remainder, rounding, powers(0:series_order), power
+    real(wp) :: at(size(flight%guards)), remainder, rounding, power
     integer :: g, k
     logical :: is_proven
     at = 2
     is_certain = .true.
-    powers(0) = 1
-    do k = 1, series_order
-      powers(k) = powers(k - 1)*(step/flight%series%unit)
-    end do
     power = 1.01_wp
     do k = 1, series_order + 1
       power = power*(step/flight%around%bounds%unit)
@@ -385,7 +381,7 @@ contains
     do g = 1, size(flight%guards)
       if (.not. flight%is_active(g)) cycle
       remainder = power*flight%around%bounds%last(flight%guards(g)%node)
-      call cross(flight, g, powers, remainder, at(g), rounding, is_proven)
+      call cross(flight, g, remainder, at(g), rounding, is_proven)
       if (is_proven) cycle
       is_certain = is_certain .and. remainder <= rounding .and. flight%around%is_own
       if (remainder <= rounding .and. flight%around%is_own) flight%uncertain = flight%uncertain + 1
@@ -395,11 +391,11 @@ contains
   end subroutine find_crossing
 
   !> First crossing of a guard within the step. A zero of order m at the start is divided out: the rest of the series, over
-  !> the fraction to the power m, has the other zeros. `powers` of the step, in units of the series.
-  pure subroutine cross(flight, g, powers, remainder, at, rounding, is_proven)
+  !> the fraction to the power m, has the other zeros.
+  pure subroutine cross(flight, g, remainder, at, rounding, is_proven)
     type(flight_t), intent(in) :: flight
     integer, intent(in) :: g
-    real(wp), intent(in) :: powers(0:series_order), remainder
+    real(wp), intent(in) :: remainder
     real(wp), intent(out) :: at, rounding
     logical, intent(out) :: is_proven
     real(wp) :: p(0:series_order), total
@@ -407,7 +403,7 @@ contains
     node = flight%guards(g)%node
     m = min(flight%zeros(g), series_order)
     total = 0
-    p = flight%series%c(:, node)*powers
+    p = flight%series%c(:, node)*flight%powers
     do k = m, series_order
       total = total + (k + 1)*abs(p(k))
     end do

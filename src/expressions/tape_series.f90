@@ -56,7 +56,7 @@ contains
       if (tape%nodes(i)%operation == op_variable) series%is_used(i) = .true.
     end do
     call compile(tape, rates, branches, series%is_used, series%program)
-    call put_termwise_last(series%program, tape%count, series%together)
+    call put_termwise_last(series%program, tape%count, order, series%together)
     has_value = .true.
     if (present(only_used)) then
       ! The other branch serves where a step goes past a switch.

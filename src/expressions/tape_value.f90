@@ -39,9 +39,29 @@ contains
     real(wp), intent(inout) :: value(tape%count)
     integer, intent(inout) :: fault(tape%count)
     integer, intent(in) :: branches(:)
-    integer :: i
-    do i = 1, size(these)
-      call take_node(tape, these(i), variables, parameters, value, fault, branches)
+    real(wp) :: y
+    integer :: at
+    do at = 1, size(these)
+      associate (i => these(at), it => tape%nodes(these(at)))
+        ! Most operations are these, and defined.
+        if (any(it%operation == [op_add, op_subtract, op_multiply])) then
+          if (fault(it%first) == 0 .and. fault(it%second) == 0) then
+            if (it%operation == op_add) then
+              y = value(it%first) + value(it%second)
+            else if (it%operation == op_subtract) then
+              y = value(it%first) - value(it%second)
+            else
+              y = value(it%first)*value(it%second)
+            end if
+            if (abs(y) <= huge(y)) then
+              value(i) = y
+              fault(i) = 0
+              cycle
+            end if
+          end if
+        end if
+        call take_node(tape, i, variables, parameters, value, fault, branches)
+      end associate
     end do
   end subroutine evaluate_some
 
