@@ -94,9 +94,9 @@ class Search:
         return points / self.starts
 
     def seconds(self, points: float) -> float:
-        """At most what the search of that map takes: a rank that begins the longest slice last has its share before.
+        """At most what the search of that map takes.
 
-        R. L. Graham (1966).
+        A rank that begins the longest slice last has searched its share before: R. L. Graham (1966).
         """
         return self.per_rank(points) * self.whole / self.slices + self.longest
 
@@ -146,7 +146,7 @@ class Program:
         return Search(whole - min(alone), max(alone) - min(alone), ratios, X0_COUNT * v0_count)
 
     def processor_seconds(self, ratios: list[float], v0_count: int) -> float:
-        """Seconds of the processor of one rank that searches the attractors at these ratios; least of some."""
+        """Seconds of the processor of a rank that searches the attractors at these ratios; least of some."""
         path = self.folder / "search.h5"
         words = ["-o", path, "--force", "-q", "--search-only", "--shard", "1/1"]
         command = [str(word) for word in (self.program, "basin", CASE, *uneven_map(ratios, v0_count), *words)]
