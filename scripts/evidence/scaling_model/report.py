@@ -223,7 +223,8 @@ def jobs_section(jobs: dict[int, list[float]], mean: float, before: simulation.B
     search, points = before.search, before.ranks_points
     taken = (
         f"Start {before.start:.2f} s; search {search.seconds(points):.2f} s: "
-        f"{search.per_rank(points):.1f} slices for each rank, {search.whole / search.slices:.3f} s each in the mean,\n"
+        f"{search.per_rank(points):.1f} slices for each rank, "
+        f"{search.whole / search.slices:.3f} s each in the mean,\n"
         f"and {search.longest:.2f} s for the slice that takes longest (commit {before.commit})."
     )
     return "\n".join([JOBS_BEGIN, made, "", taken, "", table(header, rows), "", *lines, JOBS_END])
