@@ -15,6 +15,8 @@ module drive_law
 
   !> Samples of a measured force closer than this share of the largest are the same.
   real(wp), parameter :: same_force = 1e-9_wp
+  !> Samples of a measured force this share of the largest from a straight line lie on it.
+  real(wp), parameter :: same_line = 1e-12_wp
 
   public :: drive_of, add_harmonics, add_ripple, foot_motion, measured_force, ends_with_its_first, next_sample, lever_foot, &
     lever_assembles, moves_foot, is_speed, is_given
@@ -35,6 +37,8 @@ module drive_law
     !> Measured force: time between samples [s], 0 = none, and the samples [N] from the section to the next, both ends counted.
     real(wp) :: interval = 0
     real(wp), allocatable :: force(:)
+    !> Number of the sample, from 0, up to which the force follows the line between samples i - 1 and i.
+    integer, allocatable :: line_end(:)
   end type drive_t
 
   !> Samples closer than this share of an interval count as reached.
@@ -85,6 +89,7 @@ contains
       law%force = list_of(choice, 'force')
       ! One period has its first sample once more at its end.
       if (value_of(choice, 'periodic') > 0.5_wp) law%force = [law%force, law%force(:1)]
+      law%line_end = line_ends(law%force)
       allocate (law%cosine(0), law%sine(0))
       return
     case default
@@ -122,6 +127,8 @@ contains
     integer :: n
     position = law%mean
     d1 = 0
+    if (present(first)) first = 0
+    if (size(law%cosine) == 0) return
     call sine_cosine(phi, s1, c1)
     s = s1
     c = c1
@@ -153,13 +160,35 @@ contains
     if (ends_with_its_first) ends_with_its_first = abs(samples(size(samples)) - samples(1)) <= same_force*maxval(abs(samples))
   end function ends_with_its_first
 
-  !> The first sample of a measured force after `time` [s], where its rate changes, or `time_end` if that comes first.
+  !> Where the straight line ends that the samples follow from each of them to the next, as numbers of samples from 0.
+  pure function line_ends(force) result(ends)
+    real(wp), intent(in) :: force(0:)
+    integer :: ends(size(force) - 1)
+    real(wp) :: allowed
+    integer :: first, last
+    allowed = same_line*maxval(abs(force))
+    first = 0
+    do while (first < size(ends))
+      last = first + 1
+      do while (last < size(ends))
+        if (abs(force(last + 1) - force(first) - (last + 1 - first)*(force(first + 1) - force(first))) > allowed) exit
+        last = last + 1
+      end do
+      ends(first + 1:last) = last
+      first = last
+    end do
+  end function line_ends
+
+  !> The first sample of a measured force after `time` [s] where its rate changes, or `time_end` if that comes first.
   pure real(wp) function next_sample(law, time, time_end) result(next)
     type(drive_t), intent(in) :: law
     real(wp), intent(in) :: time, time_end
+    integer :: i
     next = time_end
     if (.not. law%interval > 0) return
-    next = (int(time/law%interval + reached) + 1)*law%interval
+    i = max(int(time/law%interval + reached), 0) + 1
+    if (i <= size(law%line_end)) i = law%line_end(i)
+    next = i*law%interval
     if (next > time_end - reached*law%interval) next = time_end
   end function next_sample
 

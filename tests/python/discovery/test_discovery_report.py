@@ -18,10 +18,16 @@ from made_verdicts import make, verdict
 from matplotlib.image import imread
 from program import CASE
 from separatrix.discovery.cli import summary
+from separatrix.discovery.fitting.catalogue import STARTS
+from separatrix.discovery.fitting.joint_effects import JOINT_EFFECTS
+from separatrix.discovery.fitting.members import MEMBERS
+from separatrix.discovery.fitting.motor_effects import MOTOR_EFFECTS
 from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import comparison
 from separatrix.discovery.report.document import write_report
+from separatrix.discovery.report.loop_figures import loops
+from separatrix.discovery.report.phrases import PHRASES, explained
 from separatrix.discovery.report.verdict_sections import sections
 from separatrix.discovery.workflow import investigate
 from separatrix.library import Model
@@ -362,12 +368,67 @@ def test_a_missing_program_is_reported(tmp_path: Path, monkeypatch: pytest.Monke
 def test_the_first_page_states_what_is_missed_in_its_unit_and_what_to_measure_next() -> None:
     lines = sections(verdict("ambiguous"))[0].body[1]
     assert (
-        "On the records that were fitted the base machine missed 0.0025 m (5 %) beyond the noise, the "
-        "extended machine misses 0.000114 m (0.23 %) (reduced chi^2 7.25 and 1.013, 1 of noise alone); "
-        "99.8 % of the excess is removed."
+        "On the records that were fitted the base machine missed 0.0025 m (5 %) of the signal beyond the "
+        "noise, the extended machine misses 0.000114 m (0.23 %) of the signal (reduced chi^2 7.25 and 1.013, "
+        "1 of noise alone); 99.8 % of the gap is closed; what remains is below the noise."
     ) in lines
     assert "To measure next: measure the barrier." in lines
     lines = sections(verdict("not-in-catalogue"))[0].body[1]
     assert any(
-        "the base machine misses 0.0025 m (5 %) beyond the noise (reduced chi^2 7.25" in one for one in lines
+        "the base machine misses 0.0025 m (5 %) of the signal beyond the noise (reduced chi^2 7.25" in one
+        for one in lines
     )
+    assert "To measure next: the maps above show where to look for a law that the catalogue lacks." in lines
+
+
+def test_the_first_page_states_what_an_effect_is_and_how_sure_it_is() -> None:
+    body = sections(verdict("named"))[0].body
+    assert "lacks: cubic spring (a spring force that grows with the cube of the extension)." in body[0]
+    assert any("a probability of 5.8e-74, given all effects" in line for line in body[1])
+    assert "To measure next: nothing stays ambiguous." in body[1]
+    in_part = sections(verdict("named") | {"complete": False})[0].body[1]
+    assert "To measure next: the name is not in doubt." in " ".join(in_part)
+    assert not any("probability" in line for line in sections(verdict("none"))[0].body[1])
+    nothing = verdict("named")
+    nothing["gap"]["held_out"]["misfit"]["after"] = 0.0
+    lines = sections(nothing)[0].body[1]
+    assert any("the extended machine misses nothing (reduced chi^2" in line for line in lines)
+
+
+def test_every_effect_has_a_phrase() -> None:
+    functions = {member.effect for member in MEMBERS}
+    assert {*STARTS, *JOINT_EFFECTS, *MOTOR_EFFECTS, *functions} - {*PHRASES} == set()
+    assert explained("coulomb@second") == "coulomb@second (dry friction)"
+
+
+def test_the_first_notes_are_on_the_first_page_and_the_others_below() -> None:
+    notes = [f"note {number}" for number in range(5)]
+    summary, compared = sections(verdict("named") | {"notes": notes})[:2]
+    assert notes[:3] in summary.body
+    assert "(2 more below.)" in summary.body
+    assert notes[3:] in compared.body
+    assert verdict("named")["notes"] in sections(verdict("named"))[0].body
+
+
+def test_numbers_of_the_rig_have_no_key() -> None:
+    reported = verdict("none")
+    reported["parameters"] = {"nuisance:drive_scale": reported["parameters"]["restoring.stiffness"]}
+    table = next(one for one in sections(reported) if one.key == "parameters").body[0]
+    assert table.rows[0][0] == "drive scale (of the rig, no key of the case)"
+
+
+def test_records_of_a_force_have_their_loops(tmp_path: Path) -> None:
+    make(tmp_path, "named")
+    with h5py.File(tmp_path / "details.h5", "a") as file:
+        assert loops(file) is None
+        file.attrs["compared"], file.attrs["force_unit"] = "force", "N"
+        shown = [file[f"{use}/{name}"] for use, name in (("training", "f0"), ("held_out", "f1"))]
+        for group in (*file["records"].values(), *(one[stage] for one in shown for stage in one)):
+            group["force"] = 3 * group["x"][:] + np.sin(12 * group["t"][:])
+        axes = loops(file).axes
+        assert [ax.get_title(loc="left") for ax in axes] == ["f0, training", "f1, held out"]
+        for ax, name in zip(axes, ("f0", "f1"), strict=True):
+            measured, before, after = ax.lines
+            np.testing.assert_array_equal(measured.get_ydata(), file[f"records/{name}/force"][:])
+            # a segment does not run on into the next one
+            assert all(np.isnan(one.get_ydata()).sum() == 11 for one in (before, after))

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a gap is: the map over the variable of the missing force is reported, not correlated ones."""
 
+import numpy as np
 import pytest
 from separatrix.discovery import Options
-from separatrix.discovery.decision.where import sentences, where_maps
+from separatrix.discovery.decision.where import Map, _at_rest, sentences, where_maps
 from separatrix.discovery.fitting.base import fit_base
 from separatrix.discovery.fitting.data import gather, scales_of
+from separatrix.discovery.fitting.regions import Region
 from separatrix.discovery.measured.preflight import prepare
 from separatrix.discovery.measured.records import read_record
 from separatrix.library import Model
@@ -60,3 +62,39 @@ def test_nothing_is_reported_where_the_noise_explains_all(source_dir, tmp_path, 
     from design import draw
 
     assert regions(tmp_path, records, draw(5101, 25), louder=1e4) == []
+
+
+def test_a_region_beyond_a_barrier_that_yields_is_where_the_body_presses_on_it():
+    """One that lies on both sides of it belongs to the side on which most of it is."""
+    edges, flagged = np.array([-0.3, -0.1, 0.018, 0.03]), np.array([True, False, True])
+    force = np.array([0.2, 0.0, 0.5])
+    found = {
+        name: sentences([Map(name, "m", "N", edges, None, force, 0.05 + 0 * force, flagged)], barriers)
+        for name, barriers in (("position", {"upper": 0.022}), ("velocity", {"upper": 0.022, "lower": -0.1}))
+    }
+    assert [one["text"].partition("missing ")[2] for one in found["position"]] == [
+        "at position 0.018 to 0.03 m, where the body presses on the upper barrier",
+        "at position -0.3 to -0.1 m",
+    ]
+    assert not any("barrier" in one["text"] for one in found["velocity"])
+    below = [Map("position", "m", "N", edges, None, force, 0.05 + 0 * force, flagged)]
+    assert sentences(below, {"lower": -0.1})[1]["text"].endswith("presses on the lower barrier")
+    assert not any("barrier" in one["text"] for one in sentences(below))
+
+
+def test_no_force_is_missing_in_a_bin_of_speeds_at_rest():
+    """What friction holds there is anything up to its level: a bin of -1.6 to 0 mm/s lacked -2.39 N."""
+
+    def region(name, edges, other=None):
+        count = (len(edges) - 1) * (1 if other is None else len(other) - 1)
+        other = None if other is None else np.array(other)
+        return Region(name, "", "N", np.array(edges), other, np.zeros((1, 1, count)))
+
+    regions = [
+        region("position", [-1e-3, 0.0, 1e-3]),
+        region("velocity", [-0.1, -1.6e-3, 0.0, 0.2]),
+        region("low speed", [-2e-2, -3e-3, 0.0, 1e-3]),
+        region("position and velocity", [0.0, 1e-3, 1.0], [-1e-3, 1e-3, 0.2]),
+    ]
+    assert _at_rest(regions).astype(int).tolist() == [0, 0, 0, 1, 0, 0, 1, 1, 1, 0, 1, 0]
+    assert not _at_rest(regions[:1]).any()

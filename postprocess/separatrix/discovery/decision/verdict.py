@@ -74,7 +74,7 @@ def verdict_of(findings: Findings) -> dict:
         "equivalences": equivalents([*named, *[names[-1] for names in decision.alternatives]]),
         "parameters": _parameters(final),
         "base_parameters": _parameters(findings.base),
-        "where": sentences(findings.maps),
+        "where": sentences(findings.maps, _soft_barriers(findings.base)),
         "gap": _gap(findings),
         "remains": [asdict(one) | {"text": one.text()} for one in _remaining(findings)],
         "locations": findings.base.problem.locations(
@@ -219,24 +219,18 @@ def _candidate(one: ScoredCandidate) -> dict:
 
 
 def _notes(findings: Findings) -> list[str]:
+    """Qualifications, what may make the verdict void first, how the records were read last."""
     context = findings.context
-    notes = [
-        f"{one.record.name}: {note}"
-        for data in (context.training, context.held_out)
-        for one in (data.prepared if data else ())
-        for note in one.notes
-    ]
     fits = _final(findings)
-    notes += in_words(fits[0][2])
+    notes = [*other_units(context.training, findings.base.model)]
+    if findings.base.problem.one_signal:
+        notes += other_machine(context.training, fits[0][2], context.options)
+    if findings.decision.outcome in ("not-in-catalogue", "characterised"):
+        notes += other_drive(context.training, findings.base)
     for _, data, fitted in fits:
         notes += other_phase(data, fitted)
         if fitted.problem.one_signal:
             notes += doubted_noise(data, fitted.problem, fitted.fit, context.scales.mass)
-    if findings.base.problem.one_signal:
-        notes += other_machine(context.training, fits[0][2], context.options)
-    notes += other_units(context.training, findings.base.model)
-    if findings.decision.outcome in ("not-in-catalogue", "characterised"):
-        notes += other_drive(context.training, findings.base)
     best = findings.decision.accepted
     notes += _of_accepted(best[0]) if best else []
     fit = findings.base.fit
@@ -257,7 +251,17 @@ def _notes(findings: Findings) -> list[str]:
             else ""
         )
         notes.append(f"no impacts are seen in the records{why}; the fitted machine has {hits}")
-    return notes
+    return [*notes, *in_words(fits[0][2]), *_of_records(context)]
+
+
+def _of_records(context: SearchContext) -> list[str]:
+    """How the records were read."""
+    return [
+        f"{one.record.name}: {note}"
+        for data in (context.training, context.held_out)
+        for one in (data.prepared if data else ())
+        for note in one.notes
+    ]
 
 
 def _of_accepted(best: ScoredCandidate) -> list[str]:
@@ -344,6 +348,16 @@ def _parameters(fitted: Fitted) -> dict:
                 "unit": unit_of(one.path, parameter.unit, fitted.model.parameters) if parameter else "1",
             }
     return found
+
+
+def _soft_barriers(base: Fitted) -> dict[str, float]:
+    """Positions of barriers that yield, by side, as they were fitted."""
+    if "contact.stiffness" not in base.model.parameters:
+        return {}
+    known = {path: one.value for path, one in base.model.parameters.items()}
+    known |= base.problem.machine_values(0, base.fit.values)
+    sides = {side: known.get(f"contact.{side}") for side in ("lower", "upper")}
+    return {side: float(position) for side, position in sides.items() if position is not None}
 
 
 def _knot_of(path: str, fitted: Fitted) -> str:

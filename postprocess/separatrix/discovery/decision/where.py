@@ -8,7 +8,7 @@ projected out. Its error comes from resampling blocks of segments. Flags are cor
 """
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +70,7 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
     sizes = [one.columns.shape[2] for one in regions]
     force, error = _forces(fitted, columns, options)
     flags = benjamini_hochberg(2 * norm.sf(np.abs(force) / error), SEARCH.flag_level)
+    flags &= ~_at_rest(regions)
     own = {name for effect in named for name in _OF_FAMILY.get(effect_of(effect).family, ())}
     flags &= np.repeat(_reported(regions, _gains(fitted, columns, sizes), own), sizes)
     ends = np.cumsum([0, *sizes])
@@ -79,6 +80,22 @@ def where_maps(fitted: Fitted, mass: float, options: Options, named: Iterable[st
         )
         for one, a, b in zip(regions, ends[:-1], ends[1:], strict=True)
     ]
+
+
+def _at_rest(regions: list[Region]) -> np.ndarray:
+    """Which bins hold hardly any speed: what friction holds at rest is not known."""
+    slow = SEARCH.at_rest * max(
+        (np.abs(one.edges).max() for one in regions if one.name == SPEED), default=0.0
+    )
+    found = []
+    for one in regions:
+        speeds = one.other_edges if one.name == PLANE else one.edges if one.name in (SPEED, LOW) else None
+        if speeds is None:
+            found.append(np.zeros(one.columns.shape[2], bool))
+        else:
+            rests = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1])) < slow
+            found.append(np.tile(rests, one.columns.shape[2] // rests.size))
+    return np.concatenate(found)
 
 
 def _forces(fitted: Fitted, columns: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
@@ -154,12 +171,16 @@ def benjamini_hochberg(p: np.ndarray, level: float) -> np.ndarray:
     return flags
 
 
-def sentences(maps: list[Map]) -> list[dict]:
-    """Flagged regions in words and numbers, the clearest of each map first."""
+def sentences(maps: list[Map], barriers: Mapping[str, float] | None = None) -> list[dict]:
+    """Flagged regions in words and numbers, the clearest of each map first.
+
+    Positions of `barriers` that yield, 'lower' and 'upper', let a region be where the body presses on one.
+    """
     found = []
     for one in maps:
         for index in np.flatnonzero(one.flagged)[np.argsort(-np.abs(one.force / one.error)[one.flagged])][:3]:
             region = _region(one, int(index))
+            region["text"] += _pressed(one, region, barriers or {})
             found.append(
                 {
                     "map": one.name,
@@ -172,6 +193,17 @@ def sentences(maps: list[Map]) -> list[dict]:
                 }
             )
     return found
+
+
+def _pressed(one: Map, region: dict, barriers: Mapping[str, float]) -> str:
+    """On which barrier the body presses in most of a region of positions, as words; '' where on none."""
+    if one.name not in (POSITION, PLANE):
+        return ""
+    ends = [np.atleast_1d(region[end])[0] for end in ("from", "to")]
+    for side, sense in (("upper", 1), ("lower", -1)):
+        if side in barriers and sense * (np.mean(ends) - barriers[side]) > 0:
+            return f", where the body presses on the {side} barrier"
+    return ""
 
 
 def quantity_of(name: str) -> str:

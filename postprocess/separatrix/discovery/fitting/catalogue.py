@@ -128,6 +128,8 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
     """The machine with the effect `name` added, or why that makes no sense."""
     effect = effects()[name]
     if effect.needs and not _has(model, effect.needs):
+        if effect.needs == "contact.restitution" and _has(model, "contact.stiffness"):
+            return "the barriers of the machine yield already, and this effect is for rigid ones"
         return f"the machine has no {effect.needs}"
     sizes = STARTS[name](scales)
     if name == "second_barrier":

@@ -183,6 +183,8 @@ class Search:
     map_nearly: float = row(0.9, "1", "campaign",
         "share of what the best map explains at which a simpler one is as good")
     map_of_name: float = row(0.75, "1", "campaign", "the same for the map of a named effect")
+    at_rest: float = row(0.02, "1", "test",
+        "share of the largest speed within which a bin of speeds is at rest, where no force is known")
 # fmt: on
 
 

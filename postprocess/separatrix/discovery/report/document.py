@@ -12,6 +12,7 @@ from separatrix import style
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import figures, where_figures
 from separatrix.discovery.report.comparison import compare
+from separatrix.discovery.report.loop_figures import loops
 from separatrix.discovery.report.pages import Beside, Picture, Section, page_of, write_pdf
 from separatrix.discovery.report.verdict_sections import cause, names, sections
 from separatrix.open import reading
@@ -62,6 +63,13 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
     visible = Options().visible
     _first_page(by_key["verdict"], verdict)
     _show(
+        by_key["gap"],
+        "loops",
+        loops(details),
+        "Force over position: measured, of the base machine and of the machine of the verdict. The area of a "
+        "loop is the energy that a cycle takes.",
+    )
+    _show(
         by_key["where"],
         "where-lines",
         where_figures.where_lines(details),
@@ -74,7 +82,8 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         "where-plane",
         where_figures.where_plane(details),
         f"The force that the base machine lacks ({verdict['units']['force']}) by position and velocity; "
-        "a star marks what differs from zero by more than chance, given the number of bins.",
+        "hatched: negative. A star marks what differs from zero by more than chance, given the number of "
+        "bins.",
     )
     _show(
         by_key["missing"],

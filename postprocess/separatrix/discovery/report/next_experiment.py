@@ -33,6 +33,8 @@ def next_experiment(verdict: dict) -> Section:
         )
     elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
         text = "The maps above show where to look for a law that the catalogue lacks."
+    elif verdict["outcome"] == "named" and not verdict["complete"]:
+        text = "The name is not in doubt. What is left over shows when the remaining gap appears."
     else:
         text = "Nothing stays ambiguous."
     return Section("next", "What to measure next", [text])

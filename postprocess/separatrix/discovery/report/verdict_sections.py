@@ -7,6 +7,7 @@ from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.options import Options
 from separatrix.discovery.report.next_experiment import next_experiment
 from separatrix.discovery.report.pages import Section, Table
+from separatrix.discovery.report.phrases import explained
 from separatrix.discovery.wording import (
     at_knot,
     digits_of,
@@ -19,6 +20,9 @@ from separatrix.discovery.wording import (
     with_unit,
     words,
 )
+
+_FIRST_NOTES = 3
+"""Notes on the first page."""
 
 GATES = {
     "converged": "the fit converged",
@@ -78,19 +82,24 @@ def cause(verdict: dict) -> str:
 
 def _summary(verdict: dict) -> Section:
     text = {
-        "named": f"The base machine lacks: {names(verdict)}. "
+        "named": f"The base machine lacks: {_what(verdict)}. "
         + (
             "All gates are passed."
             if verdict["complete"]
             else "All gates but the adequacy are passed: a gap remains that the catalogue does not name."
         ),
-        "ambiguous": f"Something is missing that looks like {names(verdict)}, but {_doubt(verdict)}.",
+        "ambiguous": f"Something is missing that looks like {_what(verdict)}, but {_doubt(verdict)}.",
         "none": "No effect is missing that these records could show.",
         "not-in-catalogue": f"Something is missing, and no effect of {searched(verdict)} explains it.",
         "characterised": f"Something is missing, and no effect of {searched(verdict)} explains it; "
         f"it looks like {cause(verdict)}.",
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {text}"]
+    if verdict["p_value"] is not None:
+        lines.append(
+            f"Chance alone would make such a gain with a probability of {probability(verdict['p_value'])}, "
+            "given all effects that were tried."
+        )
     for index, one in enumerate(verdict["character"]):
         lines.append(f"{'Or ' if index else 'Most likely '}{one['text']}.")
     if verdict["added"]:
@@ -113,15 +122,17 @@ def _summary(verdict: dict) -> Section:
         lines.append(f"{path}{at_knot(one)} = {size}, {known}{interval(one, digits)}.")
     if verdict["function"]:
         lines.append(f"{verdict['families'][-1].capitalize()}: {verdict['function']['text']}.")
-    lines += [_gap_of(use, one) for use, one in verdict["gap"].items()]
-    lines += [f"{one['text'][0].upper()}{one['text'][1:]}." for one in verdict["remains"]]
-    if verdict["separating_experiment"]:
-        lines.append(f"To measure next: {verdict['separating_experiment']}.")
+    left = {one["use"]: one["text"].partition(", ")[2] for one in verdict["remains"]}
+    lines += [_gap_of(use, one, left.get(use, "")) for use, one in verdict["gap"].items()]
+    advice = verdict["separating_experiment"] or next_experiment(verdict).body[0].rstrip(".")
+    lines.append(f"To measure next: {advice[0].lower()}{advice[1:]}.")
     body: list = [lines[0], lines[1:]]
     if verdict["reasons"]:
         body += ["What kept the verdict from being firmer:", list(verdict["reasons"])]
-    if verdict["notes"]:
-        body += ["Notes:", list(verdict["notes"])]
+    notes = verdict["notes"]
+    if notes:
+        more = f"({len(notes) - _FIRST_NOTES} more below.)" if len(notes) > _FIRST_NOTES else ""
+        body += ["Notes, the most important first:", notes[:_FIRST_NOTES], *([more] if more else [])]
     return Section("verdict", "Verdict", body)
 
 
@@ -137,17 +148,27 @@ def _doubt(verdict: dict) -> str:
     return "it is in doubt for the reason below"
 
 
-def _gap_of(use: str, one: dict) -> str:
-    """What a machine misses on the records of one use, before and after."""
+def _what(verdict: dict) -> str:
+    """The effects of the verdict with what they are."""
+    return " and ".join(explained(name) for name in verdict["effects"]) or "none"
+
+
+def _missed(one: dict, when: str) -> str:
+    """What a machine misses, before or after, as words."""
+    return f"{misfit(one, when)} of the signal" if one["misfit"][when] > 0 else "nothing"
+
+
+def _gap_of(use: str, one: dict, left: str) -> str:
+    """What a machine misses on the records of one use, before and after, and what is `left` of it."""
     if one["before"] == one["after"]:
-        change = f"misses {misfit(one, 'before')} beyond the noise (reduced chi^2 {number(one['before'])}"
+        change = f"misses {_missed(one, 'before')} beyond the noise (reduced chi^2 {number(one['before'])}"
     else:
         change = (
-            f"missed {misfit(one, 'before')} beyond the noise, the extended machine misses "
-            f"{misfit(one, 'after')} (reduced chi^2 {number(one['before'])} and {number(one['after'])}"
+            f"missed {_missed(one, 'before')} beyond the noise, the extended machine misses "
+            f"{_missed(one, 'after')} (reduced chi^2 {number(one['before'])} and {number(one['after'])}"
         )
     closed = _removed(one)
-    share = "" if closed == "-" else f"; {closed} of the excess is removed"
+    share = f"; {left}" if left else "" if closed == "-" else f"; {closed} of the excess is removed"
     floor = number(one["noise_floor"])
     return f"On {_records_of(use)} the base machine {change}, {floor} of noise alone){share}."
 
@@ -199,6 +220,7 @@ def _compared(verdict: dict) -> Section:
             table,
             f"Held out: {verdict['held_out_chosen']}. Random choices follow from seed {verdict['seed']}; "
             f"separatrix {verdict['version']}, {number(verdict['runtime_s'], 3)} s.",
+            *(["Further notes:", rest] if (rest := verdict["notes"][_FIRST_NOTES:]) else []),
         ],
     )
 
@@ -350,13 +372,19 @@ def _held_out(verdict: dict) -> str:
     )
 
 
+def _of_the_rig(path: str) -> str:
+    """A parameter's path; what the case has no key for, in words."""
+    kind, _, name = path.partition(":")
+    return f"{words(name)} (of the rig, no key of the case)" if kind == "nuisance" else path
+
+
 def _parameters(verdict: dict) -> Section:
     rows = []
     for path, one in verdict["parameters"].items():
         digits = digits_of(one["value"], one["standard_error"])
         rows.append(
             [
-                path + at_knot(one),
+                _of_the_rig(path) + at_knot(one),
                 number(one["value"], digits),
                 "-" if one["standard_error"] is None else number(one["standard_error"], 2),
                 interval(one, digits),

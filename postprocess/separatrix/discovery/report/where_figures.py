@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import NullLocator
 
 from separatrix import style
@@ -89,11 +90,17 @@ def where_plane(details: h5py.File) -> Figure | None:
     norm = SymLogNorm(linthresh=0.05 * largest, vmin=-largest, vmax=largest)
     image = ax.pcolormesh(x, v, force.T, cmap=_DIVERGING, norm=norm, edgecolor="white", linewidth=0.4)
     for i, j in np.ndindex(*shape):
+        if force[i, j] < 0:
+            # the two ends of the colours are alike in grey
+            size = x[i + 1] - x[i], v[j + 1] - v[j]
+            ax.add_patch(
+                Rectangle((x[i], v[j]), *size, fill=False, hatch="////", edgecolor="#00000040", linewidth=0)
+            )
         if np.isfinite(error[i, j]):
             tone = abs(float(norm(force[i, j])) - 0.5)
             ax.text(
                 0.5 * (x[i] + x[i + 1]), 0.5 * (v[j] + v[j + 1]),
-                f"{force[i, j]:.2g}" + ("*" if flagged[i, j] else ""),
+                f"{force[i, j]:+.2g}" + ("*" if flagged[i, j] else ""),
                 ha="center", va="center", fontsize=5.0, color="white" if tone > 0.35 else "black",
             )  # fmt: skip
     of_x, of_v = group.attrs["unit"].split(", ")
