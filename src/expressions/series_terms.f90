@@ -1,225 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Recurrences of the Taylor coefficients of nodes: which one each node has, chosen once, and their terms, order by order.
+!> Terms of the recurrences of `series_program`, order by order.
 module series_terms
   use kinds, only: wp
-  use operations, only: op_acos, op_add, op_arc_tangent, op_asin, op_atan, op_cos, op_cosh, op_divide, op_exp, op_log, &
-    op_multiply, op_negative, op_power, op_select, op_sin, op_sinh, op_sqrt, op_square, op_subtract, op_tan, op_tanh, op_variable
-  use tape, only: node_t, tape_t
+  use series_program, only: add, angle, arc, arc_back, by_linear, by_rate, by_rate_back, by_variable, by_variable_back, copy, &
+    divide, instruction_t, larger, log_of, minus, multiply, of_rate, one_over, one_term, over_steady, power, root, scaled, square, &
+    subtract, turn, turn_back, two_over, two_terms
   implicit none
   private
 
-  public :: compile, put_termwise_last, raise_all
-
-  !> Kinds of recurrences: the integral of a rate; a copy; sums; products with something steady, with something linear in time, of
-  !> two series; quotients; functions with the derivative a' b, a being linear in time or not; the other functions; of two
-  !> branches, where none is chosen, the larger bound; functions with the derivative a' b of a variable a.
-  integer, parameter :: of_rate = 1, copy = 2, minus = 3, add = 4, subtract = 5, scaled = 6, by_linear = 7, multiply = 8, &
-    square = 9, over_steady = 10, divide = 11, turn = 12, by_rate = 13, turn_back = 14, by_rate_back = 15, root = 16, power = 17, &
-    log_of = 18, arc = 19, arc_back = 20, angle = 21, larger = 22, by_variable = 23, by_variable_back = 24
-
-  !> What gives the coefficients of a node: those of nodes a and b.
-  type, public :: instruction_t
-    integer :: kind = copy, node = 0, a = 0, b = 0
-    !> The partner of a function of two arguments, or the rate of a variable; the node that is divided by, 0 for none.
-    integer :: partner = 0, divisor = 0
-    !> Number of the variable that the node is, 0 for none.
-    integer :: variable = 0
-    !> Where the coefficients of the node, of a, b and the partner begin.
-    integer :: at_node = 0, at_a = 0, at_b = 0, at_partner = 0
-  end type instruction_t
+  public :: raise_all
 
 contains
-
-  !> The instructions for the nodes in use that vary, in their order. `rates`: node of the rate of each variable.
-  pure subroutine compile(tape, rates, branches, is_used, program)
-    type(tape_t), intent(in) :: tape
-    integer, intent(in) :: rates(:), branches(:)
-    logical, intent(in) :: is_used(:)
-    type(instruction_t), allocatable, intent(out) :: program(:)
-    logical :: is_linear(tape%count)
-    integer :: i, k
-    allocate (program(count(is_used .and. .not. tape%nodes(:tape%count)%is_steady)))
-    do i = 1, tape%count
-      is_linear(i) = tape%nodes(i)%is_steady
-      if (tape%nodes(i)%operation == op_variable) is_linear(i) = tape%nodes(rates(tape%nodes(i)%first))%is_steady
-    end do
-    k = 0
-    do i = 1, tape%count
-      if (.not. is_used(i) .or. tape%nodes(i)%is_steady) cycle
-      k = k + 1
-      call choose(tape, i, rates, branches, is_linear, program(k))
-      program(k)%node = i
-    end do
-  end subroutine compile
-
-  !> The recurrence of a node, and whether it is linear in time.
-  pure subroutine choose(tape, i, rates, branches, is_linear, chosen)
-    type(tape_t), intent(in) :: tape
-    integer, intent(in) :: i, rates(:), branches(:)
-    logical, intent(inout) :: is_linear(:)
-    type(instruction_t), intent(inout) :: chosen
-    associate (node => tape%nodes(i))
-      chosen%a = node%first
-      select case (node%operation)
-      case (op_variable)
-        chosen = instruction_t(of_rate, a=rates(node%first), variable=node%first)
-      case (op_select)
-        if (node%first <= size(branches)) then
-          chosen%a = merge(node%second, node%third, branches(node%first) > 0)
-          is_linear(i) = is_linear(chosen%a)
-        else
-          chosen = instruction_t(larger, a=node%second, b=node%third)
-        end if
-      case (op_add, op_subtract, op_negative)
-        call choose_sum(tape, node, chosen)
-        is_linear(i) = is_linear(chosen%a)
-        if (chosen%b > 0) is_linear(i) = is_linear(i) .and. is_linear(chosen%b)
-      case (op_multiply)
-        call choose_product(tape, node, is_linear, chosen)
-        is_linear(i) = chosen%kind == scaled .and. is_linear(chosen%b)
-      case (op_divide)
-        chosen = instruction_t(divide, a=node%first, b=node%second, divisor=node%second)
-        if (tape%nodes(node%second)%is_steady) chosen%kind = over_steady
-        is_linear(i) = chosen%kind == over_steady .and. is_linear(node%first)
-      case default
-        call choose_function(node, i, is_linear(node%first), chosen)
-        if (tape%nodes(node%first)%operation == op_variable) call choose_variable(rates(tape%nodes(node%first)%first), chosen)
-      end select
-    end associate
-  end subroutine choose
-
-  !> Of a variable the rate is at hand: its series, not the derivative of that of the variable.
-  pure subroutine choose_variable(rate, chosen)
-    integer, intent(in) :: rate
-    type(instruction_t), intent(inout) :: chosen
-    select case (chosen%kind)
-    case (by_rate)
-      chosen%kind = by_variable
-    case (by_rate_back)
-      chosen%kind = by_variable_back
-    case default
-      return
-    end select
-    chosen%partner = rate
-  end subroutine choose_variable
-
-  !> A sum or difference: of what is steady only the first coefficient is not zero.
-  pure subroutine choose_sum(tape, node, chosen)
-    type(tape_t), intent(in) :: tape
-    type(node_t), intent(in) :: node
-    type(instruction_t), intent(inout) :: chosen
-    if (node%operation == op_negative) then
-      chosen%kind = minus
-    else if (tape%nodes(node%second)%is_steady) then
-      chosen%kind = copy
-    else if (tape%nodes(node%first)%is_steady) then
-      chosen%kind = merge(minus, copy, node%operation == op_subtract)
-      chosen%a = node%second
-    else
-      chosen%kind = merge(subtract, add, node%operation == op_subtract)
-      chosen%b = node%second
-    end if
-  end subroutine choose_sum
-
-  pure subroutine choose_product(tape, node, is_linear, chosen)
-    type(tape_t), intent(in) :: tape
-    type(node_t), intent(in) :: node
-    logical, intent(in) :: is_linear(:)
-    type(instruction_t), intent(inout) :: chosen
-    chosen%kind = multiply
-    if (is_linear(node%first) .or. is_linear(node%second)) chosen%kind = by_linear
-    if (tape%nodes(node%first)%is_steady .or. tape%nodes(node%second)%is_steady) chosen%kind = scaled
-    chosen%b = node%second
-    if (chosen%kind == multiply) return
-    if (chosen%kind == by_linear .and. is_linear(node%first)) return
-    if (tape%nodes(node%first)%is_steady) return
-    chosen%a = node%second
-    chosen%b = node%first
-  end subroutine choose_product
-
-  !> A function of one argument, or the angle of two.
-  pure subroutine choose_function(node, i, turns, chosen)
-    type(node_t), intent(in) :: node
-    integer, intent(in) :: i
-    logical, intent(in) :: turns
-    type(instruction_t), intent(inout) :: chosen
-    chosen%b = node%partner
-    select case (node%operation)
-    case (op_square)
-      chosen%kind = square
-    case (op_sqrt)
-      chosen%kind = root
-      chosen%divisor = i
-    case (op_power)
-      chosen%kind = power
-      chosen%b = node%second
-      chosen%divisor = node%first
-    case (op_exp)
-      chosen%kind = merge(turn, by_rate, turns)
-      chosen%b = i
-    case (op_sin, op_sinh, op_cosh, op_tan, op_tanh)
-      chosen%kind = merge(turn, by_rate, turns)
-    case (op_cos)
-      chosen%kind = merge(turn_back, by_rate_back, turns)
-    case (op_log)
-      chosen%kind = log_of
-      chosen%b = node%first
-      chosen%divisor = node%first
-    case (op_asin, op_atan)
-      chosen%kind = arc
-      chosen%divisor = node%partner
-    case (op_acos)
-      chosen%kind = arc_back
-      chosen%divisor = node%partner
-    case (op_arc_tangent)
-      chosen%kind = angle
-      chosen%b = node%second
-      chosen%partner = node%partner
-      chosen%divisor = node%partner
-    end select
-  end subroutine choose_function
-
-  !> Puts the instructions last whose coefficients depend on those of the same order alone, and which no others need: for them,
-  !> orders need not be raised in turn. `together` is the number of the others.
-  pure subroutine put_termwise_last(program, nodes, order, together)
-    type(instruction_t), intent(inout) :: program(:)
-    integer, intent(in) :: nodes, order
-    integer, intent(out) :: together
-    logical :: is_needed(0:nodes), is_first(size(program))
-    integer :: source(0:nodes), at, before
-    source = [(at, at=0, nodes)]
-    is_needed = .false.
-    do at = 1, size(program)
-      associate (it => program(at))
-        ! Beyond order 0 a copy is its original.
-        if (it%kind == copy) source(it%node) = source(it%a)
-        if (any(it%kind == [copy, minus, add, subtract, over_steady])) it%a = source(it%a)
-        if (any(it%kind == [add, subtract, scaled])) it%b = source(it%b)
-        if (.not. is_termwise(it%kind)) is_needed(it%node) = .true.
-      end associate
-    end do
-    do
-      before = count(is_needed)
-      do at = size(program), 1, -1
-        if (is_needed(program(at)%node)) is_needed([program(at)%a, program(at)%b, program(at)%partner]) = .true.
-      end do
-      if (count(is_needed) == before) exit
-    end do
-    is_first = is_needed(program%node)
-    together = count(is_first)
-    program = [pack(program, is_first), pack(program, .not. is_first)]
-    program%at_node = (program%node - 1)*(order + 1)
-    program%at_a = (program%a - 1)*(order + 1)
-    program%at_b = (program%b - 1)*(order + 1)
-    program%at_partner = (program%partner - 1)*(order + 1)
-  end subroutine put_termwise_last
-
-  pure logical function is_termwise(kind)
-    integer, intent(in) :: kind
-    is_termwise = any(kind == [copy, minus, add, subtract, scaled, over_steady, larger])
-  end function is_termwise
 
   !> Coefficients from order 1 on, from those of order 0; see `raise_orders`. `fault` is 0, or minus the node whose coefficient
   !> is too large.
@@ -271,9 +64,13 @@ contains
     real(wp), intent(in) :: unit, sign, divisor(:)
     real(wp), intent(inout) :: c(0:size(divisor)*(order + 1) - 1)
     integer, intent(out) :: fault
-    real(wp) :: y
+    real(wp) :: y, factor_a(count), factor_b(count)
     integer :: k, at
     fault = 0
+    do at = 1, count
+      factor_a(at) = factor_of(program(at)%factor_a, program(at)%minus_a)
+      factor_b(at) = factor_of(program(at)%factor_b, program(at)%minus_b)
+    end do
     do k = 1, order
       do at = 1, count
         associate (it => program(at), a => program(at)%at_a, b => program(at)%at_b)
@@ -282,24 +79,20 @@ contains
             y = max(c(a + k), c(b + k))
           case (of_rate)
             y = unit*c(a + k - 1)/k
-          case (copy)
-            y = c(a + k)
-          case (minus)
-            y = sign*c(a + k)
-          case (add)
-            y = c(a + k) + c(b + k)
-          case (subtract)
-            y = c(a + k) + sign*c(b + k)
-          case (scaled)
-            y = c(a)*c(b + k)
+          case (one_term)
+            y = factor_a(at)*c(a + k)
+          case (two_terms)
+            y = factor_a(at)*c(a + k) + factor_b(at)*c(b + k)
+          case (one_over)
+            y = factor_a(at)*c(a + k)/divisor(it%divisor)
+          case (two_over)
+            y = (factor_a(at)*c(a + k) + factor_b(at)*c(b + k))/divisor(it%divisor)
           case (by_linear)
             y = c(a)*c(b + k) + c(a + 1)*c(b + k - 1)
           case (multiply)
             y = product_term(c(a), c(b), k)
           case (square)
             y = square_term(c(a), k)
-          case (over_steady)
-            y = c(a + k)/divisor(it%b)
           case (divide)
             y = (c(a + k) + sign*inner_products(c(it%at_node), c(b), k))/divisor(it%b)
           case (turn)
@@ -324,6 +117,17 @@ contains
         return
       end do
     end do
+
+  contains
+
+    pure real(wp) function factor_of(node, is_minus) result(factor)
+      integer, intent(in) :: node
+      logical, intent(in) :: is_minus
+      factor = 1
+      if (node > 0) factor = c((node - 1)*(order + 1))
+      if (is_minus) factor = sign*factor
+    end function factor_of
+
   end subroutine raise_together
 
   !> The same for roots, powers, logarithms and angles: solutions of linear differential equations of first order in the argument.

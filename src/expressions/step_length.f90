@@ -34,6 +34,10 @@ contains
     ! Its powers must not overflow.
     real(real64), parameter :: most = 30
     reach = most
+    ! First those that are mostly the shortest: others then need fewer logarithms.
+    do i = 1, size(others)
+      call shorten(series%c(:, others(i)), series%order, reach)
+    end do
     do i = 1, size(state)
       associate (rate => series%c(:, series%rates(i)), n => series%order)
         if (all(abs(rate(n - 4:n)) <= 0)) cycle
@@ -43,9 +47,6 @@ contains
         end do
       end associate
       call shorten(terms, series%order, reach)
-    end do
-    do i = 1, size(others)
-      call shorten(series%c(:, others(i)), series%order, reach)
     end do
     step = exponential(real(reach, wp))*series%unit
   end function natural_step

@@ -6,7 +6,8 @@
 module tape_series
   use kinds, only: wp
   use operations, only: op_variable
-  use series_terms, only: compile, instruction_t, put_termwise_last, raise_all
+  use series_program, only: compile, instruction_t, put_termwise_last
+  use series_terms, only: raise_all
   use tape, only: tape_t
   use tape_parts, only: needed
   use tape_value, only: evaluate_some
