@@ -13,7 +13,7 @@ import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.locks import lock_options
-from separatrix.stored import NamedErrors, compare_checksums, first_line
+from separatrix.stored import NamedErrors, compare_checksums, first_line, is_ours, why_unreadable
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED, RENAMED_EVENTS
 from separatrix.version import __version__
@@ -73,6 +73,9 @@ def reading(path: str | Path) -> Iterator[None]:
     except SeparatrixError:
         raise
     except KeyError as error:
+        # h5py raises it also for what it finds and cannot read
+        if str(error.args[0]).startswith(("Unable to", "Can't")):
+            raise SeparatrixError(f"{path}: is damaged ({error.args[0]})") from error
         raise SeparatrixError(f"{path}: lacks what is needed of it ({error.args[0]})") from error
     except DAMAGE as error:
         raise SeparatrixError(f"{path}: is damaged ({first_line(error)})") from error
@@ -175,14 +178,22 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
     try:
         with h5py.File(path, "r", **lock_options(path)) as file:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
-            _check_header(path, attributes)
+            if attributes.get("format") != FORMAT and is_ours(file):
+                raise SeparatrixError(f"{path}: is damaged (the attribute format is missing or changed)")
+            try:
+                _check_header(path, attributes)
+            except SeparatrixError:
+                # a damaged attribute is no other kind or version
+                if attributes.get("format") == FORMAT:
+                    compare_checksums(path, file)
+                raise
             compare_checksums(path, file)
             return attributes, _read_provenance(file), [name for name in TABLES if name in file]
     except OSError as error:
-        reason = first_line(error)
+        reason = why_unreadable(path, error)
         if path.suffix == ".toml" and not h5py.is_hdf5(path):
-            reason = CASE_GIVEN
-        raise SeparatrixError(f"{path}: cannot be read as HDF5 ({reason})", BAD_DATA) from error
+            reason = f"cannot be read as HDF5 ({CASE_GIVEN})"
+        raise SeparatrixError(f"{path}: {reason}", BAD_DATA) from error
 
 
 def _check_header(path: Path, attributes: dict) -> None:

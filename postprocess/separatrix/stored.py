@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Damage in a result file: checksums of arrays and attributes, arrays that cannot be decompressed."""
 
+import os
+import re
 import zlib
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from xarray.core import indexing
 
 from separatrix.errors import BAD_DATA, DAMAGE, SeparatrixError
 
-__all__ = ["NamedErrors", "compare_checksums", "first_line"]
+__all__ = ["NamedErrors", "compare_checksums", "first_line", "is_ours", "why_unreadable"]
 
 _SEAL = "attributes_checksum"
 # version of the format from which a file with checksums has one of its attributes
@@ -77,6 +79,23 @@ def _bytes_of(value: object) -> bytes:
         text = value if isinstance(value, bytes) else value.encode(errors="surrogateescape")
         return text + b"\0"
     return np.ascontiguousarray(value, "<f8").tobytes()
+
+
+def is_ours(file: h5py.File) -> bool:
+    """Whether a file has the provenance of a result, also where the attribute of its format is damaged."""
+    return "provenance" in file and "case_identity" in file["provenance"].attrs
+
+
+def why_unreadable(path: Path, error: OSError) -> str:
+    """Return why HDF5 does not read a file: it may not, it is no HDF5 file, it is cut, or it is damaged."""
+    if error.errno is not None:
+        return f"cannot be read ({os.strerror(error.errno)})"
+    if not h5py.is_hdf5(path):
+        return f"cannot be read as HDF5 ({first_line(error)})"
+    ends = re.search(r"truncated file: eof = (\d+), .*stored_eof = (\d+)", str(error))
+    if ends:
+        return f"is cut: {ends[1]} of {ends[2]} bytes are left"
+    return f"is damaged ({first_line(error)})"
 
 
 class NamedErrors(H5netcdfBackendEntrypoint):

@@ -2,9 +2,11 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The cycle that a motion is on at its section points: its period and multipliers decide what errors of long means cannot, whether
-!> a motion that contracts very slowly is periodic.
+!> a motion that contracts very slowly is periodic. The exponents of a motion on a cycle are those of its multipliers, which spares
+!> the means.
 module cycle_reached
-  use exponents, only: period_of_section, spectrum_t
+  use direction_frame, only: log_of
+  use exponents, only: on_circle, period_of_section, spectrum_t
   use hybrid_machine, only: event_t, hybrid_t
   use kinds, only: wp
   use matrices, only: solve
@@ -14,7 +16,7 @@ module cycle_reached
   implicit none
   private
 
-  public :: note_cycle
+  public :: note_cycle, note_cycle_exponents
 
   !> Section points come back within this share of their range. In natural sizes: one so near to a cycle is on it, so near it may
   !> come to it; and Newton's method has converged where its steps are no longer.
@@ -24,8 +26,66 @@ module cycle_reached
   !> taken as the largest of so many, and by how much, as a logarithm, the multiplier lets it at least.
   integer, parameter :: longest = 32, watched_sections = 20000, block = 256
   real(wp), parameter :: least_decay = 0.05_wp
+  !> Section points that show the period of a cycle. A cycle is looked for after so many sections, and whenever they have doubled.
+  integer, parameter :: last_points = 64
+  !> Moduli from which on a multiplier is known to the digits of an exponent, and up to which it is that of a lost direction.
+  real(wp), parameter :: known_from = 1e-6_wp, lost_to = 1e-9_wp
+
+  !> A motion that is watched in its transient, until it is on a cycle that attracts.
+  type, public :: cycle_watch_t
+    !> Sections of the cycle, 0: none is known; its section point and multipliers.
+    integer :: sections = 0
+    real(wp), allocatable :: point(:)
+    complex(wp), allocatable :: multipliers(:)
+    integer, private :: passed = 0, next = last_points
+    real(wp), private :: positions(last_points) = 0
+  contains
+    procedure :: look => look_for_cycle
+  end type cycle_watch_t
 
 contains
+
+  !> Looks at the next section point, with the watched position there.
+  subroutine look_for_cycle(self, machines, position, point)
+    class(cycle_watch_t), intent(inout) :: self
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: position, point(:)
+    integer :: sections
+    self%positions = [self%positions(2:), position]
+    self%passed = self%passed + 1
+    if (self%passed < self%next) return
+    self%next = 2*self%next
+    call find_cycle(machines, nearest_period(self%positions), point, self%point, sections, self%multipliers)
+    if (sections == 0) return
+    if (maxval(abs(self%multipliers)) >= 1 - on_circle .or. distance(machines%centre, self%point, point) > on_cycle) return
+    self%sections = sections
+  end subroutine look_for_cycle
+
+  !> Exponents of a motion on a watched cycle that takes a `duration` [s] and leaves so many directions as are `left`. `ok`: the
+  !> multipliers distinguish the directions that are left from those that are lost.
+  subroutine note_cycle_exponents(watch, duration, left, spectrum, ok)
+    type(cycle_watch_t), intent(in) :: watch
+    real(wp), intent(in) :: duration
+    integer, intent(in) :: left
+    type(spectrum_t), intent(inout) :: spectrum
+    logical, intent(out) :: ok
+    real(wp) :: sizes(size(watch%multipliers))
+    sizes = abs(watch%multipliers)
+    ok = all(sizes(:left) > known_from) .and. all(sizes(left + 1:) < lost_to)
+    if (.not. ok) return
+    spectrum%exponents(:left) = log_of(sizes(:left))/duration
+    spectrum%exponents(left + 1:) = -huge(1.0_wp)
+    spectrum%errors = 0
+    spectrum%halves = spectrum%exponents(1)
+    spectrum%sum_found = sum(spectrum%exponents)
+    spectrum%cycle = watch%sections
+    spectrum%multiplier = maxval(sizes)
+    spectrum%by_multipliers = .true.
+    spectrum%returns = .true.
+    spectrum%known = .true.
+    spectrum%periods = watch%sections
+    spectrum%mean_period = duration/watch%sections
+  end subroutine note_cycle_exponents
 
   !> Notes in `spectrum` whether the section points come back, and the cycle that the last of them (`spectrum%point`, of which
   !> `series` has the watched position) is on, if Newton's method finds one.
@@ -33,15 +93,36 @@ contains
     type(neighbourhood_t), intent(in) :: machines
     real(wp), intent(in) :: series(:)
     type(spectrum_t), intent(inout) :: spectrum
-    real(wp), allocatable :: point(:), matrix(:, :)
+    real(wp), allocatable :: point(:)
     complex(wp), allocatable :: values(:)
-    integer :: period, k
-    logical :: ok
+    integer :: period, sections
     period = period_of_section(series, same)
     spectrum%returns = period > 0
     if (.not. allocated(spectrum%point)) return
     if (.not. spectrum%returns) period = nearest_period(series)
-    call refine(machines, period, spectrum%point, point, matrix, ok)
+    call find_cycle(machines, period, spectrum%point, point, sections, values)
+    if (sections == 0) return
+    if (distance(machines%centre, point, spectrum%point) > on_cycle) then
+      if (.not. approaches(machines, point, spectrum%point, sections, maxval(abs(values)))) return
+    end if
+    spectrum%cycle = sections
+    spectrum%multiplier = maxval(abs(values))
+  end subroutine note_cycle
+
+  !> The cycle next to `start` that comes back after a `period` of so many sections, or a divisor: its section point, `sections` (0:
+  !> there is none) and multipliers.
+  subroutine find_cycle(machines, period, start, point, sections, values)
+    type(neighbourhood_t), intent(in) :: machines
+    integer, intent(in) :: period
+    real(wp), intent(in) :: start(:)
+    real(wp), allocatable, intent(out) :: point(:)
+    integer, intent(out) :: sections
+    complex(wp), allocatable, intent(out) :: values(:)
+    real(wp), allocatable :: matrix(:, :)
+    integer :: k
+    logical :: ok
+    sections = 0
+    call refine(machines, period, start, point, matrix, ok)
     if (.not. ok) return
     do k = 1, period
       if (modulo(period, k) /= 0) cycle
@@ -49,17 +130,12 @@ contains
     end do
     ! Newton's method came to an orbit too unstable to come back to the digits it is known to.
     if (k > period) return
-    if (k < period) call refine(machines, k, spectrum%point, point, matrix, ok)
+    if (k < period) call refine(machines, k, start, point, matrix, ok)
     if (.not. ok) return
     values = multipliers_of(matrix)
     ! One that rounding hides is not known.
-    if (.not. all(abs(values) < huge(1.0_wp))) return
-    if (distance(machines%centre, point, spectrum%point) > on_cycle) then
-      if (.not. approaches(machines, point, spectrum%point, k, maxval(abs(values)))) return
-    end if
-    spectrum%cycle = k
-    spectrum%multiplier = maxval(abs(values))
-  end subroutine note_cycle
+    if (all(abs(values) < huge(1.0_wp))) sections = k
+  end subroutine find_cycle
 
   !> The number of sections, up to `longest`, after which the last positions come back the nearest.
   pure integer function nearest_period(series) result(period)

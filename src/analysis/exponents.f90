@@ -32,6 +32,9 @@ module exponents
   !> Values of the 0-1 test from and to which it decides.
   real(wp), parameter, public :: chaotic_from = 0.8_wp, regular_to = 0.2_wp
 
+  !> A multiplier so near to the unit circle is on it.
+  real(wp), parameter, public :: on_circle = 1e-10_wp
+
   !> What a motion may be.
   integer, parameter, public :: motion_not_known = 0, motion_contracting = 1, motion_neutral = 2, motion_chaotic = 3, &
     motion_transient = 4
@@ -55,6 +58,8 @@ module exponents
     real(wp), allocatable :: point(:)
     integer :: cycle = 0
     real(wp) :: multiplier = 0
+    !> The exponents are those of the multipliers of that cycle, and `periods` its sections.
+    logical :: by_multipliers = .false.
     !> Largest exponent of the first and of the second half.
     real(wp) :: halves(2) = 0
     !> What the turning of the directions may bring into exponents, where those are of many motions that turn alike [1/s].
@@ -322,12 +327,12 @@ contains
   pure integer function type_of_motion(spectrum, k) result(motion)
     type(spectrum_t), intent(in) :: spectrum
     real(wp), intent(in) :: k
-    !> Of a logarithm over a section; of a multiplier.
-    real(wp), parameter :: rounding = 10*epsilon(1.0_wp), neutral = 1e-10_wp
+    !> Of a logarithm over a section.
+    real(wp), parameter :: rounding = 10*epsilon(1.0_wp)
     motion = motion_not_known
     if (.not. spectrum%known .or. spectrum%at_rest) return
     associate (largest => spectrum%exponents(1), error => spectrum%errors(1), room => 3*spectrum%errors(1) + spectrum%memory)
-      if (spectrum%cycle > 0 .and. spectrum%multiplier < 1 - neutral) then
+      if (spectrum%cycle > 0 .and. spectrum%multiplier < 1 - on_circle) then
         if (k < regular_to) motion = motion_contracting
       else if (abs(spectrum%halves(1) - spectrum%halves(2)) > 2*sqrt(2.0_wp)*room + 1e-9_wp*abs(largest) .and. error > 0) then
         motion = motion_transient

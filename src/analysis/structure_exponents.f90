@@ -3,25 +3,23 @@
 
 !> Lyapunov spectrum of a motion of a structure, by orthogonal directions carried from section to section (Benettin et al. 1980).
 module structure_exponents
-  use cycle_reached, only: note_cycle
+  use cycle_reached, only: cycle_watch_t, note_cycle, note_cycle_exponents
   use direction_frame, only: log_of, orthogonalise
-  use elementary, only: logarithm
   use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
   use turn_exponents, only: exponents_from_point, exponents_of_turns
-  use multibody, only: joint_contact, joint_soft
   use multibody_section, only: multibody_point, lay_out
-  use multibody_state, only: joint_motion, multibody_state_t, turning_at
+  use multibody_state, only: multibody_state_t
   use kinds, only: int64, wp
   use motion, only: start_state
-  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, event_touch_lower, &
-    event_touch_upper, event_turning_point, state_t, tally_t
+  use motion_state, only: state_t, tally_t
   use one_body, only: one_body_t
   use status, only: reason_not_smooth
-  use structure, only: coordinates_of, state_in, structure_t
+  use structure, only: coordinates_of, structure_t
   use structure_modes, only: mode_number
   use structure_family, only: least_dimension, state_at_start, vary_section
+  use structure_volumes, only: has_exact_sum, note_events, note_sum
   use structure_walk, only: advance_section, start_of_structure
   use variations, only: neighbourhood_t
   implicit none
@@ -35,6 +33,8 @@ module structure_exponents
   !> motion whose turns go on in the rounding.
   real(wp), parameter :: still = 1e-5_wp, died_away = 1e-9_wp
   integer, parameter :: quiet_sections = 8
+  !> And above which it does not come to rest on a cycle.
+  real(wp), parameter :: goes_on = 1e-3_wp
 
 contains
 
@@ -112,6 +112,7 @@ contains
     real(wp) :: frame(structure%n, structure%n), batch(batches, structure%n), growth(structure%n), duration, lasted, pace(sections)
     real(wp) :: rate, largest_rate
     type(event_t), allocatable :: events(:)
+    type(cycle_watch_t) :: watch
     integer :: i, k, part, mode, left, quiet
     series = 0
     batch = 0
@@ -140,7 +141,15 @@ contains
       if (.not. structure%has_clock .and. quiet >= quiet_sections) return
       call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%reason)
       if (spectrum%reason /= 0) return
-      if (i < 1) cycle
+      if (i < 1) then
+        ! Without a clock it may be coming to rest.
+        if (.not. (structure%has_clock .or. rate > goes_on)) cycle
+        call watch%look(machines, position_of(structure, state), coordinates_of(structure, state))
+        if (watch%sections == 0) cycle
+        call pass_cycle(machines, structure, watch, state, spectrum, series)
+        if (spectrum%known .or. spectrum%reason /= 0) return
+        cycle
+      end if
       left = min(left, least_dimension(structure, mode, events))
       duration = duration + lasted
       part = 1 + int((int(i - 1, int64)*batches)/sections)
@@ -156,6 +165,55 @@ contains
     spectrum%at_rest = .not. structure%has_clock .and. fades_away(pace, -spectrum%exponents(1)*duration/2)
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
+
+  !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
+  !> distinguish the directions that are left from those that are lost; the watch is over then.
+  subroutine pass_cycle(machines, structure, watch, state, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    type(structure_t), intent(in) :: structure
+    type(cycle_watch_t), intent(inout) :: watch
+    type(multibody_state_t), intent(inout) :: state
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp), intent(inout) :: series(:)
+    type(spectrum_t) :: before
+    type(multibody_state_t) :: there
+    type(event_t), allocatable :: events(:)
+    real(wp) :: frame(structure%n, structure%n), growth(structure%n), duration, lasted, positions(watch%sections)
+    integer :: i, mode, left
+    logical :: ok
+    call start_of_structure(structure, watch%point, there, ok)
+    if (ok) state = there
+    before = spectrum
+    duration = 0
+    left = structure%n
+    frame = 0
+    do i = 1, structure%n
+      frame(i, i) = 1
+    end do
+    do i = 1, watch%sections
+      call bring_back(structure, state)
+      mode = mode_number(structure%frame%moving%machine, state%phase)
+      call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%reason)
+      if (spectrum%reason /= 0) return
+      left = min(left, least_dimension(structure, mode, events))
+      duration = duration + lasted
+      call note_events(structure, events, spectrum)
+      positions(i) = position_of(structure, state)
+    end do
+    if (.not. structure%has_clock) then
+      left = min(left, structure%n - 1)
+      spectrum%exponents = spectrum%exponents(:structure%n - 1)
+      spectrum%errors = spectrum%errors(:structure%n - 1)
+    end if
+    call note_cycle_exponents(watch, duration, left, spectrum, ok)
+    if (.not. ok) then
+      spectrum = before
+      return
+    end if
+    call note_sum(structure, duration, left, spectrum)
+    spectrum%point = coordinates_of(structure, state)
+    series = [(positions(1 + modulo(i - 1, size(positions))), i=1, size(series))]
+  end subroutine pass_cycle
 
   !> Whether a motion comes to rest: the paces at its sections fall from one half of them to the other as the largest exponent
   !> predicts, by `decay` as a logarithm, while those of a motion that comes to a cycle stay.
@@ -278,84 +336,7 @@ contains
     spectrum%decay = decay_of(batch(:, 1))
     spectrum%halves = 2*[sum(batch(:batches/2, 1)), sum(batch(batches/2 + 1:, 1))]/batches
     spectrum%sum_found = sum(batch)/batches
-    spectrum%sum_exact = spectrum%sum_exact/duration - damping_rate(structure)
-    spectrum%has_sum = spectrum%has_sum .and. left == structure%n
+    call note_sum(structure, duration, left, spectrum)
   end subroutine conclude
-
-  !> Whether volumes change by a formula: linear damping, constant restitutions, friction that does not depend on the speed; no
-  !> contact that is a spring.
-  pure logical function has_exact_sum(structure)
-    type(structure_t), intent(in) :: structure
-    associate (machine => structure%frame%moving%machine)
-      has_exact_sum = machine%linear .and. structure%has_clock .and. structure%positions == machine%n .and. &
-                      .not. any(machine%joints%kind == joint_soft) .and. size(structure%frame%elastic) == 0
-      if (size(machine%joints) > 0) has_exact_sum = has_exact_sum .and. &
-        .not. any(machine%joints%kind == joint_contact .and. machine%joints%contact%kind /= 0)
-    end associate
-  end function has_exact_sum
-
-  !> Trace of the damping over the masses [1/s].
-  pure real(wp) function damping_rate(structure)
-    type(structure_t), intent(in) :: structure
-    integer :: i
-    damping_rate = 0
-    associate (machine => structure%frame%moving%machine)
-      do i = 1, machine%n
-        damping_rate = damping_rate + sum(machine%mobility(i, :)*machine%damping(:, i))
-      end do
-    end associate
-  end function damping_rate
-
-  !> Adds the logarithms by which the events of a section change volumes; what is neither an impact nor a turning point has no
-  !> formula.
-  subroutine note_events(structure, events, spectrum)
-    type(structure_t), intent(in) :: structure
-    type(event_t), intent(in) :: events(:)
-    type(spectrum_t), intent(inout) :: spectrum
-    real(wp) :: e
-    integer :: k
-    do k = 1, size(events)
-      associate (event => events(k))
-        select case (event%kind)
-        case (event_impact_upper, event_impact_lower)
-          spectrum%impacts = spectrum%impacts + 1
-          e = structure%frame%moving%machine%joints(event%joint)%contact%restitution
-          if (e > 0) spectrum%sum_exact = spectrum%sum_exact + 2*logarithm(e)
-          if (.not. e > 0) spectrum%has_sum = .false.
-          spectrum%has_sum = spectrum%has_sum .and. event%before == event%after
-        case (event_touch_upper, event_touch_lower)
-          spectrum%impacts = spectrum%impacts + 1
-        case (event_chatter_upper, event_chatter_lower)
-          ! The impact with which the contact closes.
-          spectrum%impacts = spectrum%impacts + 1
-          spectrum%has_sum = .false.
-        case (event_turning_point)
-          spectrum%sum_exact = spectrum%sum_exact &
-            + logarithm(abs(slide_rate(structure, event, event%after, event%departure)/ &
-                            slide_rate(structure, event, event%before, event%arrival)))
-        case default
-          spectrum%has_sum = .false.
-        end select
-      end associate
-    end do
-  end subroutine note_events
-
-  !> Acceleration of the joint of an event in a mode [m/s^2].
-  pure real(wp) function slide_rate(structure, event, mode, y)
-    type(structure_t), intent(in) :: structure
-    type(event_t), intent(in) :: event
-    integer, intent(in) :: mode
-    real(wp), intent(in) :: y(:)
-    type(multibody_state_t) :: state
-    real(wp) :: slope(structure%n), s, u, given
-    associate (machine => structure%frame%moving%machine, p => structure%positions)
-      state = state_in(structure, mode, event%time, y(:structure%n))
-      slope = structure%slope(mode, event%time, y(:structure%n))
-      call joint_motion(machine, event%joint, state%q, state%v, event%time, &
-                        turning_at(machine%frequency, event%time, structure%frame%moving%harmonics), s, u, given)
-      slide_rate = sum(machine%joints(event%joint)%row* &
-                       matmul(structure%frame%velocities, slope(p + 1:p + structure%frame%speeds))) + given
-    end associate
-  end function slide_rate
 
 end module structure_exponents

@@ -4,6 +4,7 @@
 !> Lyapunov spectrum of a machine with a motor, or by expressions, by orthogonal directions carried from section to section.
 !> Without a clock the trivial exponent 0 is left out.
 module turn_exponents
+  use cycle_reached, only: cycle_watch_t, note_cycle_exponents
   use direction_frame, only: log_of, orthogonalise
   use exponents, only: batches, decay_of, error_of, spectrum_t
   use hybrid_machine, only: event_t
@@ -48,6 +49,7 @@ contains
     real(wp), intent(out) :: series(:)
     type(event_t), allocatable :: events(:)
     real(wp) :: growth(size(point)), frame(size(point), size(point)), batch(batches, size(point)), duration
+    type(cycle_watch_t) :: watch
     integer :: i, left, part, directions
     series = 0
     batch = 0
@@ -64,13 +66,19 @@ contains
       end if
       if (spectrum%reason /= 0) return
       ! Nor what it loses.
-      if (i < 1) left = directions
-      if (i < 1) cycle
-      if (machines%centre%has_clock) then
-        duration = duration + machines%centre%period
-      else
-        duration = duration + events(size(events))%time
+      if (i < 1) then
+        left = directions
+        if (.not. (machines%centre%has_clock .or. machines%centre%crank_section)) cycle
+        call watch%look(machines, point(1), point)
+        if (watch%sections == 0) cycle
+        call pass_cycle(machines, watch, directions, point, spectrum, series)
+        if (spectrum%known .or. spectrum%reason /= 0) then
+          spectrum%passed = transient + i
+          return
+        end if
+        cycle
       end if
+      duration = duration + duration_of(machines, events)
       part = 1 + int((int(i - 1, int64)*batches)/turns)
       batch(part, :) = batch(part, :) + log_of(growth)
       spectrum%impacts = spectrum%impacts + count(events%kind == event_impact_upper .or. events%kind == event_impact_lower)
@@ -83,6 +91,51 @@ contains
     spectrum%mean_period = duration/turns
     call conclude(batch(:, :directions)*batches/duration, left, spectrum)
   end subroutine exponents_from_point
+
+  !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
+  !> distinguish the directions that are left from those that are lost; the watch is over then.
+  subroutine pass_cycle(machines, watch, directions, point, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    type(cycle_watch_t), intent(inout) :: watch
+    integer, intent(in) :: directions
+    real(wp), intent(inout) :: point(:)
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp), intent(inout) :: series(:)
+    type(event_t), allocatable :: events(:)
+    real(wp) :: growth(size(point)), frame(size(point), size(point)), duration, positions(watch%sections)
+    integer(int64) :: impacts
+    integer :: i, left
+    logical :: ok
+    left = directions
+    duration = 0
+    impacts = 0
+    call begin_frame(frame)
+    point = watch%point
+    do i = 1, watch%sections
+      call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
+      if (spectrum%reason /= 0) return
+      duration = duration + duration_of(machines, events)
+      impacts = impacts + count(events%kind == event_impact_upper .or. events%kind == event_impact_lower)
+      positions(i) = point(1)
+    end do
+    allocate (spectrum%exponents(directions), spectrum%errors(directions))
+    call note_cycle_exponents(watch, duration, left, spectrum, ok)
+    if (.not. ok) then
+      deallocate (spectrum%exponents, spectrum%errors)
+      return
+    end if
+    spectrum%impacts = impacts
+    spectrum%point = point
+    series = [(positions(1 + modulo(i - 1, size(positions))), i=1, size(series))]
+  end subroutine pass_cycle
+
+  !> Time from one section to the next [s].
+  pure real(wp) function duration_of(machines, events) result(duration)
+    type(neighbourhood_t), intent(in) :: machines
+    type(event_t), intent(in) :: events(:)
+    duration = machines%centre%period
+    if (.not. machines%centre%has_clock) duration = events(size(events))%time
+  end function duration_of
 
   !> Orthonormal directions, each of which has a part along every coordinate: those of coordinates that do not act on others would
   !> stay so, in whatever order they grow.

@@ -6,6 +6,7 @@ module case_overrides
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use status, only: exit_bad_case
+  use text, only: replace_all
   use toml_bindings, only: read_toml, toml_array, toml_entry_t, toml_table
   implicit none
   private
@@ -37,7 +38,7 @@ contains
       ! The value is parsed under a short name: 'axis[1].count' is a path, not a TOML key.
       call read_toml('v = '//override(mark + 1:), '', added, error)
       if (allocated(error)) then
-        problem = error%message(index(error%message, ': ') + 2:)
+        problem = replace_all(error%message(index(error%message, ': ') + 2:), "'v", "'"//key)
       else if (any_other_key(added)) then
         problem = 'found more than one value'
       end if

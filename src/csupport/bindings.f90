@@ -9,7 +9,7 @@ module bindings
   private
 
   public :: c_crashed, c_fork, c_signals_farewell, c_signals_install, c_signals_ignore_file_limit, c_signals_limit, &
-    c_signals_no_limit, c_signals_terminated, &
+    c_signals_no_limit, c_signals_notice, c_signals_terminated, &
     c_signals_received, c_signals_clear, c_signals_raise, c_crc32, &
     c_philox, c_uniform, c_monotonic_seconds, c_utc_now, c_resident_bytes, c_host_name, c_keep_memory, &
     c_stderr_is_terminal, c_default_environment, c_set_environment, c_sleep_microseconds, c_exit, c_exit_now, c_file_exists, &
@@ -138,6 +138,9 @@ module bindings
 
     subroutine c_signals_no_limit() bind(c, name='separatrix_signals_no_limit')
     end subroutine c_signals_no_limit
+
+    subroutine c_signals_notice() bind(c, name='separatrix_signals_notice')
+    end subroutine c_signals_notice
 
     subroutine c_signals_clear() bind(c, name='separatrix_signals_clear')
     end subroutine c_signals_clear

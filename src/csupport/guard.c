@@ -12,6 +12,8 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include "guard.h"
+
 static const int guarded[] = {SIGPROF, SIGSEGV, SIGBUS, SIGFPE, SIGABRT};
 enum { guarded_count = sizeof guarded / sizeof *guarded };
 
@@ -21,9 +23,11 @@ static int exit_code;
 static volatile sig_atomic_t active;
 static int held, timed;
 /* Standard error, which is silent meanwhile: the C library has a word of its own before it aborts. */
-static int messages = -1;
+static volatile sig_atomic_t messages = -1;
 
 static void speak_again(void);
+
+int separatrix_guard_messages(void) { return messages < 0 ? STDERR_FILENO : messages; }
 
 static void give_up(int number) {
   if (!active) {
@@ -34,7 +38,7 @@ static void give_up(int number) {
     raise(number);
     return;
   }
-  if (write(messages < 0 ? STDERR_FILENO : messages, message, strlen(message)) < 0)
+  if (write(separatrix_guard_messages(), message, strlen(message)) < 0)
     _exit(exit_code);
   _exit(exit_code);
 }
@@ -49,11 +53,12 @@ static void silence(void) {
 }
 
 static void speak_again(void) {
-  if (messages < 0)
+  const int kept = messages;
+  if (kept < 0)
     return;
-  dup2(messages, STDERR_FILENO);
-  close(messages);
+  dup2(kept, STDERR_FILENO);
   messages = -1;
+  close(kept);
 }
 
 static void install(void) {

@@ -6,14 +6,14 @@
 module signals
   use, intrinsic :: iso_c_binding, only: c_null_char
   use bindings, only: c_signals_clear, c_signals_farewell, c_signals_ignore_file_limit, c_signals_install, c_signals_limit, &
-    c_signals_no_limit, c_signals_raise, c_signals_received, c_signals_terminated
+    c_signals_no_limit, c_signals_notice, c_signals_raise, c_signals_received, c_signals_terminated
   use errors, only: error_t, fail
   use kinds, only: real64
   use status, only: exit_internal
   implicit none
   private
 
-  public :: install_signals, ignore_file_limit, set_farewell, begin_time_limit, end_time_limit
+  public :: install_signals, ignore_file_limit, set_farewell, begin_time_limit, end_time_limit, notice_stop
   public :: signal_count, termination_asked, clear_signals, raise_signal
 
   !> Linux signal numbers.
@@ -45,6 +45,11 @@ contains
   subroutine end_time_limit()
     call c_signals_no_limit()
   end subroutine end_time_limit
+
+  !> The process ends, for whatever reason: neither a signal that came nor the time limit has to end it.
+  subroutine notice_stop()
+    call c_signals_notice()
+  end subroutine notice_stop
 
   !> Makes a write beyond the file size limit an error instead of the end of the process; code 70 if the system refuses.
   subroutine ignore_file_limit(error)

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cfenv>
 #include <cfloat>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -61,7 +62,24 @@ std::string quoted_if_needed(const std::string &key) {
   return bare ? key : "\"" + key + "\"";
 }
 
-void flatten(const Value &value, const std::string &path, Document &document) {
+// The decimal or hexadecimal integer at a position of the text as a number; false for any other text.
+bool number_at(const std::string &text, int line, int column, double &number) {
+  std::istringstream lines(text);
+  std::string digits;
+  for (int i = 0; i < line; ++i)
+    if (!std::getline(lines, digits))
+      return false;
+  if (column < 1 || static_cast<std::size_t>(column) > digits.size())
+    return false;
+  digits.erase(0, static_cast<std::size_t>(column) - 1);
+  digits.resize(std::min(digits.find_first_not_of("+-_0123456789xabcdefABCDEF"), digits.size()));
+  digits.erase(std::remove(digits.begin(), digits.end(), '_'), digits.end());
+  char *end = nullptr;
+  number = std::strtod(digits.c_str(), &end);
+  return !digits.empty() && *end == '\0' && std::fabs(number) >= 0x1p63 && std::fabs(number) <= DBL_MAX;
+}
+
+void flatten(const Value &value, const std::string &path, const std::string &text, Document &document) {
   Entry entry;
   entry.path = path;
   entry.line = static_cast<int>(value.location().line());
@@ -70,8 +88,11 @@ void flatten(const Value &value, const std::string &path, Document &document) {
     entry.kind = SEPARATRIX_TOML_INTEGER;
     entry.integer = value.as_integer();
     entry.real = static_cast<double>(entry.integer);
-    // toml11 clamps what it cannot hold, without a word.
-    if (entry.integer == INT64_MAX || entry.integer == INT64_MIN)
+    // toml11 clamps what it cannot hold, without a word. It is a number that no integer key allows.
+    const bool clamped = entry.integer == INT64_MAX || entry.integer == INT64_MIN;
+    if (clamped && number_at(text, entry.line, entry.column, entry.real))
+      entry.kind = SEPARATRIX_TOML_FLOAT;
+    else if (clamped)
       document.fail("the integer of key '" + path + "' is too large", entry.line, entry.column);
   } else if (value.is_floating()) {
     entry.kind = SEPARATRIX_TOML_FLOAT;
@@ -94,11 +115,11 @@ void flatten(const Value &value, const std::string &path, Document &document) {
     document.entries.push_back(entry);
   if (value.is_table()) {
     for (const auto &item : value.as_table())
-      flatten(item.second, (path.empty() ? "" : path + ".") + quoted_if_needed(item.first), document);
+      flatten(item.second, (path.empty() ? "" : path + ".") + quoted_if_needed(item.first), text, document);
   } else if (value.is_array()) {
     int index = 0;
     for (const auto &item : value.as_array())
-      flatten(item, path + "[" + std::to_string(++index) + "]", document);
+      flatten(item, path + "[" + std::to_string(++index) + "]", text, document);
   }
 }
 
@@ -282,7 +303,7 @@ void parse(const std::string &text, Document &document) {
   }
   try {
     std::istringstream stream(text);
-    flatten(toml::parse<toml::discard_comments, std::map, std::vector>(stream, "case"), "", document);
+    flatten(toml::parse<toml::discard_comments, std::map, std::vector>(stream, "case"), "", text, document);
     std::stable_sort(document.entries.begin(), document.entries.end(), [](const Entry &a, const Entry &b) {
       return a.line < b.line || (a.line == b.line && a.column < b.column);
     });

@@ -15,13 +15,14 @@ module basin_driver
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
   use refined_tile, only: pilot_share
+  use run_plan, only: pilot_seconds, plan_text
   use second_look, only: look_again, resume_second_look
   use session, only: identity_of, open_session, session_t
   use shard, only: describe_shard, finish_search, finish_shard, shard_path
   use share_files, only: read_catalogue
   use status, only: exit_done
   use text, only: to_text
-  use tiled_run, only: open_tiles, pilot_seconds, plan_text, run_tiles
+  use tiled_run, only: open_tiles, run_tiles
   implicit none
   private
 
@@ -114,12 +115,12 @@ contains
     if (work%refine%active) then
       call pilot_share(work, work%grid%shape, seconds, share, error)
       call session%stop_if(error)
-      call session%journal%line('plan', plan_text(work%grid%shape, tile, schema%bytes_of_point(), seconds))
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, schema%bytes_of_point(), seconds, session%command))
       call session%journal%line('plan', 'about '//to_text(100*share, 2)//' % of the points computed (from a few blocks)')
     else
       call pilot_seconds(work, work%grid%shape, seconds, error)
       call session%stop_if(error)
-      call session%journal%line('plan', plan_text(work%grid%shape, tile, schema%bytes_of_point(), seconds))
+      call session%journal%line('plan', plan_text(work%grid%shape, tile, schema%bytes_of_point(), seconds, session%command))
     end if
     call session%end_with(exit_done)
   end subroutine report_plan

@@ -28,8 +28,9 @@ module boundary_driver
   use map_reader, only: reader_t
   use map_schema, only: schema_t
   use session, only: describe_file, identity_of, session_t
-  use signals, only: end_time_limit
+  use signals, only: end_time_limit, set_farewell
   use status, only: exit_bad_case, exit_done
+  use stop_check, only: nothing_kept
   use stored_map, only: open_map_session, read_labels, restore_catalogues
   use text, only: replace_all, to_text
   use trajectory_slots, only: describe_regime
@@ -67,6 +68,7 @@ contains
     call assess_file(session%journal, reader, command%partial, error)
     call session%stop_if(error)
     call session%begin(path, tiled=.true.)
+    call set_farewell('stopped within one long trajectory; '//nothing_kept)
     call restore_catalogues(reader, session%team, session%journal, grid, session%the_case, catalogues, error)
     if (.not. allocated(error)) call kept%open(session, path, work_identity(session, planes, catalogues), &
                                                'following the boundary', error)

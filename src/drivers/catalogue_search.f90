@@ -17,7 +17,7 @@ module catalogue_search
   use parallel, only: make_scheduler
   use scheduler, only: scheduler_options_t, scheduler_t
   use status, only: exit_bad_case, exit_io, exit_resumable
-  use stop_check, only: check_stop
+  use stop_check, only: check_stop, nothing_kept
   use team, only: team_t
   use text, only: to_text
   use trajectory_slots, only: describe_regime, ensemble_t
@@ -121,8 +121,8 @@ contains
     call slices%finish()
     call team%agree(error)
     if (allocated(error)) return
-    if (slices%stop_requested()) call fail(error, exit_resumable, 'stopped while searching for attractors; nothing '// &
-      'was written yet, the same command starts again')
+    if (slices%stop_requested()) call fail(error, exit_resumable, 'stopped while searching for attractors; '// &
+      nothing_kept)
   end subroutine search_round
 
   !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is noticed between them. Those that lead to

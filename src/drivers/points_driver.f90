@@ -12,11 +12,12 @@ module points_driver
   use map_file, only: map_file_t
   use map_schema, only: schema_t
   use point_list, only: read_point_list
+  use run_plan, only: pilot_seconds, plan_text
   use session, only: open_session, session_t
   use shard, only: describe_shard, finish_shard, shard_path
   use span_check, only: check_periods
   use status, only: exit_done
-  use tiled_run, only: open_tiles, pilot_seconds, plan_text, run_tiles
+  use tiled_run, only: open_tiles, run_tiles
   use trajectories, only: block_size
   implicit none
   private
@@ -59,7 +60,7 @@ contains
       call session%stop_if(error)
       call describe_points(work%list, schema)
       call session%journal%line('plan', plan_text([size(work%list%x0)], [points_per_tile], &
-                                                  schema%bytes()/size(work%list%x0) + schema%bytes_of_point(), seconds))
+                                                  schema%bytes()/size(work%list%x0) + schema%bytes_of_point(), seconds, command))
       call session%end_with(exit_done)
     end if
     call session%begin(path, tiled=.true.)

@@ -25,9 +25,9 @@ module session
   use parallel, only: start_team
   use provenance, only: provenance_t, start_provenance
   use restoring_law, only: position_is_angle
-  use signals, only: ignore_file_limit, install_signals, set_farewell, termination_asked
+  use signals, only: ignore_file_limit, install_signals, notice_stop, set_farewell, termination_asked
   use status, only: exit_cannot_create, exit_done, exit_io
-  use stop_check, only: limit_time
+  use stop_check, only: limit_time, nothing_kept
   use sketch, only: sketch_of
   use structure_file, only: read_structure_file
   use system, only: exit_program, sleep_microseconds
@@ -84,7 +84,7 @@ contains
     call session%stop_if(error)
     row = rows(command_number(command%name))
     if (row%stops_early) call install_signals(error)
-    call set_farewell('stopped within one long trajectory; nothing was written yet, the same command starts again')
+    call set_farewell('stopped within one long trajectory; '//nothing_kept)
     if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call h5_read_alignment(bytes, error)
@@ -252,6 +252,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     call self%team%agree(error)
     if (.not. allocated(error)) return
+    ! Not only on the rank that has noticed it: the others may wait longer than their timers.
+    call notice_stop()
     call self%journal%error(error%message)
     if (self%writing .and. (error%code == exit_io .or. error%code == exit_cannot_create)) then
       ! HDF5 cannot be shut down after a write of its own has failed. The barrier lets rank 0 speak first.
@@ -284,6 +286,7 @@ contains
     class(session_t), intent(inout) :: self
     type(error_t), allocatable, intent(in) :: error
     if (.not. allocated(error)) return
+    call notice_stop()
     self%journal%active = .true.
     call self%journal%error(error%message)
     call unlock(self)

@@ -18,7 +18,7 @@ module stability_driver
   use machine_family, only: machine_neighbourhood
   use more_periods, only: periods_needed
   use session, only: open_session, session_t
-  use stability_of_map, only: needed_text, run_stability_of_map, why_not_known
+  use stability_of_map, only: needed_text, run_stability_of_map, seen_text, why_not_known
   use status, only: exit_done, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
@@ -102,9 +102,10 @@ contains
                                     'completed chatter, impacts without rebound, or, of a motor, a held integral or a fast '// &
                                     'current)', '"number": '//to_text(i)//', "value": null')
         else
-          call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': '//to_text(value, 6)//' 1/s, standard '// &
-            'error '//to_text(error, 2), '"number": '//to_text(i)//', "value": '//json_number(value)//', "error": '// &
-            json_number(error))
+          more = ', standard error '//to_text(error, 2)
+          if (spectrum%by_multipliers) more = ', by the multipliers'
+          call session%journal%line('exponent', 'Lyapunov exponent '//to_text(i)//': '//to_text(value, 6)//' 1/s'//more, &
+            '"number": '//to_text(i)//', "value": '//json_number(value)//', "error": '//json_number(error))
         end if
       end associate
     end do
@@ -121,9 +122,7 @@ contains
     name = trim(motion_names(type_of_motion(spectrum, k)))
     what = 'is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')
     if (spectrum%at_rest) what = 'comes to rest'
-    call session%journal%line('motion', 'the motion '//what//', by '//to_text(spectrum%periods)// &
-      trim(merge(' drive periods', ' returns      ', has_clock))//' with '//to_text(spectrum%impacts)//' impacts'// &
-      needed_text(spectrum, k), &
+    call session%journal%line('motion', 'the motion '//what//', '//seen_text(spectrum, has_clock)//needed_text(spectrum, k), &
       '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts)//more)
   end subroutine report
 

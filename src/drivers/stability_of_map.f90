@@ -25,7 +25,7 @@ module stability_of_map
   implicit none
   private
 
-  public :: needed_text, run_stability_of_map, why_not_known
+  public :: needed_text, run_stability_of_map, seen_text, why_not_known
 
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
@@ -41,6 +41,7 @@ module stability_of_map
     type(spectrum_t) :: spectrum
     real(wp) :: zero_one = 0
     integer :: type = not_known, period = 0
+    logical :: has_clock = .true.
   end type finding_t
 
 contains
@@ -145,6 +146,18 @@ contains
     end if
   end subroutine describe
 
+  !> What was seen of a motion: how long it was followed, or the cycle whose multipliers give its exponents.
+  pure function seen_text(spectrum, has_clock) result(text)
+    type(spectrum_t), intent(in) :: spectrum
+    logical, intent(in) :: has_clock
+    character(len=:), allocatable :: text
+    text = to_text(spectrum%periods)//trim(merge(' drive period', ' return      ', has_clock))
+    if (spectrum%periods /= 1) text = text//'s'
+    text = trim(merge('on a cycle of', 'by           ', spectrum%by_multipliers))//' '//text//' with '// &
+           to_text(spectrum%impacts)//' impact'
+    if (spectrum%impacts /= 1) text = text//'s'
+  end function seen_text
+
   !> What more periods would do for a motion that is not known, by the 0-1 test `k`; '' if that is not known either.
   pure function needed_text(spectrum, k) result(text)
     type(spectrum_t), intent(in) :: spectrum
@@ -195,7 +208,8 @@ contains
           values = values//'null'
           errors = errors//'null'
         else
-          words = words//' '//to_text(value, 6)//' +- '//to_text(error, 2)
+          words = words//' '//to_text(value, 6)
+          if (.not. found%spectrum%by_multipliers) words = words//' +- '//to_text(error, 2)
           values = values//json_number(value)
           errors = errors//json_number(error)
         end if
@@ -207,8 +221,8 @@ contains
       words = words//', sum '//to_text(found%spectrum%sum_found, 10)//' (exact '//to_text(found%spectrum%sum_exact, 10)//')'
       data = data//', "sum": '//json_number(found%spectrum%sum_found)//', "exact_sum": '//json_number(found%spectrum%sum_exact)
     end if
-    words = words//'; 0-1 test '//to_text(found%zero_one, 3)//'; by '//to_text(found%spectrum%periods)// &
-            ' drive periods with '//to_text(found%spectrum%impacts)//' impacts'
+    words = words//'; 0-1 test '//to_text(found%zero_one, 3)//'; '// &
+            seen_text(found%spectrum, found%has_clock)
     data = data//', "zero_one": '//json_number(found%zero_one)//', "periods": '//to_text(found%spectrum%periods)// &
            ', "impacts": '//to_text(found%spectrum%impacts)
   end subroutine add_numbers
@@ -227,6 +241,7 @@ contains
     family%options = grid%options
     call machine_neighbourhood(family, 0.0_wp, machines, error)
     if (allocated(error)) return
+    found%has_clock = machines%centre%has_clock
     start = point_start(grid, index)
     call exponents_of_machine(machines, start, periods/4, periods, found%spectrum, section)
     if (.not. found%spectrum%known) return

@@ -14,6 +14,10 @@ module stop_check
 
   public :: check_stop, limit_time
 
+  !> How to go on after a stop before anything was kept, also of a run that resumes another.
+  character(len=*), parameter, public :: nothing_kept = &
+    'this run has written nothing yet; the same command starts again'
+
 contains
 
   !> From here to `end_time_limit` the process ends by itself where one trajectory lasts beyond `time_limit` [s] since the start
@@ -45,7 +49,7 @@ contains
     if (has_file) then
       call fail(error, exit_resumable, 'stopped while '//doing//'; the same command with --resume goes on')
     else
-      call fail(error, exit_resumable, 'stopped while '//doing//'; nothing was written yet, the same command starts again')
+      call fail(error, exit_resumable, 'stopped while '//doing//'; '//nothing_kept)
     end if
   end subroutine check_stop
 

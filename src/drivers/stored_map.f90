@@ -17,14 +17,14 @@ module stored_map
   use launched_team, only: start_launched_team
   use launcher, only: launched_ranks
   use map_reader, only: open_final, reader_t
-  use map_verify, only: probe_file, verify_file
+  use map_verify, only: probe_file, verify_file, verify_plain
   use refinement, only: origin_contradicted
   use second_look, only: recall_second_look
   use session, only: session_t
-  use signals, only: ignore_file_limit
+  use signals, only: ignore_file_limit, set_farewell
   use start_label, only: label_left_domain
   use status, only: exit_bad_case, exit_io, exit_resumable, reason_left_domain
-  use stop_check, only: limit_time
+  use stop_check, only: limit_time, nothing_kept
   use team, only: team_t
   implicit none
   private
@@ -50,6 +50,7 @@ contains
     call session%journal%open_copy(command%log, error)
     if (.not. allocated(error)) call ignore_file_limit(error)
     if (.not. allocated(error)) call h5_read_alignment(bytes, error)
+    call set_farewell('stopped while the map was read; '//nothing_kept)
     if (.not. allocated(error)) call limit_time(session%journal, command%time_limit, error)
     call session%stop_if(error)
     if (session%team%is_root()) call check_map_file(command%path, session%alone, error)
@@ -80,6 +81,8 @@ contains
     call reader%text_attribute('/', 'kind', kind, error)
     if (.not. allocated(error)) call reader%number_attribute('/', 'complete', complete, error)
     call reader%close(ignored)
+    ! A damaged attribute is no kind of file.
+    if (.not. allocated(error) .and. (kind /= 'basin' .or. nint(complete) /= 1)) call verify_plain(path, error)
     if (allocated(error)) return
     if (kind /= 'basin') then
       call fail(error, exit_bad_case, "'"//path//"': found a file of the kind '"//kind//"', allowed a map that basin wrote")

@@ -26,6 +26,7 @@ module sweep_driver
   use map_schema, only: name_length, schema_t, type_float64
   use point_columns, only: at_impacts, at_reason, map_values
   use restoring_law, only: position_is_angle
+  use run_plan, only: pilot_seconds, plan_text
   use session, only: describe_file, open_session, session_t
   use signals, only: end_time_limit
   use status, only: exit_done, is_given_up, last_reason, reason_settled, reason_time_over
@@ -33,7 +34,7 @@ module sweep_driver
   use sweep_chain, only: chains_t, hold_reason, new_chains, run_chains
   use sweep_report, only: describe_chains, report_given_up, report_limits
   use text, only: to_text
-  use tiled_run, only: finish_tiles, open_tiles, pilot_seconds, plan_text, run_tiles
+  use tiled_run, only: finish_tiles, open_tiles, run_tiles
   use work_watch, only: watch_t
   use written_check, only: check_written
   implicit none
@@ -147,7 +148,7 @@ contains
         call session%stop_if(error)
         call add_map_variables(points, 'branch_', ['value', 'start'], session%the_case%laws)
         plan = plan//'; many starts: '//plan_text([size(values), product(sweep%starts)], [1, product(sweep%starts)], &
-                                                  points%bytes_of_point(), seconds)
+                                                  points%bytes_of_point(), seconds, session%command)
       else
         plan = plan//'; no many starts'
       end if

@@ -4,11 +4,10 @@
 !> Computes a grid tile by tile on a team: working file, resumption, hand-out, progress, clean stop, final file.
 module tiled_run
   use balance, only: report_balance
-  use command_line, only: command_t
   use device_choice, only: report_trial
   use errors, only: error_t
   use files, only: file_exists
-  use journal, only: duration_text, size_text
+  use journal, only: duration_text
   use kinds, only: int64, wp
   use lane_gpu, only: seconds_waited
   use last_wait, only: last_wait_t
@@ -23,25 +22,21 @@ module tiled_run
   use scheduler, only: scheduler_options_t, scheduler_t
   use session, only: session_t
   use shard, only: in_shard
-  use spread_order, only: new_spread_order, spread_order_t, spread_subscripts
-  use signals, only: end_time_limit, set_farewell
+  use spread_order, only: new_spread_order, spread_order_t
+  use signals, only: end_time_limit, notice_stop, set_farewell
   use status, only: exit_resumable
   use system, only: monotonic_seconds
   use text, only: to_text
   use tile_times, only: write_tile_times
-  use tiles, only: new_tiling, tiling_t
   use written_check, only: check_written
   implicit none
   private
 
   public :: point_work_t
-  public :: open_tiles, run_tiles, finish_tiles, plan_text, pilot_seconds, index_in_block
+  public :: open_tiles, run_tiles, finish_tiles, index_in_block
 
   !> Seconds between two looks at the name of the working file.
   real(wp), parameter :: check_interval = 10
-
-  !> Points of the small sample from which a dry run estimates the time.
-  integer, parameter :: pilot_points = 64
 
   !> Checks for signals and the time limit between pieces of a tile, and reports how far the run is.
   type, extends(watch_t) :: tile_watch_t
@@ -158,6 +153,7 @@ contains
       computed = computed + 1
     end do
     call end_time_limit()
+    if (scheduler%stop_requested()) call notice_stop()
     call file%flush(error)
     call session%abort_if(error)
     if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
@@ -345,50 +341,5 @@ contains
     call session%journal%line('written', 'wrote '//file%path//' in '// &
       duration_text(monotonic_seconds() - session%journal%started))
   end subroutine finish_tiles
-
-  !> Seconds per point on one core, from a small sample spread over the grid.
-  subroutine pilot_seconds(work, lengths, seconds, error)
-    class(point_work_t), intent(inout) :: work
-    integer, intent(in) :: lengths(:)
-    real(wp), intent(out) :: seconds
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: values(pilot_points, work%variables), start
-    integer :: index(size(lengths), pilot_points), i
-    logical :: whole
-    do i = 1, pilot_points
-      index(:, i) = spread_subscripts(i, lengths)
-    end do
-    ! Of the processor, which others may be using too.
-    call cpu_time(start)
-    call compute_list(work, index, values, whole, error)
-    if (allocated(error)) return
-    call cpu_time(seconds)
-    seconds = (seconds - start)/pilot_points
-  end subroutine pilot_seconds
-
-  !> Points, tiles and bytes of a grid, and the time that `seconds_per_point` on one core mean.
-  function plan_text(lengths, tile_shape, bytes_per_point, seconds_per_point) result(lines)
-    integer, intent(in) :: lengths(:), tile_shape(:)
-    integer(int64), intent(in) :: bytes_per_point
-    real(wp), intent(in) :: seconds_per_point
-    character(len=:), allocatable :: lines
-    type(tiling_t) :: tiling
-    type(error_t), allocatable :: error
-    integer(int64) :: points
-    integer :: i
-    call new_tiling(int(lengths, int64), int(tile_shape, int64), tiling, error)
-    if (allocated(error)) then
-      lines = error%message
-      return
-    end if
-    points = product(int(lengths, int64))
-    lines = to_text(lengths(1))
-    do i = 2, size(lengths)
-      lines = lines//' x '//to_text(lengths(i))
-    end do
-    lines = lines//' = '//to_text(points)//' points in '//to_text(tiling%count())//' tiles; '// &
-      size_text(points*bytes_per_point)//' while it runs, less when compressed; about '// &
-      duration_text(points*seconds_per_point)//' on one core (from a small sample), divided by the number of ranks'
-  end function plan_text
 
 end module tiled_run

@@ -17,7 +17,7 @@ module enclosures
   implicit none
   private
 
-  public :: prepare_enclosure, enclose
+  public :: prepare_enclosure, forget_bounds, restart_enclosure, enclose
 
   !> The last term of a step is then some epsilon of the first.
   integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
@@ -68,7 +68,7 @@ contains
     type(enclosure_t), intent(inout) :: around
     logical :: is_argument(0:tape%count)
     integer :: i
-    call prepare_series(tape, series_order + 1, rates, wanted, branches, around%series)
+    call prepare_series(tape, series_order + 1, rates, wanted, branches, around%series, only_used=.true.)
     around%bounds%are_known = .false.
     around%bounds%branches = branches
     is_argument = .false.
@@ -84,6 +84,27 @@ contains
       end do
     end associate
   end subroutine prepare_enclosure
+
+  !> Forgets the bounds, as `prepare_enclosure` does.
+  pure subroutine forget_bounds(around)
+    type(enclosure_t), intent(inout) :: around
+    around%bounds%are_known = .false.
+    around%bounds%branches = around%series%branches
+  end subroutine forget_bounds
+
+  !> As at first, with no bounds.
+  pure subroutine restart_enclosure(around)
+    type(enclosure_t), intent(inout) :: around
+    type(enclosure_t) :: first
+    call forget_bounds(around)
+    around%margin = first%margin
+    around%excess = first%excess
+    around%fault = first%fault
+    around%is_own = first%is_own
+    around%bounds%wait = first%bounds%wait
+    around%bounds%next_wait = first%bounds%next_wait
+    around%bounds%widening = first%bounds%widening
+  end subroutine restart_enclosure
 
   !> Encloses a step: by the bounds there are, unless they are sought `anew`, or by new ones. `path`: the polynomials of the states
   !> in the fraction of the step.

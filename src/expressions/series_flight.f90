@@ -8,7 +8,8 @@
 module series_flight
   use bernstein, only: first_crossing
   use elementary, only: exponential, logarithm
-  use enclosures, only: bounds_t, enclose, enclosure_t, least_margin, prepare_enclosure, series_order, widest_margin
+  use enclosures, only: bounds_t, enclose, enclosure_t, forget_bounds, least_margin, prepare_enclosure, restart_enclosure, &
+    series_order, widest_margin
   use kinds, only: wp
   use operations, only: op_add, op_select, op_subtract, op_variable
   use step_length, only: is_plain, natural_step
@@ -18,7 +19,8 @@ module series_flight
   implicit none
   private
 
-  public :: start_flight, set_branches, change_branches, advance_flight, value_in_flight, keep_bounds, take_bounds, series_order
+  public :: start_flight, restart_flight, set_branches, change_branches, advance_flight, value_in_flight, keep_bounds, &
+    take_bounds, series_order
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
   !> proven; at the budget of steps; at its start, whose branches are not those of the state.
@@ -57,12 +59,16 @@ module series_flight
     !> Steps, enclosures tried for them, and decisions that even short steps left to rounding.
     integer :: steps = 0, tries = 0, uncertain = 0
     integer :: step_budget = 1000000
+    !> By which the caller knows the system; 0: none.
+    integer :: label = 0
     type(series_t), private :: series
     type(enclosure_t), private :: around
     !> Node of each variable of the tape among the states, 0 for other states; the polynomials of the states in the fraction of a
     !> step.
     integer, allocatable, private :: variables(:)
     real(wp), allocatable, private :: path(:, :)
+    !> Powers of the step, in units of the series.
+    real(wp), private :: powers(0:series_order) = 1
     !> Nodes of the active guards that are more than a variable and a constant.
     integer, allocatable, private :: curved(:)
     !> Length of the last proven step, as a part of that by the last coefficients.
@@ -102,14 +108,38 @@ contains
     call set_branches(flight, [(1, k=1, size(tape%switches))])
   end subroutine start_flight
 
+  !> A flight of the same system anew, as `start_flight` leaves it but for parameters, directions of guards, branches and which
+  !> guards are active: the caller sets these.
+  pure subroutine restart_flight(flight)
+    type(flight_t), intent(inout) :: flight
+    flight%zeros = 0
+    flight%crossed = .false.
+    flight%fault = 0
+    flight%steps = 0
+    flight%tries = 0
+    flight%uncertain = 0
+    flight%proven = 1
+    flight%next_unit = 1
+    flight%goes_on = .false.
+    call restart_enclosure(flight%around)
+  end subroutine restart_flight
+
   !> Chooses the branch of every switching function by a sign.
   pure subroutine set_branches(flight, branches)
     type(flight_t), intent(inout) :: flight
     integer, intent(in) :: branches(:)
     integer :: i, own
+    logical :: is_prepared
     own = size(flight%guards) - size(branches)
-    call prepare_series(flight%tape, series_order, flight%rates, flight%guards(:own)%node, branches, flight%series)
-    call prepare_enclosure(flight%tape, flight%rates, flight%guards(:own)%node, branches, flight%around)
+    is_prepared = allocated(flight%series%branches)
+    if (is_prepared) is_prepared = all(flight%series%branches == branches)
+    if (is_prepared) then
+      call forget_bounds(flight%around)
+    else
+      call prepare_series(flight%tape, series_order, flight%rates, flight%guards(:own)%node, branches, flight%series, &
+                          only_used=.true.)
+      call prepare_enclosure(flight%tape, flight%rates, flight%guards(:own)%node, branches, flight%around)
+    end if
     flight%is_active = .true.
     flight%is_active(own + 1:) = .false.
     do i = 1, flight%tape%count
@@ -316,18 +346,16 @@ contains
   pure subroutine set_path(flight, step)
     type(flight_t), intent(inout) :: flight
     real(wp), intent(in) :: step
-    real(wp) :: power(0:series_order)
     integer :: i, k
-    power(0) = 1
     do k = 1, series_order
-      power(k) = power(k - 1)*(step/flight%series%unit)
+      flight%powers(k) = flight%powers(k - 1)*(step/flight%series%unit)
     end do
     do i = 1, size(flight%rates)
       if (flight%variables(i) > 0) then
-        flight%path(:, i) = flight%series%c(:, flight%variables(i))*power
+        flight%path(:, i) = flight%series%c(:, flight%variables(i))*flight%powers
       else
         do k = 1, series_order
-          flight%path(k, i) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k*power(k)
+          flight%path(k, i) = flight%series%unit*flight%series%c(k - 1, flight%rates(i))/k*flight%powers(k)
         end do
       end if
       flight%path(0, i) = flight%state(i)
@@ -341,14 +369,19 @@ contains
     real(wp), intent(in) :: step
     real(wp), intent(out) :: fraction
     logical, intent(out) :: is_certain
-    real(wp) :: at(size(flight%guards)), remainder, rounding
-    integer :: g
+    real(wp) :: at(size(flight%guards)), remainder, rounding, power
+    integer :: g, k
     logical :: is_proven
     at = 2
     is_certain = .true.
+    power = 1.01_wp
+    do k = 1, series_order + 1
+      power = power*(step/flight%around%bounds%unit)
+    end do
     do g = 1, size(flight%guards)
       if (.not. flight%is_active(g)) cycle
-      call cross(flight, g, step, at(g), remainder, rounding, is_proven)
+      remainder = power*flight%around%bounds%last(flight%guards(g)%node)
+      call cross(flight, g, remainder, at(g), rounding, is_proven)
       if (is_proven) cycle
       is_certain = is_certain .and. remainder <= rounding .and. flight%around%is_own
       if (remainder <= rounding .and. flight%around%is_own) flight%uncertain = flight%uncertain + 1
@@ -359,28 +392,21 @@ contains
 
   !> First crossing of a guard within the step. A zero of order m at the start is divided out: the rest of the series, over
   !> the fraction to the power m, has the other zeros.
-  pure subroutine cross(flight, g, step, at, remainder, rounding, is_proven)
+  pure subroutine cross(flight, g, remainder, at, rounding, is_proven)
     type(flight_t), intent(in) :: flight
     integer, intent(in) :: g
-    real(wp), intent(in) :: step
-    real(wp), intent(out) :: at, remainder, rounding
+    real(wp), intent(in) :: remainder
+    real(wp), intent(out) :: at, rounding
     logical, intent(out) :: is_proven
-    real(wp) :: p(0:series_order), power, total
+    real(wp) :: p(0:series_order), total
     integer :: k, m, node
     node = flight%guards(g)%node
     m = min(flight%zeros(g), series_order)
-    power = 1
     total = 0
-    do k = 0, series_order
-      p(k) = flight%series%c(k, node)*power
-      if (k >= m) total = total + (k + 1)*abs(p(k))
-      power = power*(step/flight%series%unit)
+    p = flight%series%c(:, node)*flight%powers
+    do k = m, series_order
+      total = total + (k + 1)*abs(p(k))
     end do
-    power = 1.01_wp
-    do k = 1, series_order + 1
-      power = power*(step/flight%around%bounds%unit)
-    end do
-    remainder = power*flight%around%bounds%last(node)
     rounding = epsilon(1.0_wp)*total
     if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, flight%around%bounds%first, node)
     p(:series_order - m) = p(m:)

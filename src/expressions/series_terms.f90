@@ -10,7 +10,7 @@ module series_terms
   implicit none
   private
 
-  public :: compile, raise_all
+  public :: compile, put_termwise_last, raise_all
 
   !> Kinds of recurrences: the integral of a rate; a copy; sums; products with something steady, with something linear in time, of
   !> two series; quotients; functions with the derivative a' b, a being linear in time or not; the other functions; of two
@@ -26,6 +26,8 @@ module series_terms
     integer :: partner = 0, divisor = 0
     !> Number of the variable that the node is, 0 for none.
     integer :: variable = 0
+    !> Where the coefficients of the node, of a, b and the partner begin.
+    integer :: at_node = 0, at_a = 0, at_b = 0, at_partner = 0
   end type instruction_t
 
 contains
@@ -179,68 +181,150 @@ contains
     end select
   end subroutine choose_function
 
+  !> Puts the instructions last whose coefficients depend on those of the same order alone, and which no others need: for them,
+  !> orders need not be raised in turn. `together` is the number of the others.
+  pure subroutine put_termwise_last(program, nodes, order, together)
+    type(instruction_t), intent(inout) :: program(:)
+    integer, intent(in) :: nodes, order
+    integer, intent(out) :: together
+    logical :: is_needed(0:nodes), is_first(size(program))
+    integer :: source(0:nodes), at, before
+    source = [(at, at=0, nodes)]
+    is_needed = .false.
+    do at = 1, size(program)
+      associate (it => program(at))
+        ! Beyond order 0 a copy is its original.
+        if (it%kind == copy) source(it%node) = source(it%a)
+        if (any(it%kind == [copy, minus, add, subtract, over_steady])) it%a = source(it%a)
+        if (any(it%kind == [add, subtract, scaled])) it%b = source(it%b)
+        if (.not. is_termwise(it%kind)) is_needed(it%node) = .true.
+      end associate
+    end do
+    do
+      before = count(is_needed)
+      do at = size(program), 1, -1
+        if (is_needed(program(at)%node)) is_needed([program(at)%a, program(at)%b, program(at)%partner]) = .true.
+      end do
+      if (count(is_needed) == before) exit
+    end do
+    is_first = is_needed(program%node)
+    together = count(is_first)
+    program = [pack(program, is_first), pack(program, .not. is_first)]
+    program%at_node = (program%node - 1)*(order + 1)
+    program%at_a = (program%a - 1)*(order + 1)
+    program%at_b = (program%b - 1)*(order + 1)
+    program%at_partner = (program%partner - 1)*(order + 1)
+  end subroutine put_termwise_last
+
+  pure logical function is_termwise(kind)
+    integer, intent(in) :: kind
+    is_termwise = any(kind == [copy, minus, add, subtract, scaled, over_steady, larger])
+  end function is_termwise
+
   !> Coefficients from order 1 on, from those of order 0; see `raise_orders`. `fault` is 0, or minus the node whose coefficient
   !> is too large.
-  pure subroutine raise_all(program, order, unit, sign, divisor, c, fault)
+  pure subroutine raise_all(program, together, order, unit, sign, divisor, c, fault)
     type(instruction_t), intent(in) :: program(:)
-    integer, intent(in) :: order
+    integer, intent(in) :: together, order
     real(wp), intent(in) :: unit, sign, divisor(:)
     real(wp), intent(inout) :: c(0:order, size(divisor))
+    integer, intent(out) :: fault
+    integer :: at
+    call raise_together(together, program, order, unit, sign, divisor, c, fault)
+    do at = together + 1, size(program)
+      if (fault /= 0) return
+      call raise_termwise(program(at), order, sign, divisor, c)
+      if (.not. all(abs(c(1:, program(at)%node)) <= huge(1.0_wp))) fault = -program(at)%node
+    end do
+  end subroutine raise_all
+
+  !> All orders of a node whose coefficients depend on those of the same order alone.
+  pure subroutine raise_termwise(it, order, sign, divisor, c)
+    type(instruction_t), intent(in) :: it
+    integer, intent(in) :: order
+    real(wp), intent(in) :: sign, divisor(:)
+    real(wp), intent(inout) :: c(0:order, size(divisor))
+    associate (a => it%a, b => it%b, i => it%node)
+      select case (it%kind)
+      case (copy)
+        c(1:, i) = c(1:, a)
+      case (minus)
+        c(1:, i) = sign*c(1:, a)
+      case (add)
+        c(1:, i) = c(1:, a) + c(1:, b)
+      case (subtract)
+        c(1:, i) = c(1:, a) + sign*c(1:, b)
+      case (scaled)
+        c(1:, i) = c(0, a)*c(1:, b)
+      case (over_steady)
+        c(1:, i) = c(1:, a)/divisor(b)
+      case (larger)
+        c(1:, i) = max(c(1:, a), c(1:, b))
+      end select
+    end associate
+  end subroutine raise_termwise
+
+  !> The coefficients of nodes that need each other, order by order.
+  pure subroutine raise_together(count, program, order, unit, sign, divisor, c, fault)
+    integer, intent(in) :: count, order
+    type(instruction_t), intent(in) :: program(count)
+    real(wp), intent(in) :: unit, sign, divisor(:)
+    real(wp), intent(inout) :: c(0:size(divisor)*(order + 1) - 1)
     integer, intent(out) :: fault
     real(wp) :: y
     integer :: k, at
     fault = 0
     do k = 1, order
-      do at = 1, size(program)
-        associate (it => program(at), a => program(at)%a, b => program(at)%b)
+      do at = 1, count
+        associate (it => program(at), a => program(at)%at_a, b => program(at)%at_b)
           select case (it%kind)
           case (larger)
-            y = max(c(k, a), c(k, b))
+            y = max(c(a + k), c(b + k))
           case (of_rate)
-            y = unit*c(k - 1, a)/k
+            y = unit*c(a + k - 1)/k
           case (copy)
-            y = c(k, a)
+            y = c(a + k)
           case (minus)
-            y = sign*c(k, a)
+            y = sign*c(a + k)
           case (add)
-            y = c(k, a) + c(k, b)
+            y = c(a + k) + c(b + k)
           case (subtract)
-            y = c(k, a) + sign*c(k, b)
+            y = c(a + k) + sign*c(b + k)
           case (scaled)
-            y = c(0, a)*c(k, b)
+            y = c(a)*c(b + k)
           case (by_linear)
-            y = c(0, a)*c(k, b) + c(1, a)*c(k - 1, b)
+            y = c(a)*c(b + k) + c(a + 1)*c(b + k - 1)
           case (multiply)
-            y = product_term(c(0, a), c(0, b), k)
+            y = product_term(c(a), c(b), k)
           case (square)
-            y = square_term(c(0, a), k)
+            y = square_term(c(a), k)
           case (over_steady)
-            y = c(k, a)/divisor(b)
+            y = c(a + k)/divisor(it%b)
           case (divide)
-            y = (c(k, a) + sign*inner_products(c(0, it%node), c(0, b), k))/divisor(b)
+            y = (c(a + k) + sign*inner_products(c(it%at_node), c(b), k))/divisor(it%b)
           case (turn)
-            y = c(1, a)*c(k - 1, b)/k
+            y = c(a + 1)*c(b + k - 1)/k
           case (turn_back)
-            y = sign*(c(1, a)*c(k - 1, b))/k
+            y = sign*(c(a + 1)*c(b + k - 1))/k
           case (by_rate)
-            y = rate_products(c(0, a), c(0, b), k, k)/k
+            y = rate_products(c(a), c(b), k, k)/k
           case (by_rate_back)
-            y = sign*rate_products(c(0, a), c(0, b), k, k)/k
+            y = sign*rate_products(c(a), c(b), k, k)/k
           case (by_variable)
-            y = unit*product_term(c(0, it%partner), c(0, b), k - 1)/k
+            y = unit*product_term(c(it%at_partner), c(b), k - 1)/k
           case (by_variable_back)
-            y = sign*unit*product_term(c(0, it%partner), c(0, b), k - 1)/k
+            y = sign*unit*product_term(c(it%at_partner), c(b), k - 1)/k
           case default
             y = function_term(it, k, sign, divisor, order, c)
           end select
-          c(k, it%node) = y
+          c(it%at_node + k) = y
           if (abs(y) <= huge(1.0_wp)) cycle
           fault = -it%node
         end associate
         return
       end do
     end do
-  end subroutine raise_all
+  end subroutine raise_together
 
   !> The same for roots, powers, logarithms and angles: solutions of linear differential equations of first order in the argument.
   pure real(wp) function function_term(it, k, sign, divisor, order, c) result(y)

@@ -57,25 +57,25 @@ contains
     real(wp), intent(in) :: terms(0:order)
     real(real64), intent(inout) :: reach
     real(real64) :: size_of(0:most_order/2), last, longest
-    integer :: k, j
-    logical :: is_known
+    integer :: k, j, known
     real(real64), parameter :: none = -1e30_real64
-    is_known = .false.
+    known = -1
     do k = order - 4, order
       if (.not. abs(terms(k)) > 0) cycle
-      if (.not. is_known) then
-        do j = 0, order/2
-          size_of(j) = none
-          if (abs(terms(j)) > 0) size_of(j) = rough_logarithm(abs(terms(j)))
-        end do
-        if (all(size_of(:order/2) <= none)) return
-        is_known = .true.
-      end if
       last = rough_logarithm(abs(terms(k)))
       longest = -huge(longest)
       do j = 0, order/2
+        if (j > known) then
+          known = j
+          size_of(j) = none
+          if (abs(terms(j)) > 0) size_of(j) = rough_logarithm(abs(terms(j)))
+        end if
         longest = max(longest, log_epsilon*rough_inverse(order - j) + (size_of(j) - last)*rough_inverse(k - j))
+        if (longest >= reach) exit
       end do
+      if (longest < reach) then
+        if (all(size_of(:order/2) <= none)) return
+      end if
       reach = min(reach, longest)
     end do
   end subroutine shorten

@@ -27,34 +27,46 @@ contains
     type(interval_t), intent(out) :: bound(tape%count)
     integer, intent(out) :: fault(tape%count)
     integer, intent(in), optional :: branches(:)
-    type(interval_t) :: chosen
-    integer :: i, a, b, origin
-    logical :: is_defined
+    integer :: i
     do i = 1, tape%count
-      fault(i) = 0
-      a = tape%nodes(i)%first
-      b = a
-      select case (tape%nodes(i)%operation)
-      case (op_constant)
-        bound(i) = interval_t(tape%nodes(i)%value, tape%nodes(i)%value)
-      case (op_variable)
-        bound(i) = box(a)
-      case (op_parameter)
-        bound(i) = interval_t(parameters(a), parameters(a))
-      case (op_select)
-        call bound_branch(tape, tape%nodes(i), bound(:i - 1), fault(:i - 1), chosen, origin, branches)
-        bound(i) = chosen
-        fault(i) = origin
-      case default
-        if (operation_table(tape%nodes(i)%operation)%arguments > 1) b = tape%nodes(i)%second
-        fault(i) = max(fault(a), fault(b))
-        bound(i) = interval_t()
-        if (fault(i) > 0) cycle
-        call operate_on_intervals(tape%nodes(i)%operation, bound(a), bound(b), bound(i), is_defined)
-        if (.not. is_defined) fault(i) = i
-      end select
+      call bound_node(tape, i, box, parameters, bound, fault, branches)
     end do
   end subroutine bound_values
+
+  pure subroutine bound_node(tape, i, box, parameters, bound, fault, branches)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: i
+    type(interval_t), intent(in) :: box(:)
+    real(wp), intent(in) :: parameters(:)
+    type(interval_t), intent(inout) :: bound(tape%count)
+    integer, intent(inout) :: fault(tape%count)
+    integer, intent(in), optional :: branches(:)
+    type(interval_t) :: chosen
+    integer :: a, b, origin
+    logical :: is_defined
+    fault(i) = 0
+    a = tape%nodes(i)%first
+    b = a
+    select case (tape%nodes(i)%operation)
+    case (op_constant)
+      bound(i) = interval_t(tape%nodes(i)%value, tape%nodes(i)%value)
+    case (op_variable)
+      bound(i) = box(a)
+    case (op_parameter)
+      bound(i) = interval_t(parameters(a), parameters(a))
+    case (op_select)
+      call bound_branch(tape, tape%nodes(i), bound(:i - 1), fault(:i - 1), chosen, origin, branches)
+      bound(i) = chosen
+      fault(i) = origin
+    case default
+      if (operation_table(tape%nodes(i)%operation)%arguments > 1) b = tape%nodes(i)%second
+      fault(i) = max(fault(a), fault(b))
+      bound(i) = interval_t()
+      if (fault(i) > 0) return
+      call operate_on_intervals(tape%nodes(i)%operation, bound(a), bound(b), bound(i), is_defined)
+      if (.not. is_defined) fault(i) = i
+    end select
+  end subroutine bound_node
 
   pure subroutine bound_branch(tape, node, bound, fault, chosen, origin, branches)
     type(tape_t), intent(in) :: tape
@@ -98,8 +110,15 @@ contains
     type(series_t), intent(inout) :: series
     integer, intent(out) :: fault
     type(interval_t) :: bound(tape%count)
-    integer :: faults(tape%count)
-    call bound_values(tape, box, parameters, bound, faults, series%branches)
+    integer :: faults(tape%count), i
+    bound = interval_t()
+    faults = 0
+    do i = 1, size(series%steady)
+      call bound_node(tape, series%steady(i), box, parameters, bound, faults, series%branches)
+    end do
+    do i = 1, size(series%varying)
+      call bound_node(tape, series%varying(i), box, parameters, bound, faults, series%branches)
+    end do
     fault = maxval(faults, mask=series%is_used)
     if (fault > 0) return
     series%c(0, :) = magnitude(bound)

@@ -6,14 +6,14 @@
 module tape_series
   use kinds, only: wp
   use operations, only: op_variable
-  use series_terms, only: compile, instruction_t, raise_all
+  use series_terms, only: compile, instruction_t, put_termwise_last, raise_all
   use tape, only: tape_t
   use tape_parts, only: needed
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate_some
   implicit none
   private
 
-  public :: prepare_series, expand, raise_orders
+  public :: prepare_series, expand, expand_values, raise_orders
 
   !> What a series is made of: the nodes in use with the given branches, and where it is stored.
   type, public :: series_t
@@ -25,6 +25,12 @@ module tape_series
     !> Nodes in use; how those of them that vary get their coefficients.
     logical, allocatable :: is_used(:)
     type(instruction_t), allocatable :: program(:)
+    !> The first instructions need each other order by order; those after them give all orders at once.
+    integer :: together = 0
+    !> Nodes whose values are needed, those that are steady apart; values and faults, and the parameters that they are for.
+    integer, allocatable :: steady(:), varying(:)
+    real(wp), allocatable :: value(:), parameters(:)
+    integer, allocatable :: faults(:)
     !> Node of the rate of each variable.
     integer, allocatable :: rates(:)
     integer, allocatable :: branches(:)
@@ -33,11 +39,14 @@ module tape_series
 contains
 
   !> Makes room for the series of a system up to `order`: `rates` are the nodes of the rates of its variables, `wanted` other
-  !> nodes whose series will be needed, `branches` the sign of every switching function.
-  pure subroutine prepare_series(tape, order, rates, wanted, branches, series)
+  !> nodes whose series will be needed, `branches` the sign of every switching function. `only_used`: values of other nodes will
+  !> not be needed either.
+  pure subroutine prepare_series(tape, order, rates, wanted, branches, series, only_used)
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order, rates(:), wanted(:), branches(:)
     type(series_t), intent(inout) :: series
+    logical, intent(in), optional :: only_used
+    logical :: has_value(tape%count)
     integer :: i
     series%order = order
     series%rates = rates
@@ -47,6 +56,17 @@ contains
       if (tape%nodes(i)%operation == op_variable) series%is_used(i) = .true.
     end do
     call compile(tape, rates, branches, series%is_used, series%program)
+    call put_termwise_last(series%program, tape%count, order, series%together)
+    has_value = .true.
+    if (present(only_used)) then
+      ! The other branch serves where a step goes past a switch.
+      if (only_used) has_value = series%is_used .or. needed(tape, [rates, wanted])
+    end if
+    series%steady = pack([(i, i=1, tape%count)], has_value .and. tape%nodes(:tape%count)%is_steady)
+    series%varying = pack([(i, i=1, tape%count)], has_value .and. .not. tape%nodes(:tape%count)%is_steady)
+    if (allocated(series%parameters)) deallocate (series%parameters)
+    series%value = [(0.0_wp, i=1, tape%count)]
+    series%faults = [(0, i=1, tape%count)]
     if (allocated(series%c)) then
       if (ubound(series%c, 1) /= order .or. size(series%c, 2) /= tape%count) deallocate (series%c)
     end if
@@ -61,14 +81,33 @@ contains
     real(wp), intent(in) :: variables(:), parameters(:)
     type(series_t), intent(inout) :: series
     integer, intent(out) :: fault
-    real(wp) :: value(tape%count)
-    integer :: faults(tape%count)
-    call evaluate(tape, variables, parameters, value, faults, series%branches)
-    fault = maxval(faults, mask=series%is_used)
-    if (fault > 0) return
-    series%c(0, :) = value
-    call raise_orders(-1.0_wp, value, series, fault)
+    call expand_values(tape, variables, parameters, series, fault)
+    if (fault == 0) call raise_orders(-1.0_wp, series%value, series, fault)
   end subroutine expand
+
+  !> Only the coefficients of order 0. What is steady is evaluated again where parameters have changed.
+  pure subroutine expand_values(tape, variables, parameters, series, fault)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: variables(:), parameters(:)
+    type(series_t), intent(inout) :: series
+    integer, intent(out) :: fault
+    logical :: is_known
+    integer :: i
+    is_known = .false.
+    if (allocated(series%parameters)) is_known = all(abs(series%parameters - parameters) <= 0)
+    if (.not. is_known) then
+      series%parameters = parameters
+      call evaluate_some(tape, series%steady, variables, parameters, series%value, series%faults, series%branches)
+      series%c(0, series%steady) = series%value(series%steady)
+    end if
+    call evaluate_some(tape, series%varying, variables, parameters, series%value, series%faults, series%branches)
+    do i = 1, size(series%varying)
+      series%c(0, series%varying(i)) = series%value(series%varying(i))
+    end do
+    fault = 0
+    if (any(series%faults > 0)) fault = maxval(series%faults, mask=series%is_used)
+    fault = max(fault, 0)
+  end subroutine expand_values
 
   !> Coefficients from order 1 on, from those of order 0. `sign` -1: coefficients. 1: bounds on their magnitudes, from bounds in
   !> `c(0, :)` and lower bounds of the magnitudes of divisors in `divisor`.
@@ -82,7 +121,7 @@ contains
       if (series%program(at)%divisor == 0) cycle
       if (.not. abs(divisor(series%program(at)%divisor)) > 0) fault = series%program(at)%node
     end do
-    if (fault == 0) call raise_all(series%program, series%order, series%unit, sign, divisor, series%c, fault)
+    if (fault == 0) call raise_all(series%program, series%together, series%order, series%unit, sign, divisor, series%c, fault)
   end subroutine raise_orders
 
 end module tape_series

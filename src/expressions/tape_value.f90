@@ -12,7 +12,7 @@ module tape_value
   implicit none
   private
 
-  public :: evaluate, fault_text, sizes_of_nodes, starting_branches
+  public :: evaluate, evaluate_some, fault_text, sizes_of_nodes, starting_branches
 
 contains
 
@@ -25,29 +25,74 @@ contains
     real(wp), intent(out) :: value(tape%count)
     integer, intent(out) :: fault(tape%count)
     integer, intent(in), optional :: branches(:)
-    real(wp) :: chosen
-    integer :: i, origin
-    logical :: is_finite
+    integer :: i
     do i = 1, tape%count
-      fault(i) = 0
-      select case (tape%nodes(i)%operation)
-      case (op_constant)
-        value(i) = tape%nodes(i)%value
-      case (op_variable)
-        call take_number(variables(tape%nodes(i)%first), value(i), is_finite)
-        if (.not. is_finite) fault(i) = i
-      case (op_parameter)
-        call take_number(parameters(tape%nodes(i)%first), value(i), is_finite)
-        if (.not. is_finite) fault(i) = i
-      case (op_select)
-        call take_branch(tape, tape%nodes(i), value(:i - 1), fault(:i - 1), chosen, origin, branches)
-        value(i) = chosen
-        fault(i) = origin
-      case default
-        call take_operation(tape, i, value, fault)
-      end select
+      call take_node(tape, i, variables, parameters, value, fault, branches)
     end do
   end subroutine evaluate
+
+  !> The same of the nodes `these` alone, in their order; those that they are made of have their values.
+  pure subroutine evaluate_some(tape, these, variables, parameters, value, fault, branches)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: these(:)
+    real(wp), intent(in) :: variables(:), parameters(:)
+    real(wp), intent(inout) :: value(tape%count)
+    integer, intent(inout) :: fault(tape%count)
+    integer, intent(in) :: branches(:)
+    real(wp) :: y
+    integer :: at
+    do at = 1, size(these)
+      associate (i => these(at), it => tape%nodes(these(at)))
+        ! Most operations are these, and defined.
+        if (any(it%operation == [op_add, op_subtract, op_multiply])) then
+          if (fault(it%first) == 0 .and. fault(it%second) == 0) then
+            if (it%operation == op_add) then
+              y = value(it%first) + value(it%second)
+            else if (it%operation == op_subtract) then
+              y = value(it%first) - value(it%second)
+            else
+              y = value(it%first)*value(it%second)
+            end if
+            if (abs(y) <= huge(y)) then
+              value(i) = y
+              fault(i) = 0
+              cycle
+            end if
+          end if
+        end if
+        call take_node(tape, i, variables, parameters, value, fault, branches)
+      end associate
+    end do
+  end subroutine evaluate_some
+
+  pure subroutine take_node(tape, i, variables, parameters, value, fault, branches)
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: i
+    real(wp), intent(in) :: variables(:), parameters(:)
+    real(wp), intent(inout) :: value(tape%count)
+    integer, intent(inout) :: fault(tape%count)
+    integer, intent(in), optional :: branches(:)
+    real(wp) :: chosen
+    integer :: origin
+    logical :: is_finite
+    fault(i) = 0
+    select case (tape%nodes(i)%operation)
+    case (op_constant)
+      value(i) = tape%nodes(i)%value
+    case (op_variable)
+      call take_number(variables(tape%nodes(i)%first), value(i), is_finite)
+      if (.not. is_finite) fault(i) = i
+    case (op_parameter)
+      call take_number(parameters(tape%nodes(i)%first), value(i), is_finite)
+      if (.not. is_finite) fault(i) = i
+    case (op_select)
+      call take_branch(tape, tape%nodes(i), value(:i - 1), fault(:i - 1), chosen, origin, branches)
+      value(i) = chosen
+      fault(i) = origin
+    case default
+      call take_operation(tape, i, value, fault)
+    end select
+  end subroutine take_node
 
   pure subroutine take_number(given, value, is_finite)
     real(wp), intent(in) :: given

@@ -6,11 +6,12 @@
 module h5
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use errors, only: error_t, fail
-  use files, only: free_bytes
   use guard, only: end_guard
+  use h5_errors, only: h5_failed
   use h5_trap, only: trap
   use h5_types, only: find_type, h5_type
   use hdf5, only: &
+    h5aexists_by_name_f, &
     H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, h5dclose_f, h5dcreate_f, h5dget_space_f, &
     h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, &
     H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, H5F_LIBVER_V18_F, h5fclose_f, &
@@ -23,7 +24,8 @@ module h5
     H5S_SELECT_SET_F, h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
     h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, hsize_t
   use kinds, only: int64, int8
-  use status, only: exit_cannot_create, exit_io, exit_usage
+  use status, only: exit_io, exit_usage
+  use superblock, only: why_not_opened
   use text, only: parse_integer, to_text
   use value_types, only: is_float
   implicit none
@@ -66,23 +68,6 @@ module h5
   integer, parameter :: most_alignment = 2**30
 
 contains
-
-  !> Whether the step failed; then sets the error, unless there is one already.
-  logical function h5_failed(status, action, object, path, error)
-    integer, intent(in) :: status
-    character(len=*), intent(in) :: action, object, path
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: message
-    integer(int64) :: free
-    h5_failed = status < 0 .or. allocated(error)
-    if (.not. h5_failed .or. allocated(error)) return
-    message = 'HDF5 cannot '//action//' '
-    if (object /= '') message = message//''''//object//''' of '
-    message = message//''''//path//''''
-    free = free_bytes(path)
-    if (free >= 0 .and. free < 2**20) message = message//': the disk has '//to_text(free)//' bytes left'
-    call fail(error, merge(exit_cannot_create, exit_io, action == 'create the file'), message)
-  end function h5_failed
 
   !> Starts the library (again is harmless) without its own error output.
   subroutine start_library(path, error)
@@ -192,7 +177,7 @@ contains
     call trap('its beginning', path, endless=.true.)
     if (status >= 0) call h5fopen_f(path, flags, file%id, status, access)
     call end_guard()
-    if (h5_failed(status, 'open', '', path, error)) return
+    if (status < 0 .and. .not. allocated(error)) call fail(error, exit_io, why_not_opened(path))
     call h5pclose_f(access, ignored)
   end subroutine h5_open
 
@@ -301,6 +286,18 @@ contains
     sizes = lengths(size(lengths):1:-1)
   end function reversed
 
+  !> That there is no object of this name, which a result never lacks.
+  function missing_text(file, name) result(text)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: text
+    logical :: is_result
+    integer :: status
+    call h5aexists_by_name_f(file%id, '/', 'format', is_result, status)
+    text = "'"//file%path//"' has no '"//name//"'"
+    if (status >= 0 .and. is_result) text = "'"//file%path//"' is damaged ('"//name//"' is missing)"
+  end function missing_text
+
   !> Opens a dataset and finds its type and lengths.
   subroutine h5_open_dataset(file, name, dataset, error)
     type(h5_file_t), intent(in) :: file
@@ -317,6 +314,9 @@ contains
     if (status >= 0) call h5dget_space_f(dataset%id, space, status)
     if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
     call end_guard()
+    if (status < 0) then
+      if (.not. h5_exists(file, name)) call fail(error, exit_io, missing_text(file, name))
+    end if
     if (h5_failed(status, 'open', name, file%path, error)) return
     allocate (sizes(rank), most(rank))
     if (rank > 0) call h5sget_simple_extent_dims_f(space, sizes, most, status)

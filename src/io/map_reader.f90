@@ -3,6 +3,7 @@
 
 !> Reading a file of Separatrix, of any format version up to that which is written.
 module map_reader
+  use attribute_seal, only: verify_attributes
   use byte_file, only: byte_file_t
   use errors, only: error_t, fail
   use h5, only: h5_close_dataset, h5_dataset_t, h5_open, h5_open_dataset, h5_read
@@ -16,6 +17,7 @@ module map_reader
   use open_file, only: open_file_t
   use slabs, only: slab, slab_count
   use status, only: exit_bad_case, exit_io, exit_no_input
+  use superblock, only: is_hdf5
   use files, only: file_exists, is_empty, is_text
   use output_check, only: is_folder
   use text, only: to_text
@@ -59,10 +61,24 @@ contains
     if (allocated(error)) return
     format = ''
     if (reader%has_attribute('/', 'format')) call reader%text_attribute('/', 'format', format, error)
-    if (allocated(error)) return
-    if (format /= 'separatrix') call fail(error, exit_io, ''''//path//''' is not a file of Separatrix')
+    if (.not. allocated(error) .and. format /= 'separatrix') call check_foreign(reader, error)
     if (.not. allocated(error)) call check_version(reader, error)
   end subroutine open_final
+
+  !> What to call a file without the attribute that distinguishes a result: damaged where it has the provenance of one, or cannot be read.
+  subroutine check_foreign(reader, error)
+    type(reader_t), intent(in) :: reader
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: names(:)
+    logical, allocatable :: are_groups(:)
+    call reader%children('/', names, are_groups, error)
+    if (allocated(error)) return
+    if (reader%has_attribute('/provenance', 'case_identity')) then
+      call fail(error, exit_io, "'"//reader%path//"' is damaged (the attribute 'format' of '/' is missing or changed)")
+    else
+      call fail(error, exit_io, "'"//reader%path//"' is not a file of Separatrix")
+    end if
+  end subroutine check_foreign
 
   subroutine check_version(reader, error)
     type(reader_t), intent(in) :: reader
@@ -72,6 +88,8 @@ contains
     call reader%number_attribute('/', 'format_version', version, error)
     if (allocated(error)) return
     if (version >= oldest_version .and. version <= format_version) return
+    call verify_attributes(reader%file, error)
+    if (allocated(error)) return
     call fail(error, exit_bad_case, ''''//reader%path//''': found format_version '//to_text(nint(version))// &
               ', this program reads '//to_text(oldest_version)//' to '//to_text(format_version))
   end subroutine check_version
@@ -97,27 +115,6 @@ contains
     if (allocated(error)) return
     call h5_open(path, reader%file, error)
   end subroutine open_reader
-
-  !> Whether the signature of HDF5 is where the format allows it: at the beginning, or behind 512, 1024, 2048 ... bytes. True for
-  !> a file that cannot be read, whose reason HDF5 states.
-  logical function is_hdf5(path)
-    character(len=*), intent(in) :: path
-    character(len=*), parameter :: signature = char(137)//'HDF'//achar(13)//achar(10)//achar(26)//achar(10)
-    character(len=len(signature)) :: found
-    integer(int64) :: at
-    integer :: unit, status
-    open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=status)
-    is_hdf5 = status /= 0
-    if (is_hdf5) return
-    at = 0
-    do while (.not. is_hdf5)
-      read (unit, pos=at + 1, iostat=status) found
-      if (status /= 0) exit
-      is_hdf5 = found == signature
-      at = max(512_int64, 2*at)
-    end do
-    close (unit)
-  end function is_hdf5
 
   !> The variables of the root and of its groups in the order of the file, without dimensions that have
   !> no coordinates.

@@ -7,16 +7,12 @@ module map_repair
   use errors, only: error_t, fail
   use kinds, only: int64, int8
   use status, only: exit_io
+  use superblock, only: short_bytes, stated_bytes
   use text, only: to_text
   implicit none
   private
 
   public :: restore_length
-
-  !> Start of a superblock of version 2 or 3 up to the address of the end of the file (HDF5 File Format Specification
-  !> 3.0, II.A.2): signature, version, size of offsets, size of lengths, flags, three addresses.
-  integer, parameter :: header_bytes = 36, end_address = 29
-  integer, parameter :: signature(8) = [-119, 72, 68, 70, 13, 10, 26, 10]
 
 contains
 
@@ -25,7 +21,7 @@ contains
     character(len=*), intent(in) :: path
     integer(int64), intent(out) :: missing
     type(error_t), allocatable, intent(out) :: error
-    integer(int8) :: header(header_bytes)
+    integer(int8) :: header(short_bytes)
     integer(int64) :: expected, found
     integer :: unit, status
     logical :: readable
@@ -38,9 +34,9 @@ contains
       inquire (unit=unit, size=found)
       read (unit, iostat=status, iomsg=message) header
       readable = status == 0
-      if (readable) readable = all(header(:8) == signature) .and. (header(9) == 2 .or. header(9) == 3) .and. header(10) == 8
+      if (readable) expected = stated_bytes(header)
+      if (readable) readable = expected >= 0
       if (readable) then
-        expected = transfer(header(end_address:), expected)
         if (found < expected) then
           missing = expected - found
           write (unit, pos=expected, iostat=status, iomsg=message) 0_int8

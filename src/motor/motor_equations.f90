@@ -266,7 +266,7 @@ contains
         if (.not. is_held(mode)) guards([guard_body_up, guard_body_down])%node = zero
         if (mode < crank_held) guards([guard_crank_up, guard_crank_down])%node = zero
         call prepare_series(sheet%tape, low_order, rates, [guards%node, system%torque, system%load, system%foot, system%inertia], &
-                            [integer ::], system%low(mode))
+                            [integer ::], system%low(mode), only_used=.true.)
         do kept = 0, 1
           call start_flight(system%flights(mode, kept), sheet%tape, [rates, powers(:3*kept)], guards, sheet%parameters)
           call set_branches(system%flights(mode, kept), [integer ::])

@@ -158,7 +158,7 @@ contains
     type(state_t), intent(inout) :: state
     type(motor_state_t), intent(inout) :: crank
     real(wp), intent(in) :: time_end
-    type(flight_t), intent(out) :: flight
+    type(flight_t), intent(inout) :: flight
     type(tally_t), intent(inout) :: tally
     integer, intent(inout) :: reason
     type(log_t), intent(inout), optional :: log

@@ -12,7 +12,7 @@ module motor_rest
     motor_system_t, v_at
   use switch_branches, only: choose_branches
   use tape_series, only: expand, prepare_series, series_t
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate_some
   implicit none
   private
 
@@ -57,20 +57,25 @@ contains
   end function equation_mode
 
   !> First Taylor coefficients of everything in a mode. The sign of slip is that of the mode of the body. `fault` is -1 if no
-  !> branches of the switching functions fit the state.
-  pure subroutine low_series(system, mode, state, crank, series, fault)
+  !> branches of the switching functions fit the state. With `values_only` the series of a machine with a motor have order 0.
+  pure subroutine low_series(system, mode, state, crank, series, fault, values_only)
     type(motor_system_t), intent(in) :: system
     integer, intent(in) :: mode
     type(state_t), intent(in) :: state
     type(motor_state_t), intent(in) :: crank
     type(series_t), intent(out) :: series
     integer, intent(out) :: fault
+    logical, intent(in), optional :: values_only
     real(wp) :: parameters(size(system%sheet%parameters)), z(system%variables)
     integer :: branches(size(system%sheet%tape%switches)), zeros(size(system%sheet%tape%switches))
     logical :: fits
     parameters = parameters_now(system, state, crank)
     z = state_vector(system, state, crank)
     fits = .true.
+    if (present(values_only) .and. .not. system%clock) then
+      if (values_only) call low_values(system, mode, z, parameters, series, fault)
+      if (values_only) return
+    end if
     associate (flight => system%flights(mode, 0))
       if (system%clock) then
         call choose_branches(flight, z, parameters, branches, zeros, fits)
@@ -85,6 +90,23 @@ contains
     fault = abs(fault)
     if (fault == 0 .and. .not. fits) fault = -1
   end subroutine low_series
+
+  !> Values alone, as series of order 0.
+  pure subroutine low_values(system, mode, z, parameters, series, fault)
+    type(motor_system_t), intent(in) :: system
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: z(:), parameters(:)
+    type(series_t), intent(inout) :: series
+    integer, intent(out) :: fault
+    integer :: faults(system%sheet%tape%count)
+    associate (tape => system%flights(mode, 0)%tape, low => system%low(mode))
+      allocate (series%c(0:0, tape%count))
+      faults = 0
+      call evaluate_some(tape, low%steady, z, parameters, series%c, faults, low%branches)
+      call evaluate_some(tape, low%varying, z, parameters, series%c, faults, low%branches)
+      fault = max(0, maxval(faults, mask=low%is_used))
+    end associate
+  end subroutine low_values
 
   !> Order of the zero of a rate's integral that is zero now: `c` are coefficients of the rate, `rounding` that of the first.
   pure integer function zero_order(c, rounding) result(order)
@@ -104,8 +126,11 @@ contains
     integer :: mode, fault
     logical :: up, down
     mode = equation_mode(.false., crank%turning /= 0)
-    call low_series(system, mode, state, crank, series, fault)
+    call low_series(system, mode, state, crank, series, fault, values_only=.true.)
     associate (guards => system%flights(mode, 0)%guards%node, rounding => force_rounding(system, state, crank, series))
+      if (series%order == 0 .and. any(abs(series%c(0, guards([guard_body_up, guard_body_down]))) <= rounding)) then
+        call low_series(system, mode, state, crank, series, fault)
+      end if
       up = is_over(series%c(:, guards(guard_body_up)), 0.0_wp, rounding)
       down = is_over(-series%c(:, guards(guard_body_down)), 0.0_wp, rounding)
     end associate

@@ -11,7 +11,7 @@ module motor_body
   use kinds, only: wp
   use machine_type, only: section_state_t
   use motion_state, only: log_t, mode_stick, state_t, tally_t
-  use motor_flow, only: add_slopes, fly_on, motor_flow_t, new_flow, rates_at, with_piece
+  use hybrid_flow, only: add_slope_nodes, fly, hybrid_flow_t, new_flow, rates_in, values_in
   use motor_machine, only: motor_machine_t
   use motor_motion, only: advance_motor, start_motor
   use motor_system, only: body_held, both_move
@@ -19,7 +19,6 @@ module motor_body
   use motor_rest, only: slips
   use motor_state, only: motor_state_t
   use hybrid_body, only: event_of_section, guard_of_body, hybrid_body_t, jump_of_body, no_jump, rests_on_barrier
-  use tape_value, only: evaluate
   implicit none
   private
 
@@ -34,7 +33,7 @@ module motor_body
   type, extends(hybrid_body_t), public :: motor_body_t
     type(motor_machine_t) :: machine
     !> Flights of a body that slips, and of one that is held.
-    type(motor_flow_t) :: flows(2)
+    type(hybrid_flow_t) :: flows(2)
     !> Derivatives of the force that holds the body: nodes of the second tape.
     integer, allocatable :: hold_slopes(:)
     !> Variable of the equations for each coordinate of the state.
@@ -93,10 +92,10 @@ contains
       allocate (body%watched(2, body%n), source=0.0_wp)
       body%watched(1, x_of) = 1
       body%watched(2, v_of) = 1
-      call new_flow(system, both_move, body%flows(1))
-      call new_flow(system, body_held, body%flows(2))
+      call new_flow(system, both_move, 1, body%flows(1))
+      call new_flow(system, body_held, 1, body%flows(2))
       allocate (body%hold_slopes(body%n))
-      call add_slopes(body%flows(2), system%body_hold(body_held), body%hold_slopes)
+      call add_slope_nodes(body%flows(2), system%body_hold(body_held), 1, body%hold_slopes)
     end associate
   end function motor_body_of
 
@@ -156,12 +155,12 @@ contains
       z(order) = y1
       sizes(order) = self%size_of
       if (present(flight)) then
-        call fly_on(flow, parameters_in(self, mode, y1), sizes, t1 - t0, z, slopes)
+        call fly(flow, parameters_in(self, mode, y1), sizes, t1 - t0, z, slopes)
         flight = slopes(order, order)
         if (k == 2) flight(:, v_of) = 0
         if (rests_on_barrier(mode)) flight(:, x_of) = 0
       else
-        call fly_on(flow, parameters_in(self, mode, y1), sizes, t1 - t0, z)
+        call fly(flow, parameters_in(self, mode, y1), sizes, t1 - t0, z)
       end if
       y1 = z(order)
     end associate
@@ -174,7 +173,7 @@ contains
     real(wp) :: slope(size(y))
     real(wp) :: z(self%n), rates(self%n)
     z(self%order) = y + 0*t
-    rates = rates_at(self%flows(merge(1, 2, slips(mode))), z, parameters_in(self, mode, y))
+    rates = rates_in(self%flows(merge(1, 2, slips(mode))), z, parameters_in(self, mode, y))
     slope = rates(self%order)
   end function slope_of_body
 
@@ -198,13 +197,11 @@ contains
     integer, intent(in) :: side
     real(wp), intent(in) :: t, y(:)
     real(wp), intent(out) :: margin, by_state(:), by_time
-    real(wp) :: z(size(self%flows(2)%states)), value(self%flows(2)%tape%count), slopes(self%n)
-    integer :: fault(self%flows(2)%tape%count)
-    z = 0
+    real(wp) :: z(self%n), value(self%flows(2)%tape%count), slopes(self%n)
     by_time = 0
     z(self%order) = y
     associate (system => self%machine%motor%system)
-      call evaluate(self%flows(2)%tape, z, with_piece(self%flows(2), z, parameters_in(self, mode_stick, y)), value, fault)
+      value = values_in(self%flows(2), z, parameters_in(self, mode_stick, y))
       margin = system%body_level - side*value(system%body_hold(body_held))
       slopes = value(self%hold_slopes)
       by_state = -side*slopes(self%order)

@@ -11,7 +11,7 @@ module motor_pieces
   implicit none
   private
 
-  public :: piece_of, set_parameters, stop_at_piece, value_of
+  public :: has_pieces, piece_of, set_parameters, stop_at_piece, value_of
 
   !> Parts of a step at whose ends it is looked whether a piece ends.
   integer, parameter :: parts = 16
@@ -22,6 +22,12 @@ module motor_pieces
   end type motor_piece_t
 
 contains
+
+  !> Whether the equations change from piece to piece.
+  pure logical function has_pieces(control)
+    type(motor_control_t), intent(in) :: control
+    has_pieces = control%curve%count > 0 .or. control%command > 0
+  end function has_pieces
 
   !> The piece in which a state is, by its variables and the values of the nodes.
   pure type(motor_piece_t) function piece_of(control, z, value) result(piece)
@@ -55,7 +61,7 @@ contains
     real(wp) :: inside, beyond, middle
     integer :: i
     next = piece
-    if (control%curve%count == 0 .and. control%command == 0) return
+    if (.not. has_pieces(control)) return
     do i = 1, parts
       if (.not. ends(piece, after(control, c, own, step*i/parts, piece))) cycle
       inside = step*(i - 1)/parts

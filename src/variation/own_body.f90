@@ -11,7 +11,7 @@ module own_body
   use motion_state, only: log_t, mode_slip_minus, tally_t
   use motor_rest, only: slips
   use motor_system, only: body_held, both_move, guard_body_down, guard_body_up, phi_at, v_at, w_at, x_at
-  use own_flow, only: add_slope_nodes, fly_own, new_own_flow, own_flow_t, rates_in, values_in
+  use hybrid_flow, only: add_slope_nodes, fly, hybrid_flow_t, new_flow, rates_in, values_in
   use own_machine, only: own_machine_t
   use hybrid_body, only: rests_on_barrier, hybrid_body_t
   implicit none
@@ -26,7 +26,7 @@ module own_body
   type, extends(hybrid_body_t), public :: own_body_t
     type(own_machine_t) :: machine
     !> Flights of a body that slips, and of one that is held.
-    type(own_flow_t) :: flows(2)
+    type(hybrid_flow_t) :: flows(2)
     !> Derivatives by all variables of what is zero where the held body is released up (1) or down (2), nodes of the second tape,
     !> and of the restitution, nodes of the first tape.
     integer, allocatable :: release_slopes(:, :), restitution_slopes(:)
@@ -82,8 +82,8 @@ contains
       allocate (body%watched(2, body%n), source=0.0_wp)
       body%watched(1, x_of) = 1
       body%watched(2, v_of) = 1
-      call new_own_flow(system, both_move, body%flows(1))
-      call new_own_flow(system, body_held, body%flows(2))
+      call new_flow(system, both_move, x_at, body%flows(1))
+      call new_flow(system, body_held, x_at, body%flows(2))
       allocate (body%release_slopes(system%variables, 2), body%restitution_slopes(system%variables))
       associate (guards => system%flights(body_held, 0)%guards)
         do k = 1, 2
@@ -150,10 +150,10 @@ contains
       if (last > turn) until = (turn + 1)*self%period
       if (last < turn) until = max(turn*self%period, t1)
       if (present(flight)) then
-        call fly_own(self%flows(k), parameters, self%sizes, until - t, z, slopes)
+        call fly(self%flows(k), parameters, self%sizes, until - t, z, slopes)
         if (abs(until - t) > 0) flight = matmul(slopes, flight)
       else
-        call fly_own(self%flows(k), parameters, self%sizes, until - t, z)
+        call fly(self%flows(k), parameters, self%sizes, until - t, z)
       end if
       y1 = z(x_at:)
       t = until

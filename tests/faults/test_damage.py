@@ -12,10 +12,15 @@ import h5py
 import life
 import numpy as np
 import pytest
+import separatrix
 
 SEED = 20261122
 PART = f"{life.NAME}.part"
 AXES = ("x0", "v0")
+#: What a damaged result is called; the last is a beginning that no reader knows.
+DAMAGED = re.compile(
+    r"is damaged|match (its|their) checksum|cannot be read as HDF5 \(.*signature|no HDF5 file, or"
+)
 
 
 @pytest.fixture(scope="module")
@@ -198,8 +203,29 @@ def test_info_shows_no_damaged_value(separatrix, final, tmp_path, amount, figure
             assert outcome.out == shown
         else:
             assert outcome.code == 74 and copy.name in outcome.messages[0], outcome
+            assert DAMAGED.search(outcome.messages[0]), outcome
         ends["same" if outcome.code == 0 else "refused"] += 1
     figures.update(seed=SEED, flips=sum(ends.values()), ends=ends)
+
+
+def test_the_package_calls_damage_damage(final, tmp_path, amount, figures):
+    chance = random.Random(SEED)
+    original = final.read_bytes()
+    copy = tmp_path / "copy.h5"
+    written = [i for i in range(len(original)) if original[i]]
+    refused = 0
+    for _ in range(amount(60, 400)):
+        copy.write_bytes(original)
+        flip(copy, chance.choice(written), chance.randrange(8))
+        try:
+            with separatrix.open_result(copy) as result:
+                result.load()
+        except separatrix.SeparatrixError as error:
+            assert str(copy) in str(error)
+            assert DAMAGED.search(str(error)), error
+            refused += 1
+    assert refused
+    figures.update(seed=SEED, refused=refused)
 
 
 def test_verify_names_the_tile(separatrix, final, tmp_path, amount, figures):
@@ -241,3 +267,5 @@ def test_verify_finds_a_cut_file(separatrix, final, tmp_path):
         copy.write_bytes(original[:cut])
         outcome = life.run(separatrix, "verify", copy.name, folder=tmp_path)
         assert outcome.code == 74, outcome
+        found = f"is cut: {cut} of {len(original)} bytes are left" if cut else "is empty"
+        assert found in outcome.messages[0]

@@ -6,6 +6,7 @@ import json
 import os
 import random
 import signal
+import subprocess
 import time
 from collections import Counter
 from pathlib import Path
@@ -232,6 +233,27 @@ def test_the_time_limit_within_one_long_trajectory(mpi_separatrix, tmp_path, lon
     assert code == 75, log
     assert time.monotonic() - began < 12
     assert "stopped within one long trajectory" in log
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("more", [[], ["--resume"]])
+def test_the_time_limit_while_a_map_is_read(separatrix, faulty_calls, reference, tmp_path, more):
+    """The command reports what it did not come to, also while HDF5 is silent."""
+    slow = {
+        "LD_PRELOAD": str(faulty_calls),
+        "FAULT_NAME": reference.name,
+        "FAULT_AT": "9",
+        "FAULT_DO": "read",
+    }
+    words = ["boundary", reference, "-o", "b.h5", "--time-limit", "0.1", *more]
+    slow = os.environ | slow
+    done = subprocess.run([separatrix, *words], cwd=tmp_path, env=slow, capture_output=True, text=True)
+    assert done.returncode == 75, done
+    assert done.stderr == (
+        "separatrix: stopped while the map was read; this run has written nothing yet; "
+        "the same command starts again\n"
+    )
+    assert not (tmp_path / "b.h5").exists()
 
 
 @pytest.mark.parametrize(("ranks", "moved"), [(0, False), (2, True)])

@@ -11,6 +11,7 @@ import numpy as np
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.locks import lock_options
 from separatrix.palette import of_attractors
+from separatrix.stored import first_line, is_ours, why_unreadable
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED
 from separatrix.view.packing import clean
@@ -43,7 +44,10 @@ class ResultFile:
         except DAMAGE as error:
             if self.path.suffix == ".toml" and not h5py.is_hdf5(self.path):
                 raise SeparatrixError(f"{path}: cannot be read as HDF5 ({CASE_GIVEN})", BAD_DATA) from error
-            raise SeparatrixError(f"{path}: is damaged ({str(error).splitlines()[0]})") from error
+            reason = f"is damaged ({first_line(error)})"
+            if isinstance(error, OSError):
+                reason = why_unreadable(self.path, error)
+            raise SeparatrixError(f"{path}: {reason}") from error
 
     def _try(self, file: h5py.File) -> None:
         """Read a little of everything."""
@@ -55,6 +59,8 @@ class ResultFile:
 
     def _read_header(self, file: h5py.File) -> None:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
+        if attributes.get("format") != "separatrix" and is_ours(file):
+            raise SeparatrixError(f"{self.path}: is damaged (the attribute format is missing or changed)")
         if attributes.get("format") != "separatrix":
             raise SeparatrixError(f"{self.path}: is not a file of Separatrix")
         if int(attributes["format_version"]) > FORMAT_VERSION:

@@ -187,6 +187,8 @@ extern "C" void separatrix_guard_end() {
   guard_code = 0;
 }
 
+extern "C" int separatrix_guard_messages() { return STDERR_FILENO; }
+
 // In place of csupport/trial.c: everything is read in this process, where it is looked at.
 extern "C" int separatrix_fork() { return -1; }
 extern "C" int separatrix_crashed(int) { return 0; }

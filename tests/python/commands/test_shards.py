@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A map or a list in shares, merged, is the map or the list; what is no set of shares is refused."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -48,6 +49,23 @@ def test_the_merged_map_is_that_of_one_run(separatrix, folder):
         assert one == other
     succeed(separatrix, "verify", "map.h5", "--sample", "20", folder=folder)
     assert len(list(folder.glob("*.part"))) == 3
+
+
+def test_the_plan_is_that_of_the_share(separatrix, folder):
+    """The shares of a plan have the tiles and points that their runs have, for a map and for a list."""
+    (folder / "starts.csv").write_text("x0,v0\n" + "0.01,0.1\n" * 2000)
+    for words in (["basin", "case.toml", *SMALL], LIST):
+        whole = succeed(separatrix, *words, "--dry-run", folder=folder).out
+        of_map = [int(part) for part in re.search(r"(\d+) points in (\d+) tiles", whole).groups()]
+        sums = [0, 0]
+        for number in (1, 2, 3):
+            plan = succeed(separatrix, *words, "--dry-run", "--shard", f"{number}/3", folder=folder).out
+            found = re.search(rf"share {number} of 3: (\d+) points in (\d+) tiles; ([\d.]+) .?B while", plan)
+            sums = [sums[0] + int(found[1]), sums[1] + int(found[2])]
+            if words is not LIST:
+                assert int(found[2]) == tiles_done(folder / part(number, 3))
+            assert float(found[3]) < 0.5 * float(re.search(r"([\d.]+) .?B while", whole)[1])
+        assert sums == of_map
 
 
 @pytest.mark.parametrize("count", [1, 5])

@@ -153,6 +153,14 @@ def test_fixed_length_attributes_are_read(basin: Path) -> None:
         assert result.attrs["kind"] == "basin"
 
 
+def test_a_cut_file_is_called_cut(basin: Path) -> None:
+    whole = basin.read_bytes()
+    basin.write_bytes(whole[:-9])
+    with pytest.raises(SeparatrixError, match=f"is cut: {len(whole) - 9} of {len(whole)} bytes") as caught:
+        open_result(basin)
+    assert caught.value.code == 65
+
+
 def test_missing_file_and_no_hdf5(tmp_path: Path) -> None:
     with pytest.raises(SeparatrixError, match="no such file") as caught:
         open_result(tmp_path / "absent.h5")

@@ -1,14 +1,15 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Flights of a body by expressions between its events, forwards or back, with their derivatives by the start: Taylor series of the
-!> equations and of their variational equations on one tape. The branches of switching functions change within a flight; where the
-!> rates jump, so do the derivatives (Aizerman and Gantmakher 1958).
-module own_flow
+!> Flights of a body on a tape, with a motor or by expressions, between its events, forwards or back, with their derivatives by the
+!> start: Taylor series of the equations and of their variational equations on one tape. Within a flight the motor passes from piece
+!> to piece and the switching functions change their branches; where the rates jump, so do the derivatives (Aizerman and
+!> Gantmakher 1958).
+module hybrid_flow
   use kinds, only: wp
-  use motor_flow, only: step_of
-  use motor_pieces, only: value_of
-  use motor_system, only: motor_system_t, v_at, x_at
+  use motor_pieces, only: has_pieces, motor_piece_t, piece_of, set_parameters, stop_at_piece, value_of
+  use motor_system, only: motor_system_t, w_at, y_at
+  use motor_torque, only: motor_control_t
   use series_flight, only: flight_t, series_order
   use switch_branches, only: choose_branches
   use tape, only: tape_t
@@ -20,49 +21,53 @@ module own_flow
   implicit none
   private
 
-  !> Steps after which a flight is given up.
+  !> Steps after which a flight is given up: a turn of a crank takes some twenty.
   integer, parameter :: most_steps = 20000
   !> Parts of a step at whose ends it is looked whether a switching function has crossed zero.
   integer, parameter :: parts = 16
   !> Changes of rates at a switch that are rounding, as a share of the rates.
   real(wp), parameter :: rounding = 1e-13_wp
 
-  public :: add_slope_nodes, fly_own, new_own_flow, rates_in, values_in
+  public :: add_slope_nodes, fly, new_flow, rates_in, values_in
 
-  !> A system z' = f(z) of the variables time, phase, x, v and states, with its derivatives by those from x on.
-  type, public :: own_flow_t
+  !> A system z' = f(z), with the derivatives of its variables from `first` on by these at the start, one column after the other.
+  type, public :: hybrid_flow_t
     type(tape_t) :: tape
     !> The same without derivatives: it has the first nodes.
     type(flight_t) :: plain
-    integer :: n = 0, varied = 0
+    integer :: n = 0, first = 1, varied = 0
     !> Nodes of variables and of their rates.
     integer, allocatable :: states(:), rates(:)
-    !> Derivatives of the switching functions by x, v and the states.
+    !> Derivatives of the switching functions by the varied variables.
     integer, allocatable :: switch_slopes(:, :)
-  end type own_flow_t
+    !> The equations change from piece to piece of a motor.
+    type(motor_control_t) :: control
+  end type hybrid_flow_t
 
 contains
 
-  !> The equations of a mode (`motor_equations`), with their variational equations.
-  pure subroutine new_own_flow(system, mode, flow)
+  !> The equations of a mode (`motor_equations`), with the variational equations of the variables from `first` on.
+  pure subroutine new_flow(system, mode, first, flow)
     type(motor_system_t), intent(in) :: system
-    integer, intent(in) :: mode
-    type(own_flow_t), intent(out) :: flow
+    integer, intent(in) :: mode, first
+    type(hybrid_flow_t), intent(out) :: flow
     integer :: k
+    flow%control = system%control
+    flow%first = first
     flow%plain = system%flights(mode, 0)
     flow%tape = flow%plain%tape
     flow%n = system%variables
-    flow%varied = flow%n - x_at + 1
-    call add_variations(flow%tape, flow%plain%rates(:flow%n), x_at, flow%states, flow%rates)
+    flow%varied = flow%n - first + 1
+    call add_variations(flow%tape, flow%plain%rates(:flow%n), first, flow%states, flow%rates)
     allocate (flow%switch_slopes(flow%varied, size(flow%tape%switches)))
     do k = 1, size(flow%tape%switches)
-      call add_slope_nodes(flow, flow%tape%switches(k)%argument, x_at, flow%switch_slopes(:, k))
+      call add_slope_nodes(flow, flow%tape%switches(k)%argument, first, flow%switch_slopes(:, k))
     end do
-  end subroutine new_own_flow
+  end subroutine new_flow
 
   !> Derivatives of a node by the variables from `first` on, as nodes.
   pure subroutine add_slope_nodes(flow, node, first, slopes)
-    type(own_flow_t), intent(inout) :: flow
+    type(hybrid_flow_t), intent(inout) :: flow
     integer, intent(in) :: node, first
     integer, intent(out) :: slopes(:)
     integer :: k
@@ -73,29 +78,51 @@ contains
 
   !> Values of all nodes; those that are not defined are no number.
   pure function values_in(flow, z, parameters) result(value)
-    type(own_flow_t), intent(in) :: flow
+    type(hybrid_flow_t), intent(in) :: flow
     real(wp), intent(in) :: z(:), parameters(:)
     real(wp) :: value(flow%tape%count)
     real(wp) :: all(size(flow%states))
     integer :: fault(flow%tape%count)
     all = 0
     all(:flow%n) = z
-    call evaluate(flow%tape, all, parameters, value, fault, branches_at(flow, z, parameters, 1))
+    call evaluate(flow%tape, all, with_piece(flow, z, parameters), value, fault, branches_at(flow, z, parameters, 1))
     where (fault > 0) value = ieee_value(1.0_wp, ieee_quiet_nan)
   end function values_in
 
   !> Rates of the variables.
   pure function rates_in(flow, z, parameters) result(rates)
-    type(own_flow_t), intent(in) :: flow
+    type(hybrid_flow_t), intent(in) :: flow
     real(wp), intent(in) :: z(:), parameters(:)
-    real(wp) :: rates(flow%n), value(flow%tape%count)
-    value = values_in(flow, z, parameters)
+    real(wp) :: rates(flow%n), value(flow%plain%tape%count)
+    integer :: fault(flow%plain%tape%count), branches(size(flow%tape%switches))
+    branches = branches_at(flow, z, parameters, 1)
+    call evaluate(flow%plain%tape, z, with_piece(flow, z, parameters), value, fault, branches(:size(flow%plain%tape%switches)))
+    where (fault > 0) value = ieee_value(1.0_wp, ieee_quiet_nan)
     rates = value(flow%rates(:flow%n))
   end function rates_in
 
+  !> The parameters in the piece of the motor in which the variables are.
+  pure function with_piece(flow, z, parameters) result(now)
+    type(hybrid_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: now(size(parameters))
+    now = parameters
+    if (has_pieces(flow%control)) call set_parameters(flow%control, piece_at(flow, z, parameters), now)
+  end function with_piece
+
+  pure type(motor_piece_t) function piece_at(flow, z, parameters) result(piece)
+    type(hybrid_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: value(flow%plain%tape%count)
+    integer :: fault(flow%plain%tape%count)
+    if (.not. has_pieces(flow%control)) return
+    call evaluate(flow%plain%tape, z(:flow%n), parameters, value, fault)
+    piece = piece_of(flow%control, z, value)
+  end function piece_at
+
   !> Signs of the switching functions of a motion that leaves `z` in a direction of time, 1 or -1.
   pure function branches_at(flow, z, parameters, direction) result(branches)
-    type(own_flow_t), intent(in) :: flow
+    type(hybrid_flow_t), intent(in) :: flow
     real(wp), intent(in) :: z(:), parameters(:)
     integer, intent(in) :: direction
     integer :: branches(size(flow%tape%switches)), zeros(size(flow%plain%tape%switches)), faults(flow%tape%count), own
@@ -115,8 +142,8 @@ contains
 
   !> Moves the variables by a `duration` [s] of either sign; `sizes` set how small an error is. With `slopes` their derivatives by
   !> the start, too. Where the equations are not defined nothing comes out that is a number.
-  pure subroutine fly_own(flow, parameters, sizes, duration, z, slopes)
-    type(own_flow_t), intent(in) :: flow
+  pure subroutine fly(flow, parameters, sizes, duration, z, slopes)
+    type(hybrid_flow_t), intent(in) :: flow
     real(wp), intent(in) :: parameters(:), sizes(:), duration
     real(wp), intent(inout) :: z(:)
     real(wp), intent(out), optional :: slopes(:, :)
@@ -133,53 +160,71 @@ contains
     scales(:n) = sizes
     do i = 1, m
       all(n + m*(i - 1) + i) = 1
-      scales(n + m*(i - 1) + 1:n + m*i) = sizes(x_at:)/sizes(x_at - 1 + i)
+      scales(n + m*(i - 1) + 1:n + m*i) = sizes(flow%first:)/sizes(flow%first - 1 + i)
     end do
     call take_steps(flow, flow%tape, size(all), parameters, scales, duration, all)
     z = all(:n)
     slopes = reshape(all(n + 1:), [m, m])
-  end subroutine fly_own
+  end subroutine fly
 
   !> Steps of the series of a tape, that of a flow with or without derivatives, for its first `count` variables.
   pure subroutine take_steps(flow, tape, count, parameters, scales, duration, z)
-    type(own_flow_t), intent(in) :: flow
+    type(hybrid_flow_t), intent(in) :: flow
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: count
     real(wp), intent(in) :: parameters(:), scales(:), duration
     real(wp), intent(inout) :: z(:)
     type(series_t) :: series
-    real(wp) :: left, step, before(flow%n), crossing(size(tape%switches))
+    type(motor_piece_t) :: piece, next
+    real(wp) :: left, step, whole, now(size(parameters)), before(flow%n), crossing(size(tape%switches))
     integer :: branches(size(flow%tape%switches)), fault, i, k
     logical :: crossed(size(tape%switches))
-    associate (arguments => tape%switches%argument)
+    associate (arguments => tape%switches%argument, states => flow%states(:count))
       left = duration
+      now = parameters
+      piece = piece_at(flow, z, now)
+      if (piece%held /= 0) call hold_integral(flow, piece%held, z)
       if (.not. abs(left) > 0) return
       branches = branches_at(flow, z(:flow%n), parameters, merge(1, -1, left > 0))
       call prepare_series(tape, series_order, flow%rates(:count), arguments, branches(:size(crossed)), series)
       do i = 1, most_steps
         if (.not. abs(left) > 0) return
-        call expand(tape, z, parameters, series, fault)
+        call set_parameters(flow%control, piece, now)
+        call expand(tape, z, now, series, fault)
         if (fault /= 0) exit
-        step = sign(min(step_of(series%c(:, flow%states(:count)), max(scales, abs(z(:count)))), abs(left)), left)
+        step = sign(min(step_of(series%c(:, states), max(scales, abs(z(:count)))), abs(left)), left)
         call stop_at_switch(series, arguments, step, crossed)
-        do k = 1, flow%n
-          before(k) = slope_of(series%c(:, flow%states(k)), step)
-        end do
-        do k = 1, size(arguments)
-          crossing(k) = slope_of(series%c(:, arguments(k)), step)
-        end do
+        whole = step
+        call stop_at_piece(flow%control, series%c, [states(w_at), states(min(y_at, count))], step, piece, next)
+        if (abs(step) < abs(whole)) crossed = .false.
         do k = 1, count
-          z(k) = value_of(series%c(:, flow%states(k)), step)
+          z(k) = value_of(series%c(:, states(k)), step)
         end do
+        if (next%held /= piece%held .and. next%held /= 0) call hold_integral(flow, next%held, z)
+        piece = next
         left = left - step
         if (.not. any(crossed)) cycle
+        before = [(slope_of(series%c(:, states(k)), step), k=1, flow%n)]
+        crossing = [(slope_of(series%c(:, arguments(k)), step), k=1, size(arguments))]
         where (crossed) series%branches = -series%branches
         call prepare_series(tape, series_order, flow%rates(:count), arguments, [series%branches], series)
-        if (count > flow%n) call pass_switch(flow, parameters, before, crossed, crossing, series, z)
+        if (count > flow%n) call pass_switch(flow, now, before, crossed, crossing, series, z)
       end do
     end associate
     if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
   end subroutine take_steps
+
+  !> The integral where it is held: nothing of what it was before is left in it.
+  pure subroutine hold_integral(flow, side, z)
+    type(hybrid_flow_t), intent(in) :: flow
+    integer, intent(in) :: side
+    real(wp), intent(inout) :: z(:)
+    integer :: k
+    z(y_at) = side*flow%control%largest_integral
+    do k = flow%n + y_at - flow%first + 1, size(z), flow%varied
+      z(k) = 0
+    end do
+  end subroutine hold_integral
 
   !> Shortens a step to where the first switching functions leave the side of their branches.
   pure subroutine stop_at_switch(series, arguments, step, crossed)
@@ -224,17 +269,17 @@ contains
   !> The derivatives where branches change: dz+ = dz- - (f- - f+) g_z dz-/(g_z f- + g_t). `before`: the rates f-; `crossing`: the
   !> rates of the switching functions g.
   pure subroutine pass_switch(flow, parameters, before, crossed, crossing, series, z)
-    type(own_flow_t), intent(in) :: flow
+    type(hybrid_flow_t), intent(in) :: flow
     real(wp), intent(in) :: parameters(:), before(:), crossing(:)
     logical, intent(in) :: crossed(:)
     type(series_t), intent(in) :: series
     real(wp), intent(inout) :: z(:)
     real(wp) :: value(flow%tape%count), jump(flow%varied), change(flow%varied, flow%varied)
     integer :: fault(flow%tape%count), k
-    associate (n => flow%n, m => flow%varied)
+    associate (first => flow%first, n => flow%n, m => flow%varied)
       call evaluate(flow%tape, z, parameters, value, fault, series%branches)
-      jump = before(x_at:) - value(flow%rates(x_at:n))
-      where (abs(jump) <= rounding*(abs(before(x_at:)) + abs(value(flow%rates(x_at:n))))) jump = 0
+      jump = before(first:) - value(flow%rates(first:n))
+      where (abs(jump) <= rounding*(abs(before(first:)) + abs(value(flow%rates(first:n))))) jump = 0
       if (.not. any(abs(jump) > 0)) return
       ! Two jumps at one instant: which comes first of a neighbour is not known.
       k = findloc(crossed, .true., dim=1)
@@ -244,6 +289,18 @@ contains
       z(n + 1:) = reshape(change, [m*m])
     end associate
   end subroutine pass_switch
+
+  !> The step whose last two terms are rounding (Jorba & Zou 2005).
+  pure real(wp) function step_of(c, scales) result(step)
+    real(wp), intent(in) :: c(0:, :), scales(:)
+    real(wp) :: share
+    integer :: k
+    step = huge(step)
+    do k = ubound(c, 1) - 1, ubound(c, 1)
+      share = maxval(abs(c(k, :))/scales)
+      if (share > 0) step = min(step, (epsilon(1.0_wp)/4/share)**(1.0_wp/k))
+    end do
+  end function step_of
 
   !> Derivative of a series.
   pure real(wp) function slope_of(c, t) result(slope)
@@ -255,4 +312,4 @@ contains
     end do
   end function slope_of
 
-end module own_flow
+end module hybrid_flow
