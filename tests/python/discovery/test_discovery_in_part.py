@@ -48,7 +48,7 @@ def beside_a_bias(between: float, *names: str) -> SimpleNamespace:
 
 @pytest.mark.parametrize("between", [0.995, -0.995])
 def test_an_effect_that_one_of_the_case_cancels_is_not_named(between):
-    """An offset of 20 N m was named beside a bias of the encoder of five times the swing."""
+    """An offset of 20 N m was named beside a bias of the encoder of five times the amplitude."""
     found = imitated(beside_a_bias(between, "coulomb", "offset_force"))
     assert list(found) == ["offset_force"]
     assert "that of effect.sensor_bias.bias of the case have a correlation of 0.9950" in found["offset_force"]

@@ -413,7 +413,7 @@ def test_the_first_notes_are_on_the_first_page_and_the_others_below() -> None:
 
 
 def test_a_named_effect_is_not_among_those_that_were_not_tested() -> None:
-    """Dahl's friction alone has no place in a machine without dry friction, which was named beside it."""
+    """Dahl's friction alone changes nothing without dry friction, which was named beside it."""
     reported = verdict("named") | {"effects": ["cubic_spring", "static_excess"]}
     by_key = {one.key: one for one in sections(reported)}
     assert "Not tested:" not in by_key["missing"].body

@@ -320,7 +320,7 @@ def _missing(verdict: dict) -> Section:
             "gained over the base machine; the evidence counts their sum less one per parameter, and what "
             "imperfections of a rig beside the effect add, where those were weighed.",
         ]
-    # the base alone may have no place for an effect that it has beside another
+    # the base alone may not allow an effect that it allows beside another
     skipped = {name: why for name, why in verdict["not_tested"].items() if name not in verdict["effects"]}
     if skipped:
         body += ["Not tested:", [f"{words(name)}: {why}." for name, why in skipped.items()]]
