@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from separatrix.discovery.decision.stages.in_part import hardly_apart
+from separatrix.discovery.decision.stages.in_part import hardly_apart, imitated
 from separatrix.discovery.fitting.machine import Free
 
 PATHS = ("body.mass", "effect.offset_force.force", "effect.sensor_bias.bias", "effect.coulomb.coefficient")
@@ -36,3 +36,29 @@ def test_effects_that_cancel_are_a_pair(between):
 
 def test_effects_that_are_known_apart_are_not():
     assert hardly_apart(fitted(0.9)) == []
+
+
+def beside_a_bias(between: float, *names: str) -> SimpleNamespace:
+    """The same where the bias is one of the case, and all of `names` are added."""
+    found = fitted(between)
+    found.names = names
+    found.added = tuple(i for i, path in enumerate(PATHS) if path.split(".")[1] in names)
+    return found
+
+
+@pytest.mark.parametrize("between", [0.995, -0.995])
+def test_an_effect_that_one_of_the_case_cancels_is_not_named(between):
+    """An offset of 20 N m was named beside a bias of the encoder of five times the amplitude."""
+    found = imitated(beside_a_bias(between, "coulomb", "offset_force"))
+    assert list(found) == ["offset_force"]
+    assert "that of effect.sensor_bias.bias of the case have a correlation of 0.9950" in found["offset_force"]
+    assert imitated(beside_a_bias(0.9, "coulomb", "offset_force")) == {}
+    # both added are a pair, which hardly_apart reports
+    assert imitated(fitted(between)) == {}
+
+
+def test_an_effect_with_a_number_that_is_known_by_itself_is_named():
+    found = beside_a_bias(0.995, "offset_force")
+    found.problem.free[3] = Free("effect.offset_force.slope", 1.0)
+    found.added = (1, 3)
+    assert imitated(found) == {}

@@ -384,10 +384,12 @@ def test_the_first_page_states_what_is_missed_in_its_unit_and_what_to_measure_ne
 def test_the_first_page_states_what_an_effect_is_and_how_sure_it_is() -> None:
     body = sections(verdict("named"))[0].body
     assert "lacks: cubic spring (a spring force that grows with the cube of the extension)." in body[0]
-    assert any("a probability of 5.8e-74, given all effects" in line for line in body[1])
+    assert any("gain so much with a probability of 5.8e-74." in line for line in body[1])
     assert "To measure next: nothing stays ambiguous." in body[1]
     in_part = sections(verdict("named") | {"complete": False})[0].body[1]
-    assert "To measure next: the name is not in doubt." in " ".join(in_part)
+    assert "To measure next: no record is asked for: the figure of what is left over" in " ".join(in_part)
+    certain = sections(verdict("named") | {"p_value": 0.0})[0].body[1]
+    assert any(line.endswith("with a probability below 1e-300.") for line in certain)
     assert not any("probability" in line for line in sections(verdict("none"))[0].body[1])
     nothing = verdict("named")
     nothing["gap"]["held_out"]["misfit"]["after"] = 0.0
@@ -408,6 +410,20 @@ def test_the_first_notes_are_on_the_first_page_and_the_others_below() -> None:
     assert "(2 more below.)" in summary.body
     assert notes[3:] in compared.body
     assert verdict("named")["notes"] in sections(verdict("named"))[0].body
+
+
+def test_a_named_effect_is_not_among_those_that_were_not_tested() -> None:
+    """Dahl's friction alone changes nothing without dry friction, which was named beside it."""
+    reported = verdict("named") | {"effects": ["cubic_spring", "static_excess"]}
+    by_key = {one.key: one for one in sections(reported)}
+    assert "Not tested:" not in by_key["missing"].body
+    assert "static excess" not in [row[0] for row in by_key["detectable"].body[1].rows]
+
+
+def test_no_more_than_the_whole_excess_is_removed() -> None:
+    reported = verdict("named")
+    reported["gap"]["training"]["after"] = 0.73
+    assert {one.key: one for one in sections(reported)}["gap"].body[1].rows[0][4] == "100.0 %"
 
 
 def test_numbers_of_the_rig_have_no_key() -> None:

@@ -34,7 +34,7 @@ def next_experiment(verdict: dict) -> Section:
     elif verdict["outcome"] in ("not-in-catalogue", "characterised"):
         text = "The maps above show where to look for a law that the catalogue lacks."
     elif verdict["outcome"] == "named" and not verdict["complete"]:
-        text = "The name is not in doubt. What is left over shows when the remaining gap appears."
+        text = "No record is asked for: the figure of what is left over shows when the remaining gap appears."
     else:
         text = "Nothing stays ambiguous."
     return Section("next", "What to measure next", [text])

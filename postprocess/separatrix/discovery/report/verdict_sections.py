@@ -97,8 +97,8 @@ def _summary(verdict: dict) -> Section:
     lines = [f"Verdict: {verdict['outcome']}. {text}"]
     if verdict["p_value"] is not None:
         lines.append(
-            f"Chance alone would make such a gain with a probability of {probability(verdict['p_value'])}, "
-            "given all effects that were tried."
+            "Chance alone would make the best of all effects gain so much with a probability "
+            f"{_chance(verdict)}."
         )
     for index, one in enumerate(verdict["character"]):
         lines.append(f"{'Or ' if index else 'Most likely '}{one['text']}.")
@@ -146,6 +146,12 @@ def _doubt(verdict: dict) -> str:
     if verdict.get("stopped_before"):
         return f"the search was ended before '{verdict['stopped_before']}'"
     return "it is in doubt for the reason below"
+
+
+def _chance(verdict: dict) -> str:
+    """The p value of the verdict after 'a probability'."""
+    found = probability(verdict["p_value"])
+    return found if found.startswith("below") else f"of {found}"
 
 
 def _what(verdict: dict) -> str:
@@ -257,7 +263,7 @@ def _removed(one: dict) -> str:
     excess = one["before"] - one["noise_floor"]
     if excess <= 0 or one["before"] == one["after"]:
         return "-"
-    return f"{100 * (one['before'] - one['after']) / excess:.1f} %"
+    return f"{min(100.0, 100 * (one['before'] - one['after']) / excess):.1f} %"
 
 
 def _where(verdict: dict) -> Section:
@@ -283,7 +289,10 @@ def _missing(verdict: dict) -> Section:
             for gate, passed in verdict["gates"].items()
         ]
         body += [
-            f"Gates of {names(verdict)}, family-wise p: {probability(verdict['p_value'])}:",
+            f"Gates of {names(verdict)}; chance would give the best of all effects this gain with a "
+            f"probability {_chance(verdict)}:"
+            if verdict["p_value"] is not None
+            else f"Gates of {names(verdict)}:",
             Table(["gate", "meaning", ""], rows),
         ]
     else:
@@ -311,8 +320,10 @@ def _missing(verdict: dict) -> Section:
             "gained over the base machine; the evidence counts their sum less one per parameter, and what "
             "imperfections of a rig beside the effect add, where those were weighed.",
         ]
-    if verdict["not_tested"]:
-        body += ["Not tested:", [f"{words(name)}: {why}." for name, why in verdict["not_tested"].items()]]
+    # the base alone may not allow an effect that it allows beside another
+    skipped = {name: why for name, why in verdict["not_tested"].items() if name not in verdict["effects"]}
+    if skipped:
+        body += ["Not tested:", [f"{words(name)}: {why}." for name, why in skipped.items()]]
     return Section("missing", "What is missing?", body)
 
 
@@ -401,6 +412,7 @@ def _detectable(verdict: dict) -> Section:
     rows = [
         [words(name), one["path"] or "-", with_unit(one["size"], one["unit"], 3), one["reason"]]
         for name, one in verdict["detectable"].items()
+        if one["size"] is not None or name not in verdict["effects"]
     ]
     text = (
         f"The size that each effect would need to stand out by {Options().visible:g} standard errors in "

@@ -66,7 +66,12 @@ def effects_in_part(state: SearchState) -> SearchState:
         complete=complete,
         accepted=[whole],
         rounds=rounds,
-        reasons=[*([] if complete else remaining(context, whole)), *hardly_apart(whole.fitted), *odd],
+        reasons=[
+            *([] if complete else remaining(context, whole)),
+            *hardly_apart(whole.fitted),
+            *_not_named(rounds[-1]),
+            *odd,
+        ],
     )
     return state.decided(named)
 
@@ -98,6 +103,43 @@ def hardly_apart(fitted: Fitted) -> list[str]:
     ]
 
 
+def imitated(fitted: Fitted) -> dict[str, str]:
+    """Added effects of which the records show little more than a combination with effects of the case.
+
+    By their names, in words. An effect with one number that is known by itself is none of them.
+    """
+    covariance, found = fitted.covariance, {}
+    free = [one.path for one in fitted.problem.free]
+    known = [
+        j
+        for j, path in enumerate(free)
+        if path.startswith("effect.") and path.split(".")[1] not in fitted.names and covariance[j, j] > 0
+    ]
+    for name in fitted.names if known else ():
+        nearest = []
+        for i in [i for i in fitted.added if free[i].startswith(f"effect.{name}.")]:
+            spread = np.sqrt(covariance[i, i] * np.diag(covariance)[known])
+            sizes = covariance[i, known] / np.maximum(spread, 1e-300)
+            nearest.append((float(np.max(np.abs(sizes))), known[int(np.argmax(np.abs(sizes)))]))
+        if nearest and min(nearest)[0] > SEARCH.hardly_apart:
+            size, j = min(nearest)
+            found[name] = (
+                f"{name} is not named: its estimate and that of {free[j]} of the case have a correlation of "
+                f"{size:.4f} in magnitude; with that number known, or a record in which only one of them "
+                "acts, it would be"
+            )
+    return found
+
+
+def _not_named(found: Round) -> list[str]:
+    """Effects that would close more and are only known together with those of the case, in words."""
+    reasons: dict[str, str] = {}
+    for one in found.scored:
+        if one.fitted.fit.converged and one.prediction is not None and worth_a_name(one, found):
+            reasons |= imitated(one.fitted)
+    return list(reasons.values())
+
+
 def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
     """What is left of the gap with the named effects, in words, by use of the records."""
     reasons = ["named in part: what is left is not in the catalogue"]
@@ -105,6 +147,8 @@ def remaining(context: SearchContext, whole: ScoredCandidate) -> list[str]:
     if whole.prediction is not None:
         fits.append(("held-out", context.held_out, whole.prediction, whole.prediction.reduced_chi2))
     for use, data, found, left in fits:
+        if left <= 1:
+            continue
         depends_on = ceiling(found.problem, found.fit, context.scales.mass).mostly
         names = ", ".join(one.record.name for one in data.prepared)
         what = (
@@ -173,6 +217,7 @@ def _both_clear(pair: ScoredCandidate, found: Round, options: Options) -> bool:
 
 def _passing(context: SearchContext, found: Round, pool: list[ScoredCandidate]) -> ScoredCandidate | None:
     """The candidate that held-out records prefer, if it passes every gate but the adequacy."""
+    pool = [one for one in pool if not imitated(one.fitted)]
     if not pool:
         return None
     best, rivals = choice(context, found.base, found.predicted, pool, preferred)
