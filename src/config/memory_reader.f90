@@ -19,6 +19,8 @@ module memory_reader
 
   !> Names of the state and of the force.
   character(len=*), parameter :: state_name = 'deflection', force_name = 'friction'
+  !> Square of a difference of exponents that is none.
+  character(len=*), parameter :: whole = '1e-20'
   character(len=*), parameter :: u = '(v - friction.velocity)', z = state_name, s0 = 'friction.stiffness', &
     share = s0//'*'//z//'/friction.force'
 
@@ -66,10 +68,11 @@ contains
       ! The deflection does not exceed F/s0, which it only approaches: the power keeps off its singularity there.
       text = u//'*if('//u//' > 0, '//left('-')//', '//left('+')//')'
     case ('bouc_wen')
-      text = u//'*(1 - (friction.shape*sign('//u//'*'//z//') + 1 - friction.shape)*abs('//share//')^friction.exponent)'
+      text = u//'*(1 - (friction.shape*sign('//u//'*'//z//') + 1 - friction.shape)*'// &
+        unless_whole('friction.exponent', 1, 'abs('//share//')')//')'
     case default
       text = u//' - abs('//u//')*'//s0//'*'//z//'/(friction.force + max(friction.static_force - friction.force, 0)'// &
-        '*exp(-(abs('//u//')/friction.stribeck_velocity)^friction.stribeck_exponent))'
+        '*exp(-'//unless_whole('friction.stribeck_exponent', 2, '(abs('//u//')/friction.stribeck_velocity)')//'))'
     end select
   end function rate_text
 
@@ -78,8 +81,19 @@ contains
     character(len=1), intent(in) :: sign
     character(len=:), allocatable :: text
     text = '(1 '//sign//' '//share//')'
-    text = text//'*max('//text//', 1e-9)^(friction.exponent - 1)'
+    text = text//'*if((friction.exponent - 1)^2 > '//whole//', max('//text//', 1e-9)^(friction.exponent - 1), 1)'
   end function left
+
+  !> A power of `base` of the exponent of a key, as a product where it is the whole number `n`: that has a Taylor series at a base of
+  !> zero, too.
+  pure function unless_whole(key, n, base) result(text)
+    character(len=*), intent(in) :: key, base
+    integer, intent(in) :: n
+    character(len=:), allocatable :: text
+    character(len=1) :: digit
+    write (digit, '(i1)') n
+    text = 'if(('//key//' - '//digit//')^2 > '//whole//', '//base//'^'//key//', '//base//'^'//digit//')'
+  end function unless_whole
 
   pure function force_text(law) result(text)
     character(len=*), intent(in) :: law

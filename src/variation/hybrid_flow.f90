@@ -10,6 +10,8 @@ module hybrid_flow
   use motor_pieces, only: has_pieces, motor_piece_t, piece_of, set_parameters, stop_at_piece, value_of
   use motor_system, only: motor_system_t, w_at, y_at
   use motor_torque, only: motor_control_t
+  use operations, only: op_add, op_constant, op_cos, op_multiply, op_negative, op_parameter, op_select, op_sin, op_square, &
+    op_subtract, op_variable
   use series_flight, only: flight_t, series_order
   use switch_branches, only: choose_branches
   use tape, only: tape_t
@@ -25,6 +27,10 @@ module hybrid_flow
   integer, parameter :: most_steps = 20000
   !> Parts of a step at whose ends it is looked whether a switching function has crossed zero.
   integer, parameter :: parts = 16
+  !> Points of a step at which its series is put into the equations; by how much a state may then change over the step, in sizes; how
+  !> often a step is halved for that.
+  integer, parameter :: looks = 4, most_halvings = 40
+  real(wp), parameter :: defect = 1e-12_wp
   !> Changes of rates at a switch that are rounding, as a share of the rates.
   real(wp), parameter :: rounding = 1e-13_wp
 
@@ -42,21 +48,31 @@ module hybrid_flow
     integer, allocatable :: switch_slopes(:, :)
     !> The equations change from piece to piece of a motor.
     type(motor_control_t) :: control
+    !> Curves may be so narrow that a series does not show them.
+    logical :: may_be_narrow = .false.
   end type hybrid_flow_t
 
 contains
 
-  !> The equations of a mode (`motor_equations`), with the variational equations of the variables from `first` on.
-  pure subroutine new_flow(system, mode, first, flow)
+  !> The equations of a mode (`motor_equations`), with the variational equations of the variables from `first` on. `is_own`: they are
+  !> expressions of a case, with curves of any width.
+  pure subroutine new_flow(system, mode, first, is_own, flow)
     type(motor_system_t), intent(in) :: system
     integer, intent(in) :: mode, first
+    logical, intent(in) :: is_own
     type(hybrid_flow_t), intent(out) :: flow
+    !> Operations of polynomials and oscillations, whose series show what is ahead.
+    integer, parameter :: wide(11) = [op_constant, op_variable, op_parameter, op_add, op_subtract, op_multiply, op_negative, &
+                                      op_square, op_sin, op_cos, op_select]
     integer :: k
     flow%control = system%control
     flow%first = first
     flow%plain = system%flights(mode, 0)
     flow%tape = flow%plain%tape
     flow%n = system%variables
+    associate (tape => flow%plain%tape)
+      flow%may_be_narrow = is_own .and. .not. all([(any(tape%nodes(k)%operation == wide), k=1, tape%count)])
+    end associate
     flow%varied = flow%n - first + 1
     call add_variations(flow%tape, flow%plain%rates(:flow%n), first, flow%states, flow%rates)
     allocate (flow%switch_slopes(flow%varied, size(flow%tape%switches)))
@@ -193,10 +209,15 @@ contains
         call expand(tape, z, now, series, fault)
         if (fault /= 0) exit
         step = sign(min(step_of(series%c(:, states), max(scales, abs(z(:count)))), abs(left)), left)
-        call stop_at_switch(series, arguments, step, crossed)
-        whole = step
-        call stop_at_piece(flow%control, series%c, [states(w_at), states(min(y_at, count))], step, piece, next)
-        if (abs(step) < abs(whole)) crossed = .false.
+        do k = 0, most_halvings
+          call stop_at_switch(series, arguments, step, crossed)
+          whole = step
+          call stop_at_piece(flow%control, series%c, [states(w_at), states(min(y_at, count))], step, piece, next)
+          if (abs(step) < abs(whole)) crossed = .false.
+          if (.not. flow%may_be_narrow) exit
+          if (follows(flow, series, now, max(scales(:flow%n), abs(z(:flow%n))), step)) exit
+          step = step/2
+        end do
         do k = 1, count
           z(k) = value_of(series%c(:, states(k)), step)
         end do
@@ -213,6 +234,26 @@ contains
     end associate
     if (abs(left) > 0) z = ieee_value(1.0_wp, ieee_quiet_nan)
   end subroutine take_steps
+
+  !> Whether a series follows the equations over a step: the last terms of the series of a narrow curve, such as that of Stribeck,
+  !> may be negligible far from it, although the step reaches it.
+  pure logical function follows(flow, series, parameters, scales, step)
+    type(hybrid_flow_t), intent(in) :: flow
+    type(series_t), intent(in) :: series
+    real(wp), intent(in) :: parameters(:), scales(:), step
+    real(wp) :: z(flow%n), slopes(flow%n), value(flow%plain%tape%count)
+    integer :: faults(flow%plain%tape%count), i, k
+    follows = .true.
+    do i = looks, 1, -1
+      do k = 1, flow%n
+        z(k) = value_of(series%c(:, flow%states(k)), step*i/looks)
+        slopes(k) = slope_of(series%c(:, flow%states(k)), step*i/looks)
+      end do
+      call evaluate(flow%plain%tape, z, parameters, value, faults, series%branches(:size(flow%plain%tape%switches)))
+      follows = all(abs(value(flow%plain%rates(:flow%n)) - slopes)*abs(step) <= defect*scales)
+      if (.not. follows) return
+    end do
+  end function follows
 
   !> The integral where it is held: nothing of what it was before is left in it.
   pure subroutine hold_integral(flow, side, z)

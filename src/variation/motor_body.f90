@@ -92,8 +92,8 @@ contains
       allocate (body%watched(2, body%n), source=0.0_wp)
       body%watched(1, x_of) = 1
       body%watched(2, v_of) = 1
-      call new_flow(system, both_move, 1, body%flows(1))
-      call new_flow(system, body_held, 1, body%flows(2))
+      call new_flow(system, both_move, 1, .false., body%flows(1))
+      call new_flow(system, body_held, 1, .false., body%flows(2))
       allocate (body%hold_slopes(body%n))
       call add_slope_nodes(body%flows(2), system%body_hold(body_held), 1, body%hold_slopes)
     end associate

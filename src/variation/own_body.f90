@@ -82,8 +82,8 @@ contains
       allocate (body%watched(2, body%n), source=0.0_wp)
       body%watched(1, x_of) = 1
       body%watched(2, v_of) = 1
-      call new_flow(system, both_move, x_at, body%flows(1))
-      call new_flow(system, body_held, x_at, body%flows(2))
+      call new_flow(system, both_move, x_at, .true., body%flows(1))
+      call new_flow(system, body_held, x_at, .true., body%flows(2))
       allocate (body%release_slopes(system%variables, 2), body%restitution_slopes(system%variables))
       associate (guards => system%flights(body_held, 0)%guards)
         do k = 1, 2

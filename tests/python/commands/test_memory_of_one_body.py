@@ -140,3 +140,11 @@ def test_exponents(separatrix, tmp_path, law):
     # Both of the oscillation, and the fast one of the deflection.
     assert found[0]["value"] == pytest.approx(-0.34, abs=0.03)
     assert found[1]["value"] == pytest.approx(found[0]["value"], abs=0.03)
+
+
+def test_exponents_pass_a_narrow_stribeck_curve(separatrix, tmp_path):
+    """Variational equations by SciPy's DOP853: steps of the series went over the curve, and nothing was known."""
+    (tmp_path / "case.toml").write_text(ONE + FRICTION.format(law="lugre") + LAWS["lugre"][0] + "\n")
+    out = succeed(separatrix, "stability", "case.toml", "--periods", "64", "--json", folder=tmp_path).out
+    found = [json.loads(line) for line in out.splitlines() if '"event": "exponent"' in line]
+    assert [one["value"] for one in found[:2]] == pytest.approx([-0.27216946, -0.83573918], abs=1e-7)
