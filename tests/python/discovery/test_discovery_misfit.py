@@ -9,10 +9,12 @@ import pytest
 from scipy.signal import lfilter
 from separatrix.discovery.decision import misfit
 from separatrix.discovery.decision.misfit import doubted_noise, missed, too_quiet, unused
+from separatrix.discovery.decision.remains import noise_and_signal
 from separatrix.discovery.decision.stages import conclusions
 from separatrix.discovery.decision.state import Decision
 from separatrix.discovery.fitting.base import limit_noise
 from separatrix.discovery.fitting.noise import Noise, white_share
+from separatrix.discovery.measured.in_force import DrivenPrepared
 from separatrix.discovery.measured.signals import white_noise
 from separatrix.discovery.options import Options
 
@@ -145,3 +147,19 @@ def test_noise_far_above_that_of_the_same_sensor_is_limited(taken, stated, left)
     # a stated size below the scatter of the samples is not that of the sensor
     assert limit_noise(training, held_out) == (left != taken)
     assert [one.sigma for one in held_out.prepared] == pytest.approx([left, left], rel=0.1)
+
+
+def test_what_is_missed_of_a_force_counts_the_error_of_the_acceleration():
+    """Only the noise of the sensor counted, which may be a hundredth of it."""
+    random, sigma, missed_force = np.random.default_rng(5), 3.6e-4, 0.4
+    t = np.arange(4000.0)
+    record = SimpleNamespace(t=t, x=t, v=None, force=random.standard_normal(4000), pieces=[(0, 4000)])
+    error = np.geomspace(0.02, 0.08, 4000)
+    driven = SimpleNamespace(inertia_error=error)
+    one = DrivenPrepared(record, sigma, 0.0, 0.0, driven=driven)
+    noise, signal = noise_and_signal(SimpleNamespace(prepared=[one]))
+    assert signal == pytest.approx(np.std(record.force))
+    chi2 = np.mean((missed_force / one.deviation(slice(None))) ** 2)
+    assert noise * np.sqrt(chi2) == pytest.approx(missed_force, rel=1e-12)
+    plain = SimpleNamespace(signal=record.force, sigma=sigma)
+    assert noise_and_signal(SimpleNamespace(prepared=[plain]))[0] == pytest.approx(sigma, rel=1e-15)

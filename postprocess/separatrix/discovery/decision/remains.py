@@ -17,6 +17,7 @@ from separatrix.discovery.fitting.data import Data
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.fitted import Fitted
 from separatrix.discovery.fitting.heldout import Prediction
+from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.policy import SEARCH
 
 
@@ -56,10 +57,20 @@ def share_text(share: float) -> str:
 
 def noise_and_signal(data: Data) -> tuple[float, float]:
     """Root mean square noise and standard deviation of what is compared first, over all records [SI]."""
-    sizes = [(one.signal.size, one.sigma, float(np.std(one.signal))) for one in data.prepared]
+    sizes = [(one.signal.size, _noise_of(one), float(np.std(one.signal))) for one in data.prepared]
     counts, *both = (np.array(column) for column in zip(*sizes, strict=True))
     noise, signal = (float(np.sqrt(np.average(one**2, weights=counts))) for one in both)
     return noise, signal
+
+
+def _noise_of(prepared: Prepared) -> float:
+    """The noise of a record. Of a force that with the error of mass times acceleration.
+
+    Where it differs from sample to sample, an equal difference everywhere makes the same chi^2 over it.
+    """
+    if getattr(prepared, "driven", None) is None:
+        return prepared.sigma
+    return float(np.mean(prepared.deviation(slice(None)) ** -2.0) ** -0.5)
 
 
 def remains_of(
