@@ -84,8 +84,8 @@ contains
     text = text//'*if((friction.exponent - 1)^2 > '//whole//', max('//text//', 1e-9)^(friction.exponent - 1), 1)'
   end function left
 
-  !> A power of `base` of the exponent of a key, as a product where it is the whole number `n`: that has a Taylor series at a base of
-  !> zero, too.
+  !> A power of `base` of the exponent of a key, as a product where it is the whole number `n`: that has a Taylor series at zero,
+  !> too.
   pure function unless_whole(key, n, base) result(text)
     character(len=*), intent(in) :: key, base
     integer, intent(in) :: n

@@ -27,8 +27,8 @@ module hybrid_flow
   integer, parameter :: most_steps = 20000
   !> Parts of a step at whose ends it is looked whether a switching function has crossed zero.
   integer, parameter :: parts = 16
-  !> Points of a step at which its series is put into the equations; by how much a state may then change over the step, in sizes; how
-  !> often a step is halved for that.
+  !> Points of a step at which its series is put into the equations; by how much a state may then change over the step, in sizes;
+  !> how often a step is halved for that.
   integer, parameter :: looks = 4, most_halvings = 40
   real(wp), parameter :: defect = 1e-12_wp
   !> Changes of rates at a switch that are rounding, as a share of the rates.
@@ -54,8 +54,8 @@ module hybrid_flow
 
 contains
 
-  !> The equations of a mode (`motor_equations`), with the variational equations of the variables from `first` on. `is_own`: they are
-  !> expressions of a case, with curves of any width.
+  !> The equations of a mode (`motor_equations`), with the variational equations of the variables from `first` on. `is_own`: they
+  !> are expressions of a case, with curves of any width.
   pure subroutine new_flow(system, mode, first, is_own, flow)
     type(motor_system_t), intent(in) :: system
     integer, intent(in) :: mode, first

@@ -143,7 +143,7 @@ def test_exponents(separatrix, tmp_path, law):
 
 
 def test_exponents_pass_a_narrow_stribeck_curve(separatrix, tmp_path):
-    """Variational equations by SciPy's DOP853: steps of the series went over the curve, and nothing was known."""
+    """Variational equations by SciPy's DOP853: steps went over the curve, and nothing was known."""
     (tmp_path / "case.toml").write_text(ONE + FRICTION.format(law="lugre") + LAWS["lugre"][0] + "\n")
     out = succeed(separatrix, "stability", "case.toml", "--periods", "64", "--json", folder=tmp_path).out
     found = [json.loads(line) for line in out.splitlines() if '"event": "exponent"' in line]
