@@ -143,10 +143,7 @@ contains
       if (spectrum%reason /= 0) return
       if (i < 1) then
         ! Without a clock it may be coming to rest.
-        if (.not. (structure%has_clock .or. rate > goes_on)) cycle
-        call watch%look(machines, position_of(structure, state), coordinates_of(structure, state))
-        if (watch%sections == 0) cycle
-        call pass_cycle(machines, structure, watch, state, spectrum, series)
+        if (structure%has_clock .or. rate > goes_on) call look_for_cycle(machines, structure, watch, state, spectrum, series)
         if (spectrum%known .or. spectrum%reason /= 0) return
         cycle
       end if
@@ -166,8 +163,20 @@ contains
     call look_at_section(machines, series, spectrum)
   end subroutine exponents_of_structure
 
+  !> Looks at the next section point of a transient; on a cycle that attracts the exponents are those of its multipliers.
+  subroutine look_for_cycle(machines, structure, watch, state, spectrum, series)
+    type(neighbourhood_t), intent(in) :: machines
+    type(structure_t), intent(in) :: structure
+    type(cycle_watch_t), intent(inout) :: watch
+    type(multibody_state_t), intent(inout) :: state
+    type(spectrum_t), intent(inout) :: spectrum
+    real(wp), intent(inout) :: series(:)
+    call watch%look(machines, position_of(structure, state), coordinates_of(structure, state))
+    if (watch%sections > 0) call pass_cycle(machines, structure, watch, state, spectrum, series)
+  end subroutine look_for_cycle
+
   !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
-  !> distinguish the directions that are left from those that are lost; the watch is over then.
+  !> distinguish the directions that are left from those that are lost; the watch goes on then.
   subroutine pass_cycle(machines, structure, watch, state, spectrum, series)
     type(neighbourhood_t), intent(in) :: machines
     type(structure_t), intent(in) :: structure
@@ -208,6 +217,7 @@ contains
     call note_cycle_exponents(watch, duration, left, spectrum, ok)
     if (.not. ok) then
       spectrum = before
+      watch%sections = 0
       return
     end if
     call note_sum(structure, duration, left, spectrum)

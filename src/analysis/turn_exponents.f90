@@ -93,7 +93,7 @@ contains
   end subroutine exponents_from_point
 
   !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
-  !> distinguish the directions that are left from those that are lost; the watch is over then.
+  !> distinguish the directions that are left from those that are lost; the watch goes on then.
   subroutine pass_cycle(machines, watch, directions, point, spectrum, series)
     type(neighbourhood_t), intent(in) :: machines
     type(cycle_watch_t), intent(inout) :: watch
@@ -122,6 +122,7 @@ contains
     call note_cycle_exponents(watch, duration, left, spectrum, ok)
     if (.not. ok) then
       deallocate (spectrum%exponents, spectrum%errors)
+      watch%sections = 0
       return
     end if
     spectrum%impacts = impacts

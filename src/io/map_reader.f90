@@ -84,15 +84,18 @@ contains
   subroutine check_version(reader, error)
     type(reader_t), intent(in) :: reader
     type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: broken
+    character(len=:), allocatable :: doubt
     real(real64) :: version
     if (.not. reader%has_attribute('/', 'format_version')) return
     call reader%number_attribute('/', 'format_version', version, error)
     if (allocated(error)) return
     if (version >= oldest_version .and. version <= format_version) return
-    call verify_attributes(reader%file, error)
-    if (allocated(error)) return
+    call verify_attributes(reader%file, broken)
+    doubt = ''
+    if (allocated(broken)) doubt = '; or it is damaged: '//broken%message
     call fail(error, exit_bad_case, ''''//reader%path//''': found format_version '//to_text(nint(version))// &
-              ', this program reads '//to_text(oldest_version)//' to '//to_text(format_version))
+              ', this program reads '//to_text(oldest_version)//' to '//to_text(format_version)//doubt)
   end subroutine check_version
 
   !> Opens any HDF5 file for reading. Code 66 if there is none, 65 if it is a text where `allowed` is asked for, 74 if it is
