@@ -115,7 +115,8 @@ scripts/wheel --check --build build-serial || status=1
 
 # By themselves: they kill what they run, at times that they choose.
 echo "test: running the tests of faults"
-.venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile tests/faults --junit-xml=build/pytest-faults.xml || status=1
+.venv/bin/python -m pytest -q -ra -n "$jobs" --dist loadfile -m "$chosen" tests/faults \
+  --junit-xml=build/pytest-faults.xml || status=1
 
 .venv/bin/python scripts/count_tests.py build/ctest.xml build-serial/ctest.xml build/pytest.xml \
   build/pytest-faults.xml || status=1

@@ -256,7 +256,7 @@ def test_the_time_limit_while_a_map_is_read(separatrix, faulty_calls, reference,
     assert not (tmp_path / "b.h5").exists()
 
 
-@pytest.mark.parametrize(("ranks", "moved"), [(0, False), (2, True)])
+@pytest.mark.parametrize(("ranks", "moved"), [pytest.param(0, False, marks=pytest.mark.long), (2, True)])
 def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, ranks, moved):
     """The run does not go on to its end for nothing; a file that was moved can be put back."""
     life.write_case(tmp_path)
@@ -280,7 +280,7 @@ def test_a_working_file_that_is_taken_away_is_noticed(mpi_separatrix, tmp_path, 
         assert "tiles were done before" in (tmp_path / "log").read_text()
 
 
-@pytest.mark.parametrize(("ranks", "share"), [(0, 0.95), (2, 0.1)])
+@pytest.mark.parametrize(("ranks", "share"), [pytest.param(0, 0.95, marks=pytest.mark.long), (2, 0.1)])
 def test_a_working_file_that_is_truncated_keeps_what_is_whole(mpi_separatrix, tmp_path, ranks, share):
     """The run reports it, writes the description back, and --resume goes on with the other tiles."""
     life.write_case(tmp_path)

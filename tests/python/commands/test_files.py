@@ -330,6 +330,7 @@ def test_a_truncated_file_is_refused(separatrix, tmp_path, results):
         assert "file.h5" in outcome.err
 
 
+@pytest.mark.long
 def test_figures_of_real_files(tmp_path, results):
     command = [sys.executable, "-m", "separatrix.cli", *map(str, results.values()), "-o", str(tmp_path)]
     drawn = subprocess.run(command, capture_output=True, text=True)
@@ -352,6 +353,7 @@ sys.exit(code)
 """
 
 
+@pytest.mark.long
 def test_the_memory_of_a_rank_does_not_grow_with_the_map(mpi_separatrix, tmp_path):
     """5 times the rows, 800 000 points more, may take 2 MB more: 2.5 bytes a point. Ranks also
     pack the final file, a slab of up to 2**20 values at a time: as many rows as a chunk has, so longer rows

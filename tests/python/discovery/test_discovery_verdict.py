@@ -108,6 +108,7 @@ def test_noise_that_nobody_states_is_that_of_the_sensor_and_hides_no_gap(separat
     assert 0.7 < verdict["gap"]["held_out"]["after"] < 1.4
 
 
+@pytest.mark.long
 def test_effects_that_are_one_motion_are_reported_together(separatrix, tmp_path):
     made = records(separatrix, tmp_path, "[effect.offset_force]\nforce = 0.6\n")
     few = ("--effects", "viscous,offset_force,sensor_bias,sensor_gain")

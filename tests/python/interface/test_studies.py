@@ -100,6 +100,7 @@ def test_the_joint_table_refuses_other_results(case):
         sx.attractors_of([])
 
 
+@pytest.mark.long
 def test_a_film_has_the_frames_of_its_time(case, tmp_path):
     """25 frames in a second of film: two seconds of the motion at half speed are 100."""
     motion = sx.trajectory(case, 0.0, 0.0, duration=10)

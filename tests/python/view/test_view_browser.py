@@ -326,6 +326,7 @@ def test_boundaries_are_drawn_over_their_map(
     desk.close()
 
 
+@pytest.mark.long
 def test_two_tabs_and_a_server_that_stops(browser: object, results: dict[str, Path], library: Path) -> None:
     """Both tabs work; when the server is gone they report it."""
     process, address = start_command(results)
