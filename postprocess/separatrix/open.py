@@ -13,7 +13,7 @@ import xarray as xr
 
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.locks import lock_options
-from separatrix.stored import NamedErrors, compare_checksums, first_line, is_ours, why_unreadable
+from separatrix.stored import NamedErrors, check_named, compare_checksums, first_line, why_unreadable
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED, RENAMED_EVENTS
 from separatrix.version import __version__
@@ -178,8 +178,7 @@ def _read_header(path: Path) -> tuple[dict, dict, list[str]]:
     try:
         with h5py.File(path, "r", **lock_options(path)) as file:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
-            if attributes.get("format") != FORMAT and is_ours(file):
-                raise SeparatrixError(f"{path}: is damaged (the attribute format is missing or changed)")
+            check_named(path, file, attributes)
             try:
                 _check_header(path, attributes)
             except SeparatrixError:

@@ -16,7 +16,7 @@ from xarray.core import indexing
 
 from separatrix.errors import BAD_DATA, DAMAGE, SeparatrixError
 
-__all__ = ["NamedErrors", "compare_checksums", "first_line", "is_ours", "why_unreadable"]
+__all__ = ["NamedErrors", "check_named", "compare_checksums", "first_line", "why_unreadable"]
 
 _SEAL = "attributes_checksum"
 # version of the format from which a file with checksums has one of its attributes
@@ -81,9 +81,11 @@ def _bytes_of(value: object) -> bytes:
     return np.ascontiguousarray(value, "<f8").tobytes()
 
 
-def is_ours(file: h5py.File) -> bool:
-    """Whether a file has the provenance of a result, also where the attribute of its format is damaged."""
-    return "provenance" in file and "case_identity" in file["provenance"].attrs
+def check_named(path: Path, file: h5py.File, attributes: dict) -> None:
+    """Raise if a file that has the provenance of a result does not name its format: that is damaged."""
+    is_ours = "provenance" in file and "case_identity" in file["provenance"].attrs
+    if is_ours and attributes.get("format") != "separatrix":
+        raise SeparatrixError(f"{path}: is damaged (the attribute format is missing or changed)")
 
 
 def why_unreadable(path: Path, error: OSError) -> str:

@@ -172,13 +172,12 @@ contains
     type(spectrum_t), intent(inout) :: spectrum
     real(wp), intent(inout) :: series(:)
     call watch%look(machines, position_of(structure, state), coordinates_of(structure, state))
-    if (watch%sections > 0) call pass_cycle(machines, structure, watch, state, spectrum, series)
+    if (watch%sections > 0) call pass_cycle(structure, watch, state, spectrum, series)
   end subroutine look_for_cycle
 
   !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
   !> distinguish the directions that are left from those that are lost; the watch goes on then.
-  subroutine pass_cycle(machines, structure, watch, state, spectrum, series)
-    type(neighbourhood_t), intent(in) :: machines
+  subroutine pass_cycle(structure, watch, state, spectrum, series)
     type(structure_t), intent(in) :: structure
     type(cycle_watch_t), intent(inout) :: watch
     type(multibody_state_t), intent(inout) :: state
@@ -187,7 +186,7 @@ contains
     type(spectrum_t) :: before
     type(multibody_state_t) :: there
     type(event_t), allocatable :: events(:)
-    real(wp) :: frame(structure%n, structure%n), growth(structure%n), duration, lasted, positions(watch%sections)
+    real(wp) :: duration, lasted, positions(watch%sections)
     integer :: i, mode, left
     logical :: ok
     call start_of_structure(structure, watch%point, there, ok)
@@ -195,14 +194,10 @@ contains
     before = spectrum
     duration = 0
     left = structure%n
-    frame = 0
-    do i = 1, structure%n
-      frame(i, i) = 1
-    end do
     do i = 1, watch%sections
       call bring_back(structure, state)
       mode = mode_number(structure%frame%moving%machine, state%phase)
-      call advance_with_frame(machines, structure, state, frame, growth, events, lasted, spectrum%reason)
+      call advance_alone(structure, state, events, lasted, spectrum%reason)
       if (spectrum%reason /= 0) return
       left = min(left, least_dimension(structure, mode, events))
       duration = duration + lasted

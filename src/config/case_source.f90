@@ -340,7 +340,12 @@ contains
     text = 'unknown'
     meant = nearest_word(path(mark + 1:), allowed)
     if (len(meant) > 0) text = text//' (did you mean '''//meant//'''?)'
-    text = text//'; allowed '//join(allowed, ', ')
+    if (size(allowed) > 0) then
+      text = text//'; allowed '//join(allowed, ', ')
+    else
+      ! A family of tables, each with a name of its own.
+      text = text//'; allowed tables ['//above//'NAME]'
+    end if
   end function unknown_text
 
   !> The names that may follow `above` ('' or a table's path with its dot).

@@ -69,10 +69,10 @@ contains
       text = u//'*if('//u//' > 0, '//left('-')//', '//left('+')//')'
     case ('bouc_wen')
       text = u//'*(1 - (friction.shape*sign('//u//'*'//z//') + 1 - friction.shape)*'// &
-        unless_whole('friction.exponent', 1, 'abs('//share//')')//')'
+        unless_whole('friction.exponent', '1', 'abs('//share//')')//')'
     case default
       text = u//' - abs('//u//')*'//s0//'*'//z//'/(friction.force + max(friction.static_force - friction.force, 0)'// &
-        '*exp(-'//unless_whole('friction.stribeck_exponent', 2, '(abs('//u//')/friction.stribeck_velocity)')//'))'
+        '*exp(-'//unless_whole('friction.stribeck_exponent', '2', '(abs('//u//')/friction.stribeck_velocity)')//'))'
     end select
   end function rate_text
 
@@ -87,12 +87,9 @@ contains
   !> A power of `base` of the exponent of a key, as a product where it is the whole number `n`: that has a Taylor series at zero,
   !> too.
   pure function unless_whole(key, n, base) result(text)
-    character(len=*), intent(in) :: key, base
-    integer, intent(in) :: n
+    character(len=*), intent(in) :: key, n, base
     character(len=:), allocatable :: text
-    character(len=1) :: digit
-    write (digit, '(i1)') n
-    text = 'if(('//key//' - '//digit//')^2 > '//whole//', '//base//'^'//key//', '//base//'^'//digit//')'
+    text = 'if(('//key//' - '//n//')^2 > '//whole//', '//base//'^'//key//', '//base//'^'//n//')'
   end function unless_whole
 
   pure function force_text(law) result(text)

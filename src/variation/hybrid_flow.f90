@@ -218,6 +218,7 @@ contains
           if (follows(flow, series, now, max(scales(:flow%n), abs(z(:flow%n))), step)) exit
           step = step/2
         end do
+        if (k > most_halvings) exit
         do k = 1, count
           z(k) = value_of(series%c(:, states(k)), step)
         end do

@@ -11,7 +11,7 @@ import numpy as np
 from separatrix.errors import BAD_DATA, DAMAGE, NO_INPUT, SeparatrixError, why_absent
 from separatrix.locks import lock_options
 from separatrix.palette import of_attractors
-from separatrix.stored import first_line, is_ours, why_unreadable
+from separatrix.stored import check_named, first_line, why_unreadable
 from separatrix.trial import CASE_GIVEN, try_first
 from separatrix.variables import FORMAT_VERSION, RENAMED
 from separatrix.view.packing import clean
@@ -59,8 +59,7 @@ class ResultFile:
 
     def _read_header(self, file: h5py.File) -> None:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
-        if attributes.get("format") != "separatrix" and is_ours(file):
-            raise SeparatrixError(f"{self.path}: is damaged (the attribute format is missing or changed)")
+        check_named(self.path, file, attributes)
         if attributes.get("format") != "separatrix":
             raise SeparatrixError(f"{self.path}: is not a file of Separatrix")
         if int(attributes["format_version"]) > FORMAT_VERSION:
