@@ -133,7 +133,8 @@ contains
     real(wp), intent(in) :: turn
     real(wp) :: middle, shift
     if (.not. turn > 0) return
-    if (features%x_max - features%x_min < turn) then
+    ! A motion that goes round once in its window ends where it began but for rounding.
+    if (features%x_max - features%x_min < turn*(1 - 1e-9_wp)) then
       middle = (features%x_max + features%x_min)/2
       shift = nearest_turn(middle, 0.0_wp, turn) - middle
       features%x_max = features%x_max + shift

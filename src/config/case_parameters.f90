@@ -9,9 +9,8 @@ module case_parameters
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use kinds, only: wp
-  use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, rows_of, &
+  use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, motor_family, parameter_row_t, rows_of, &
     part_family, path_of, split_element
-  use memory_rows, only: memory_names
   use motor_choices, only: has_motor
   use part_angles, only: is_of_angle, turns
   use restoring_law, only: position_is_angle
@@ -90,10 +89,7 @@ contains
     type(parameter_row_t), intent(in) :: row
     logical, intent(in) :: is_angle
     row_bounds = bounds_t(lower=row%range%lower, upper=row%range%upper, lower_open=row%range%lower_open, unit=row%unit)
-    if (is_of_position(row) .or. row%family == part_family .or. (row%family == 'friction' .and. &
-                                                                 any(memory_names == row%law))) then
-      row_bounds%unit = unit_of(row%unit, is_angle)
-    end if
+    if (row%family /= motor_family) row_bounds%unit = unit_of(row%unit, is_angle)
   end function row_bounds
 
   !> Whether a parameter is a position or a velocity.

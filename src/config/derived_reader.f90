@@ -7,7 +7,7 @@ module derived_reader
   use case_type, only: case_t
   use case_values, only: take_choice, take_text
   use build_motion, only: machine_of
-  use composed_units, only: composed_unit_t, read_unit
+  use composed_units, only: composed_unit_t, known_units, read_unit
   use derived_quantities, only: compile, compiled_t, derived_kinds, derived_t, is_power, longest_derived, power_names
   use errors, only: error_t
   use law_table, only: label_length

@@ -46,7 +46,7 @@ contains
       call read_parts(source, choices)
       return
     end if
-    call read_law(source, 'body', '', .false., choices(1))
+    call read_law(source, 'body', '', restores_an_angle(source), choices(1))
     body = choices(1)%name
     if (has_problems(source, 'body.law')) body = ''
     do i = 2, size(families)
@@ -57,6 +57,17 @@ contains
     call read_own_tables(source, choices)
     call read_effects(source, choices)
   end subroutine read_laws
+
+  !> Whether the restoring force is that of a pendulum, which makes the mass, read before it, an inertia.
+  pure logical function restores_an_angle(source)
+    type(case_source_t), intent(in) :: source
+    integer :: at
+    restores_an_angle = .false.
+    at = find(source, 'restoring.law')
+    if (at == 0) return
+    if (source%entries(at)%entry%kind /= toml_string) return
+    restores_an_angle = source%entries(at)%entry%string == 'pendulum'
+  end function restores_an_angle
 
   !> The table [motor]; a drive without has a given speed.
   subroutine read_motor(source, choices)

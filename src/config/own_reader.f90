@@ -5,7 +5,7 @@
 module own_reader
   use case_source, only: case_source_t, description, find, know, report
   use case_values, only: take_text
-  use composed_units, only: composed_unit_t, read_unit
+  use composed_units, only: composed_unit_t, known_units, read_unit
   use expression_names, only: has_name
   use kinds, only: wp
   use law_row, only: any_value, unit_length
@@ -249,8 +249,8 @@ contains
     spelling = string(first + length:)
     call read_unit(spelling, unit, column)
     if (column > 0) then
-      problem = 'column '//to_text(first + length - 1 + column)//': allowed a unit, as in "20 N/m^3"; a number alone stands '// &
-        'without quotes'
+      problem = 'column '//to_text(first + length - 1 + column)//': allowed '//known_units()// &
+        '; a number alone stands without quotes'
     else if (len(unit%si) > unit_length) then
       problem = 'allowed a unit of at most '//to_text(unit_length)//' characters'
     else

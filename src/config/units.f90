@@ -3,6 +3,7 @@
 
 !> Quantities with units: "12.5 mm" becomes 0.0125 m.
 module units
+  use composed_units, only: composed_unit_t, read_unit, unit_in_ascii
   use constants, only: pi
   use kinds, only: wp
   use text, only: join, number_length, read_number, replace_all
@@ -117,9 +118,31 @@ contains
       return
     end do
     if (spelling == unit .and. unit /= '1') return
+    call read_composed(spelling, unit, value, status)
+    if (status == 0) return
     problem = 'allowed '//allowed_units(unit)
     if (len(spelling) == 0) problem = 'a number in quotes needs a unit; '//problem
   end subroutine read_quantity
+
+  !> A value in a composed unit of the quantity of `unit`, made one of `unit`; `status` is 0 if it is one. An angle is a pure
+  !> number and a frequency one per time, but neither stands for the other here.
+  pure subroutine read_composed(spelling, unit, value, status)
+    character(len=*), intent(in) :: spelling, unit
+    real(wp), intent(inout) :: value
+    integer, intent(out) :: status
+    type(composed_unit_t) :: given, wanted
+    integer :: columns(2)
+    status = 1
+    if (unit == '1') return
+    call read_unit(spelling, given, columns(1))
+    call read_unit(unit, wanted, columns(2))
+    if (any(columns > 0)) return
+    if (any(given%exponents /= wanted%exponents)) return
+    if ((index(given%si, 'rad') > 0) .neqv. (index(wanted%si, 'rad') > 0)) return
+    if ((index(given%si, 'Hz') > 0) .neqv. (index(wanted%si, 'Hz') > 0)) return
+    value = value*given%multiplier/given%divisor
+    status = 0
+  end subroutine read_composed
 
   !> What may be written for a quantity of the SI unit `unit`, for messages.
   pure function allowed_units(unit) result(text)
@@ -139,7 +162,7 @@ contains
   pure function normal_form(string) result(spelling)
     character(len=*), intent(in) :: string
     character(len=:), allocatable :: spelling
-    spelling = trim(adjustl(replace_all(string, '*', ' ')))
+    spelling = trim(adjustl(replace_all(unit_in_ascii(string), '*', ' ')))
     do while (index(spelling, '  ') > 0)
       spelling = replace_all(spelling, '  ', ' ')
     end do

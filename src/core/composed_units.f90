@@ -5,11 +5,11 @@
 module composed_units
   use constants, only: two_pi
   use kinds, only: wp
-  use text, only: to_text
+  use text, only: join, replace_all, to_text
   implicit none
   private
 
-  public :: read_unit
+  public :: read_unit, unit_in_ascii, known_units
 
   !> Exponents of m, kg, s, A and K.
   integer, parameter, public :: base_count = 5
@@ -52,16 +52,24 @@ module composed_units
     divides(7) = [1e9_wp, 1e6_wp, 1e3_wp, 1e2_wp, one, one, one]
   integer, parameter :: largest_exponent = 9
 
+  !> Signs beyond ASCII, as bytes of UTF-8, and what they stand for.
+  character(len=1), parameter :: c2 = char(194), ce = char(206)
+  character(len=3), parameter :: signs(*) = [character(len=3) :: ce//char(169), char(226)//char(132)//char(166), 'Ohm', &
+                                             c2//char(181), ce//char(188), c2//char(178), c2//char(179), c2//char(176)]
+  character(len=3), parameter :: stand_for(*) = [character(len=3) :: 'ohm', 'ohm', 'ohm', 'u', 'u', '^2', '^3', 'deg']
+  character(len=2), parameter :: raised_point = c2//char(183)
+
 contains
 
-  !> The unit that `text` spells. `column`: where it is not understood, 0 if it is.
-  pure subroutine read_unit(text, unit, column)
-    character(len=*), intent(in) :: text
+  !> The unit that `spelling` stands for. `column`: where it is not understood, 0 if it is.
+  pure subroutine read_unit(spelling, unit, column)
+    character(len=*), intent(in) :: spelling
     type(composed_unit_t), intent(out) :: unit
     integer, intent(out) :: column
-    character(len=:), allocatable :: factor
+    character(len=:), allocatable :: factor, text
     integer :: at, length, power
     logical :: below
+    text = unit_in_ascii(spelling)
     unit%si = ''
     at = 1
     column = 0
@@ -160,5 +168,25 @@ contains
       symbol%divisor = symbol%divisor*divides(k)
     end if
   end subroutine find_symbol
+
+  !> A unit in the letters of ASCII: 'ohm' for both Greek signs, 'u' for both signs of micro, '^2', '^3', 'deg', a blank for a
+  !> raised point.
+  pure function unit_in_ascii(text) result(plain)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: plain
+    integer :: i
+    plain = text
+    do i = 1, size(signs)
+      if (index(plain, trim(signs(i))) > 0) plain = replace_all(plain, trim(signs(i)), trim(stand_for(i)))
+    end do
+    ! trim leaves nothing of a blank
+    plain = replace_all(plain, raised_point, ' ')
+  end function unit_in_ascii
+
+  !> The symbols and prefixes, for messages.
+  pure function known_units() result(text)
+    character(len=:), allocatable :: text
+    text = 'a unit such as kN s/m, composed of '//join(symbols(2:)%spelling, ', ')//'; prefixes: '//join(prefixes, ', ')
+  end function known_units
 
 end module composed_units

@@ -42,6 +42,7 @@ contains
     integer :: i
     marched%load = machine%joints(j)%load
     marched%frequency = machine%frequency
+    if (marched%load%slip > 0) marched%load%parameters(marched%load%slip) = state%phase(j)
     if (marched%load%by_clock) marched%clock = state%clock
     marched%of_variables = sizes_of_variables(machine, marched%load, state)
     associate (sources => marched%load%sources)
@@ -93,7 +94,7 @@ contains
     real(wp) :: variables(size(marched%load%rates))
     call load_variables(machine, marched%load, state, turning, variables, a)
     if (.not. allocated(marched%branches)) allocate (marched%branches(size(marched%load%tape%switches)))
-    call load_branches(marched%load, variables, marched%of_variables, marched%branches)
+    call load_branches(marched%load, marched%load%parameters, variables, marched%of_variables, marched%branches)
   end subroutine choose_branches
 
   !> Values of the nodes of a normal force at a `time` since the section [s].

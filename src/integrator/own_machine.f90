@@ -11,7 +11,7 @@ module own_machine
   use law_table, only: law_choice_t, label_length, parameter_row_t, rows_of, state_family
   use machine_columns, only: machine_column_t, set_column
   use machine_type, only: machine_t, section_state_t
-  use motion_state, only: append_word, log_t, options_t, tally_t, word_period
+  use motion_state, only: append_word, log_t, options_t, take_turns, tally_t, word_period
   use motor_machine, only: motor_machine_t
   use motor_motion, only: advance_motor, check_hold, prepare_motor, start_own
   use motor_system, only: w_at
@@ -97,6 +97,7 @@ contains
     associate (system => machine%motor%system)
       call look_at_forces(machine, force, stiffness)
       machine%period = system%period
+      machine%turn = system%turn
       if (.not. machine%period > 0) machine%period = merge(two_pi/sqrt(max(stiffness/system%mass, tiny(1.0_wp))), 1.0_wp, &
                                                            stiffness > 0)
       machine%drive_frequency = two_pi/machine%period
@@ -168,6 +169,7 @@ contains
     call start_own(self%motor, values, time, section%state, section%motor)
     ! Where nothing repeats, the time begins at the start.
     if (self%motor%system%aperiodic) section%motor%phi = -time
+    call take_turns(self%turn, section%state)
   end function begin
 
   pure function resume(self, before, angle) result(section)
@@ -183,7 +185,7 @@ contains
     real(wp), intent(in) :: point(:)
     type(section_state_t) :: section
     if (self%by_event) then
-      section = begin(self, [point(1), 0.0_wp, point(2:1 + size(self%starts))], 0.0_wp)
+      section = begin(self, [at_turn(self, point(1)), point(2:1 + size(self%starts))], 0.0_wp)
     else
       section = begin(self, point(:2 + size(self%starts)), 0.0_wp)
     end if
@@ -211,7 +213,21 @@ contains
     n = size(self%starts)
     point = 0
     point(:1 + n) = [section%state%x, section%motor%own(:n)]
+    if (abs(section%state%x) >= self%turn/2 .and. abs(section%state%v) > 0 .and. self%turn > 0) then
+      point(1) = sign(self%turn/2 + abs(section%state%v)/self%drive_frequency, section%state%v)
+    end if
   end function turn_point
+
+  !> x and v for the coordinate `s` of the section without a drive, see `turn_section`.
+  pure function at_turn(self, s) result(state)
+    class(own_machine_t), intent(in) :: self
+    real(wp), intent(in) :: s
+    real(wp) :: state(2)
+    state = [s, 0.0_wp]
+    associate (half => self%turn/2)
+      if (half > 0 .and. abs(s) > half) state = [-sign(half, s), sign(abs(s) - half, s)*self%drive_frequency]
+    end associate
+  end function at_turn
 
   pure function scales(self, half_range)
     class(own_machine_t), intent(in) :: self
@@ -286,6 +302,7 @@ contains
     call self%advance(section, self%period, tally, reason, log)
     if (reason /= 0) return
     section%state%time = 0
+    call take_turns(self%turn, section%state, tally)
     if (self%motor%system%aperiodic) section%motor%phi = section%motor%phi + self%period
     if (present(log)) log%origin = log%origin + self%period
     call check_hold(self%motor%system, section%state, section%motor, log)

@@ -13,7 +13,8 @@ module lane_slots
   use multibody_machine, only: multibody_machine_t
   use motor_machine, only: motor_machine_t
   use own_machine, only: own_machine_t
-  use motion_state, only: mode_slip_minus, mode_slip_plus, options_t, tally_t
+  use motor_system, only: x_at
+  use motion_state, only: mode_slip_minus, mode_slip_plus, options_t, take_turns, tally_t
   use structure_lanes, only: add_structure_region, fly_structure_lanes, occupy_structure_lane, structure_flies, &
     structure_lane_state, take_structure_counts
   use structure_preparation, only: prepare_structure_lanes
@@ -166,6 +167,9 @@ contains
                            section%lasted)
     end select
     call take_counts(batch, lane, tally)
+    if (.not. allocated(bodies%tapes) .or. .not. moving%turn > 0) return
+    call take_turns(moving%turn, section%state, tally)
+    bodies%tapes%z(lane, x_at) = section%state%x
   end subroutine take_from_lane
 
   !> For a lane whose sections do not come at given times: where its motion stopped last [s after the section], and when its phase

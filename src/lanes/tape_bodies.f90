@@ -73,7 +73,8 @@ contains
     body%proves = slides .or. min(-body%lower, body%upper) < far
     body%turns_freely = system%period > 0 .and. .not. (body%proves .or. turns)
     body%passes = system%period > 0
-    if (body%passes) body%passes = repeats(system, body)
+    ! An angle is taken back by whole turns at every section.
+    if (body%passes) body%passes = .not. system%turn > 0 .and. repeats(system, body)
     call prepare_tape_lanes(body, flow)
   end subroutine prepare_own_lanes
 

@@ -80,6 +80,9 @@ contains
     type(law_choice_t), intent(in) :: choice
     type(friction_t) :: law
     logical :: by_load
+    law%kinetic = 1
+    law%break_away = 1
+    if (choice%name == 'friction:expression') return
     by_load = choice%name == 'friction:coulomb_load'
     law%kinetic = value_of(choice, merge('kinetic_coefficient', 'force              ', by_load))
     law%break_away = value_of(choice, merge('static_coefficient', 'static_force      ', by_load))

@@ -16,13 +16,13 @@ module part_rows
   character(len=law_length), parameter :: bodies(2) = [character(len=law_length) :: 'body:watched', 'body:mass']
   character(len=law_length), parameter :: springs(5) = [character(len=law_length) :: 'spring:linear', 'spring:polynomial', &
     'spring:pendulum', 'spring:electrostatic', 'spring:expression']
-  character(len=law_length), parameter :: frictions(11) = [character(len=law_length) :: 'friction:coulomb', &
+  character(len=law_length), parameter :: frictions(12) = [character(len=law_length) :: 'friction:coulomb', &
     'friction:elastic_coulomb', 'friction:coulomb_viscous', 'friction:coulomb_stribeck', 'friction:coulomb_hyperbolic', &
     'friction:coulomb_quadratic', 'friction:coulomb_load', 'friction:maxwell_slip', 'friction:dahl', 'friction:bouc_wen', &
-    'friction:lugre']
+    'friction:lugre', 'friction:expression']
   character(len=law_length), parameter :: contacts(3) = [character(len=law_length) :: 'contact:newton', 'contact:kelvin_voigt', &
     'contact:massless']
-  character(len=law_length), parameter :: joints(19) = [springs, frictions, contacts]
+  character(len=law_length), parameter :: joints(20) = [springs, frictions, contacts]
   !> Contacts with the laws of one body, which keep their parameters.
   type(law_row_t), parameter :: other_contacts(12) = [contact_laws(3:5), contact_laws(7:15)]
   type(parameter_row_t), parameter :: kept(64) = pack(contact_parameters, contact_parameters%law /= 'newton' .and. &
@@ -66,6 +66,7 @@ module part_rows
               'Wen, J. Eng. Mech. Div. 102 (1976)'), &
     law_row_t('part', frictions(11), 'bristles: z'' = u - |u| s0 z/g(u), force s0 z + s1 z'' + s2 u', &
               'Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)'), &
+    law_row_t('part', frictions(12), 'an expression `force` [N] of speed, t, phase, NAME.x; that at rest is the limit', ''), &
     law_row_t('part', contacts(1), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
               'Glocker, Set-Valued Force Laws (2001)'), &
     law_row_t('part', contacts(2), 'stops with spring K and damper D', ''), &
@@ -114,9 +115,9 @@ module part_rows
     (parameter_row_t('part', points(i), 'row', '1', any_value, 'its displacement for one of each coordinate', &
                      optional=.true., list=.true.), i=1, 2), &
     (parameter_row_t('part', joints(i), 'first_end', '1', not_negative, 'number of the first body between', &
-                     optional=.true.), i=1, 19), &
+                     optional=.true.), i=1, 20), &
     (parameter_row_t('part', joints(i), 'second_end', '1', not_negative, 'number of the second body between', &
-                     optional=.true.), i=1, 19), &
+                     optional=.true.), i=1, 20), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'first_end', '1', not_negative, &
                      'number of the first body between', optional=.true.), i=1, 12), &
     (parameter_row_t('part', 'contact:'//other_contacts(i)%name, 'second_end', '1', not_negative, &
@@ -147,7 +148,7 @@ module part_rows
                      'friction at break-away; that of sliding if absent, never below it', optional=.true., &
                      default=-1.0_wp), i=1, 6), &
     (parameter_row_t('part', frictions(i), 'velocity', 'm/s', any_value, &
-                     'velocity of the surface of the first body or the ground: a belt', optional=.true.), i=1, 11), &
+                     'velocity of the surface of the first body or the ground: a belt', optional=.true.), i=1, 12), &
     parameter_row_t('part', frictions(2), 'stiffness', 'N/m', positive, 'of the spring'), &
     parameter_row_t('part', frictions(3), 'damping', 'N s/m', not_negative, 'b'), &
     parameter_row_t('part', frictions(4), 'stribeck_velocity', 'm/s', positive, 'v_s'), &

@@ -58,6 +58,8 @@ module multibody
     type(source_t), allocatable :: sources(:)
     !> The time is counted from the start, else from the section.
     logical :: by_clock = .false.
+    !> Number of the parameter that is the direction of sliding: 1, -1, 0 at rest. None if it is 0.
+    integer :: slip = 0
   end type load_t
 
   !> Friction with memory. The deflection z [m] is the velocity of a coordinate of its own, of the mass s0, whose kinetic energy

@@ -127,11 +127,13 @@ contains
       block
         type(series_t) :: series
         integer :: branches(size(load%tape%switches)), fault
-        real(wp) :: variables(size(load%rates))
+        real(wp) :: variables(size(load%rates)), parameters(size(load%parameters))
+        parameters = load%parameters
+        if (load%slip > 0) parameters(load%slip) = state%phase(j)
         call load_variables(machine, load, state, turning, variables, a, jerk)
-        call load_branches(load, variables, sizes_of_variables(machine, load, state), branches)
+        call load_branches(load, parameters, variables, sizes_of_variables(machine, load, state), branches)
         call prepare_series(load%tape, 2, load%rates, [load%node], branches, series)
-        call expand(load%tape, variables, load%parameters, series, fault)
+        call expand(load%tape, variables, parameters, series, fault)
         factor = series%c(:, load%node)*[1, 1, 2]
         if (fault /= 0) factor = ieee_value(factor, ieee_quiet_nan)
       end block
@@ -201,15 +203,15 @@ contains
 
   !> Branches of the switching functions of a normal force: where one is zero to rounding, its derivatives decide. `of_variables`
   !> are the sizes of the variables.
-  pure subroutine load_branches(load, variables, of_variables, branches)
+  pure subroutine load_branches(load, parameters, variables, of_variables, branches)
     type(load_t), intent(in) :: load
-    real(wp), intent(in) :: variables(:), of_variables(:)
+    real(wp), intent(in) :: parameters(:), variables(:), of_variables(:)
     integer, intent(out) :: branches(:)
     type(series_t) :: series
     real(wp), dimension(load%tape%count) :: value, sizes
     real(wp) :: size_of
     integer :: faults(load%tape%count), nodes(size(branches)), i, k, fault
-    call evaluate(load%tape, variables, load%parameters, value, faults)
+    call evaluate(load%tape, variables, parameters, value, faults)
     ! Copied: GNU Fortran 12 takes an associated component of an array for contiguous where that is a subscript.
     nodes = load%tape%switches%argument
     branches = merge(1, -1, value(nodes) >= 0)
@@ -221,7 +223,7 @@ contains
       ! Events are found to 64 units of rounding of the sizes at the start of a flight.
       if (abs(value(nodes(i))) > 256*epsilon(1.0_wp)*size_of) cycle
       call prepare_series(load%tape, 3, load%rates, nodes, branches, series)
-      call expand(load%tape, variables, load%parameters, series, fault)
+      call expand(load%tape, variables, parameters, series, fault)
       if (fault /= 0) return
       k = findloc(abs(series%c(1:, nodes(i))) > 0, .true., 1)
       if (k > 0) branches(i) = merge(1, -1, series%c(k, nodes(i)) > 0)

@@ -107,7 +107,7 @@ contains
       call add_elements(machine, choices(i), row_of(rows, choices(i)), error)
     else
       call add_friction(machine, choices(i), row_of(rows, choices(i)), error)
-      if (choices(i)%name /= 'friction:coulomb_load' .or. allocated(error)) return
+      if (all(choices(i)%name /= ['friction:coulomb_load', 'friction:expression  ']) .or. allocated(error)) return
       call set_expression(choices, i, rows, machine, machine%joints(size(machine%joints)), error)
     end if
   end subroutine add_any_friction

@@ -2,7 +2,7 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The normal force of friction between parts, or a force on them, from its expression. It may name the time and the phase of a
-!> drive; x and v of the force; NAME.x and NAME.v of bodies and points; spring.NAME, the force by which a spring presses its ends
+!> drive; x and v of the force; the sliding speed of friction; NAME.x and NAME.v of bodies and points; spring.NAME, the force by which a spring presses its ends
 !> apart; contact.NAME, that of a soft contact; the parameters of its own table by their names, and those of every table by their
 !> paths.
 module build_load
@@ -12,10 +12,11 @@ module build_load
   use expression_text, only: read_expression
   use kinds, only: wp
   use law_row, only: none_above
+  use load_checks, only: check_values, repeats
   use law_table, only: is_hidden, label_length, law_choice_t, parameter_row_t, part_family, part_kind, part_law, &
     path_of, rows_of, text_of, value_of
   use multibody, only: joint_t, load_t, multibody_t, source_t
-  use operations, only: op_add, op_multiply, op_negative
+  use operations, only: op_add, op_multiply, op_negative, op_subtract
   use own_units, only: parameter_unit, quantities_of, quantity_t, unit_problem
   use part_angles, only: is_of_angle
   use reference_points, only: is_reference_point, row_of
@@ -24,17 +25,12 @@ module build_load
   use tape_algebra, only: binary, unary
   use tape_derivative, only: differentiate
   use tape_sign, only: positive_part
-  use tape_value, only: evaluate
-  use text, only: to_text
   implicit none
   private
 
   public :: set_expression
 
   integer, parameter :: name_length = 64
-  !> Points of a period at which a normal force is compared with that a period later, and the share that rounding may change.
-  integer, parameter :: points = 24
-  real(wp), parameter :: same = 1e-9_wp
 
   !> Names of an expression and their nodes, with the units of variables and parameters.
   type :: names_t
@@ -61,7 +57,7 @@ contains
     is_base = choices(i)%name == 'drive:base'
     of_time = is_base .or. choices(i)%name == 'drive:motion'
     text = 'force'
-    if (is_load) text = 'load'
+    if (choices(i)%name == 'friction:coulomb_load') text = 'load'
     if (of_time) text = 'position'
     key = path_of(choices(i))//'.'//text
     text = text_of(choices(i), text)
@@ -76,6 +72,7 @@ contains
       if (.not. (is_load .or. of_time)) call add_own_coordinate(joint%row, is_of_angle(choices, i), load, names)
       if (.not. of_time) call add_coordinates(choices, text, rows, load, names)
       call add_parameters(choices, i, load, names)
+      if (is_load) call add_speed(choices(i), text, is_of_angle(choices, i), joint%row, load, names)
       if (.not. of_time) call add_springs(choices, text, rows, load, names)
       if (.not. of_time) call add_contacts(choices, text, rows, load, names, error)
       if (allocated(error)) then
@@ -204,6 +201,35 @@ contains
     call add_name(names, 'x', nodes(1))
     call add_name(names, 'v', nodes(2))
   end subroutine add_own_coordinate
+
+  !> The sliding speed, from zero on whichever way the surfaces slide, if the text names it.
+  pure subroutine add_speed(choice, text, is_angle, row, load, names)
+    type(law_choice_t), intent(in) :: choice
+    character(len=*), intent(in) :: text
+    logical, intent(in) :: is_angle
+    real(wp), intent(in) :: row(:)
+    type(load_t), intent(inout) :: load
+    type(names_t), intent(inout) :: names
+    type(source_t) :: source
+    real(wp) :: belt
+    integer :: nodes(2), slip, surface, sliding, speed
+    if (.not. has_name(text, 'speed')) then
+      call add_name(names, 'speed', 1)
+      return
+    end if
+    source%row = row
+    call add_source(source, units_of_motion(is_angle), load, names, nodes)
+    belt = value_of(choice, 'velocity')
+    ! The direction of a start at rest; that of a motion is set where it slides.
+    load%parameters = [load%parameters, merge(-1.0_wp, 1.0_wp, belt > 0), belt]
+    load%slip = size(load%parameters) - 1
+    names%of_parameters = [names%of_parameters, quantity_t(is_known=.true.), parameter_unit(unit_of('m/s', is_angle))]
+    call parameter_node(load%tape, load%slip, slip)
+    call parameter_node(load%tape, load%slip + 1, surface)
+    call binary(load%tape, op_subtract, nodes(2), surface, sliding)
+    call binary(load%tape, op_multiply, slip, sliding, speed)
+    call add_name(names, 'speed', speed)
+  end subroutine add_speed
 
   !> Units of a position and its velocity.
   pure function units_of_motion(is_angle) result(units)
@@ -343,55 +369,5 @@ contains
     made = node
     call unary(load%tape, op_negative, made, node)
   end subroutine accelerate
-
-  !> A constant load is not negative.
-  pure subroutine check_values(is_load, load, node, error)
-    logical, intent(in) :: is_load
-    type(load_t), intent(in) :: load
-    integer, intent(in) :: node
-    type(error_t), allocatable, intent(inout) :: error
-    real(wp) :: now(load%tape%count), z(size(load%rates))
-    integer :: fault(load%tape%count)
-    if (load%tape%is_full) then
-      call fail(error, exit_bad_case, 'found too many operations')
-      return
-    end if
-    z = 0
-    call evaluate(load%tape, z, load%parameters, now, fault)
-    if (is_load .and. load%tape%nodes(node)%is_steady .and. (fault(node) > 0 .or. now(node) < 0)) then
-      call fail(error, exit_bad_case, 'found '//to_text(real(now(node), kind(1d0)))//' N, allowed at least 0')
-    end if
-  end subroutine check_values
-
-  !> Whether an expression that names the time repeats with the period of the drive, and with it all that it switches at: a step
-  !> after many periods shows in its switching function from the first.
-  pure logical function repeats(machine, load, node)
-    type(multibody_t), intent(in) :: machine
-    type(load_t), intent(in) :: load
-    integer, intent(in) :: node
-    real(wp), dimension(load%tape%count) :: now, later, largest, change
-    real(wp) :: z(size(load%rates)), period
-    integer, dimension(load%tape%count) :: fault, fault_later
-    integer :: i
-    repeats = .false.
-    if (.not. machine%frequency > 0) return
-    period = 8*atan(1.0_wp)/machine%frequency
-    largest = 0
-    change = 0
-    do i = 0, points - 1
-      z(3:) = modulo(i*0.618_wp, 1.0_wp) - 0.5_wp
-      z(:2) = [period, 8*atan(1.0_wp)]*(i + 0.318_wp)/points
-      call evaluate(load%tape, z, load%parameters, now, fault)
-      z(1) = z(1) + period
-      call evaluate(load%tape, z, load%parameters, later, fault_later)
-      where (max(fault, fault_later) == 0)
-        largest = max(largest, abs(now), abs(later))
-        change = max(change, abs(now - later))
-      end where
-    end do
-    associate (nodes => [node, load%tape%switches%argument])
-      repeats = all(change(nodes) <= same*largest(nodes))
-    end associate
-  end function repeats
 
 end module build_load

@@ -15,6 +15,7 @@ module motor_motion
     state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, word_stick, word_upper
   use motor_choices, only: has_motor
   use motor_equations, only: build_motor_equations
+  use half_turn, only: pass_half_turn
   use motor_limits, only: change_limits, start_limits
   use motor_log, only: add_sample, motor_energy, record_motor_event
   use motor_modes, only: begin_mode, end_mode, keep_angle
@@ -138,8 +139,13 @@ contains
       if (any(flight%crossed([guard_upper, guard_lower])) .and. &
           abs(restitution_of(moving%system, state, crank) - 0.5_wp) > 0.5_wp) reason = reason_step_failed
       if (reason /= 0) return
-      call do_events(moving, flight%crossed, state, crank, passed, tally, log)
-      if (moving%system%clock) passed = flight%crossed(guard_turning) .and. turns_at_section(moving%system, mode, state%mode)
+      if (moving%system%clock) then
+        call pass_half_turn(moving%system, flight, state, tally, passed)
+        call do_events(moving, flight%crossed, state, crank, at_section, tally, log)
+        passed = passed .or. (flight%crossed(guard_turning) .and. turns_at_section(moving%system, mode, state%mode))
+      else
+        call do_events(moving, flight%crossed, state, crank, passed, tally, log)
+      end if
       idle = merge(0, idle + 1, state%time > before)
       if (idle >= most_idle_events) reason = reason_mode_cycle
       if (.not. abs(state%x) <= moving%options%domain) reason = reason_left_domain

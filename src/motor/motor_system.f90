@@ -13,6 +13,8 @@ module motor_system
   implicit none
   private
 
+  public :: passes_half_turn
+
   !> Variables.
   integer, parameter, public :: phi_at = 1, w_at = 2, x_at = 3, v_at = 4, y_at = 5
 
@@ -63,9 +65,20 @@ module motor_system
     !> Without a motor: time from section to section [s], none if it is 0; whether forces depend on the time without any period.
     real(wp) :: period = 0
     logical :: aperiodic = .false.
+    !> Without a motor: the angle [rad] after which the equations are the same again, 0 of a position. Without a drive the motion
+    !> then passes from half a turn to the other side of it, which is a section.
+    real(wp) :: turn = 0
     !> Without a motor, nodes: restitution, friction at rest [N], slope of the forces over the position [N/m]; and each force [N].
     integer :: restitution = 0, rest_friction = 0, force_slope = 0
     integer, allocatable :: forces(:)
   end type motor_system_t
+
+contains
+
+  !> Whether an angle without a drive stays within half a turn, which it passes by an event.
+  pure logical function passes_half_turn(system)
+    type(motor_system_t), intent(in) :: system
+    passes_half_turn = system%turn > 0 .and. .not. system%period > 0 .and. .not. system%aperiodic
+  end function passes_half_turn
 
 end module motor_system

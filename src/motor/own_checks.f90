@@ -4,20 +4,21 @@
 !> What must hold of equations by expressions before they move, and the size of their forces.
 module own_checks
   use constants, only: two_pi
-  use equation_sheet, only: node_of, parameter_number
+  use equation_sheet, only: add_parameter, node_of, parameter_number
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: force_family, law_choice_t, own_law, path_of, state_family
   use law_texts, only: is_own
-  use motor_system, only: motor_system_t, phi_at, w_at, x_at
+  use motor_system, only: far, motor_system_t, phi_at, v_at, w_at, x_at
   use own_names, only: depends_on
   use status, only: exit_bad_case
+  use tape_turns, only: growth_over_a_turn
   use tape_value, only: evaluate
   use text, only: to_text
   implicit none
   private
 
-  public :: check_period, check_values, set_scales
+  public :: check_period, check_values, set_scales, set_turn
 
   !> Points of a period at which forces are looked at; share of its size by which a periodic one may differ by rounding.
   integer, parameter :: points = 24
@@ -41,6 +42,25 @@ contains
     system%body_level = share*largest
     system%sheet%parameters(parameter_number(system%sheet, 'least')) = share*largest
   end subroutine set_scales
+
+  !> An angle is on a circle if nothing changes with a whole turn and no stop is in the way.
+  pure subroutine set_turn(system)
+    type(motor_system_t), intent(inout) :: system
+    real(wp) :: z(system%variables), value(system%sheet%tape%count)
+    integer :: fault(system%sheet%tape%count), i
+    if (system%contact%upper < far .or. system%contact%lower > -far) return
+    z = 0
+    associate (sheet => system%sheet)
+      call evaluate(sheet%tape, z, sheet%parameters, value, fault)
+      associate (growth => growth_over_a_turn(sheet%tape, x_at, value), &
+                 nodes => [node_of(sheet, [character(len=6) :: 'v_rate', 'hold', 'static', 'foot']), &
+                           (node_of(sheet, 'rate '//to_text(i)), i=1, system%variables - v_at)])
+        if (any(abs(growth(nodes)) > 0)) return
+      end associate
+      system%turn = two_pi
+      call add_parameter(sheet, 'half_turn', system%turn/2)
+    end associate
+  end subroutine set_turn
 
   !> Friction and restitution that depend on parameters alone.
   pure subroutine check_values(choices, at, system, error)

@@ -18,7 +18,7 @@ module own_equations
   use motor_choices, only: number_of_family
   use motor_state, only: most_own
   use motor_system, only: far, motor_system_t, v_at
-  use own_checks, only: check_period, check_values, set_scales
+  use own_checks, only: check_period, check_values, set_scales, set_turn
   use own_flights, only: add_own_flights
   use own_friction, only: add_friction, add_restitution
   use own_names, only: add_known, add_parameters, depends_on, names_t, new_names, read_own, set_unit
@@ -66,6 +66,7 @@ contains
     call check_values(choices, at, system, error)
     if (.not. allocated(error)) call check_period(choices, system, error)
     if (allocated(error)) return
+    if (names%is_angle) call set_turn(system)
     call add_own_flights(system)
     call check_sheet(system, error)
   end subroutine build_own_equations

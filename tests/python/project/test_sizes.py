@@ -15,7 +15,7 @@ WHOLE_FILES = {
     "lane_contact.hpp": 411,
     "lane_kernel.hpp": 488,
     "lane_series.hpp": 493,
-    "motor_motion.f90": 403,
+    "motor_motion.f90": 409,
     "noise.py": 427,
     "series_flight.f90": 470,
     "single_trajectory.f90": 403,
