@@ -8,7 +8,7 @@ module branch
   use body_family, only: family_t
   use branch_passage, only: first_passed, most_secants, no_passage, note_bifurcations
   use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_long, label_not_known, label_pd, label_range, &
-    label_release, label_run, no_label, plan_t, point_t, set_point, step_to, trace_t
+    label_release, label_run, move_trace, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up
   use branch_vanishing, only: end_at_rest, has_vanished
   use errors, only: error_t
@@ -192,7 +192,7 @@ contains
     points = [points, next%now]
     if (allocated(next%bend)) deallocate (next%bend)
     if (.not. turned) next%bend = (next%now%tangent - trace%now%tangent)/length
-    trace = next
+    call move_trace(next, trace)
   end subroutine go_on
 
   !> Beyond a step than which none is shorter the motion `next` has other events.

@@ -169,12 +169,25 @@ contains
     type(trace_t) :: end_point
     real(wp) :: span
     integer :: steps
-    logical :: ok, turns, passes
+    logical :: ok
     ok = at_margin
     span = length
     if (ok) span = length*(1 - 1e-6_wp)
     if (ok) call step_to(family, trace, span, end_point, ok, steps)
-    if (.not. ok) end_point = next
+    if (ok) then
+      call note_between(family, trace, end_point, span, points)
+    else
+      call note_between(family, trace, next, span, points)
+    end if
+  end subroutine note_bifurcations
+
+  !> The same on the whole of a step, of the length `span`, to `end_point`.
+  subroutine note_between(family, trace, end_point, span, points)
+    type(family_t), intent(in) :: family
+    type(trace_t), intent(in) :: trace, end_point
+    real(wp), intent(in) :: span
+    type(point_t), allocatable, intent(inout) :: points(:)
+    logical :: ok, turns, passes
     turns = changes(test_turn)
     passes = changes(test_plus)
     if (turns) then
@@ -213,7 +226,7 @@ contains
       points = [points, there%now]
     end subroutine add
 
-  end subroutine note_bifurcations
+  end subroutine note_between
 
   !> Whether a multiplier is where the label requires it; near a graze its rounding is large.
   pure logical function is_genuine(label, orbit) result(genuine)

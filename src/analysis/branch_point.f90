@@ -17,7 +17,7 @@ module branch_point
   implicit none
   private
 
-  public :: is_stable, set_sizes, set_point, step_to
+  public :: is_stable, move_trace, set_sizes, set_point, step_to
 
   !> Labels of points. GR: an orbit goes on beyond the graze with an impact more or less; GR-fold: both sides of it are on the
   !> same side of the parameter. BP: multiplier +1 where the parameter does not turn;
@@ -121,7 +121,12 @@ contains
     type(error_t), allocatable :: error
     real(wp) :: way(size(trace%now%tangent))
     steps = 0
-    next = trace
+    ! The machines are built anew.
+    next%now = trace%now
+    next%margins = trace%margins
+    next%step = trace%step
+    next%came = trace%came
+    if (allocated(trace%bend)) next%bend = trace%bend
     way = length*trace%now%tangent
     if (allocated(trace%bend)) way = way + length**2/2*trace%bend
     call move_along(next%now%orbit, way*scales_of_orbit(trace%machines, trace%now%orbit, family%parameter_size))
@@ -130,5 +135,20 @@ contains
     if (ok) call correct_orbit(family, next%machines, next%now%orbit, trace%now%tangent, ok, steps, roughly)
     if (ok) call set_point(family, next, trace%now%tangent, ok)
   end subroutine step_to
+
+  !> Moves a trace, with its machines, into another one.
+  pure subroutine move_trace(from, to)
+    type(trace_t), intent(inout) :: from
+    type(trace_t), intent(inout) :: to
+    to%now = from%now
+    to%margins = from%margins
+    to%step = from%step
+    to%came = from%came
+    to%machines%step = from%machines%step
+    to%machines%side = from%machines%side
+    call move_alloc(from%machines%centre, to%machines%centre)
+    call move_alloc(from%machines%near, to%machines%near)
+    call move_alloc(from%bend, to%bend)
+  end subroutine move_trace
 
 end module branch_point

@@ -259,7 +259,16 @@ contains
   !> elements of another length.
   pure integer function number_in(names, name) result(number)
     character(len=*), intent(in) :: names(:), name
-    number = findloc(names == name, .true., 1)
+    logical :: has_first
+    has_first = len(names) > 0 .and. len(name) > 0
+    do number = 1, size(names)
+      ! Most names differ at once.
+      if (has_first) then
+        if (names(number)(1:1) /= name(1:1)) cycle
+      end if
+      if (names(number) == name) return
+    end do
+    number = 0
   end function number_in
 
 end module text

@@ -9,7 +9,7 @@ module tape_bounds
   use kinds, only: wp
   use operations, only: op_constant, op_parameter, op_select, op_variable, operation_table
   use tape, only: node_t, tape_t
-  use tape_series, only: raise_orders, series_t
+  use tape_series, only: make_room, raise_orders, series_t
   implicit none
   private
 
@@ -121,6 +121,7 @@ contains
     end do
     fault = maxval(faults, mask=series%is_used)
     if (fault > 0) return
+    call make_room(tape%count, series)
     series%c(0, :) = magnitude(bound)
     call raise_orders(1.0_wp, least_magnitude(bound), series, fault)
   end subroutine bound_coefficients

@@ -14,14 +14,14 @@ module tape_series
   implicit none
   private
 
-  public :: prepare_series, expand, expand_values, raise_orders
+  public :: prepare_series, make_room, expand, expand_values, raise_orders
 
   !> What a series is made of: the nodes in use with the given branches, and where it is stored.
   type, public :: series_t
     integer :: order = 0
     !> The time is counted in this unit, so that coefficients of high orders do not overflow.
     real(wp) :: unit = 1
-    !> Coefficients of powers of the time: (0:order, node).
+    !> Coefficients of powers of the time: (0:order, node); there is no room for them before the first expansion.
     real(wp), allocatable :: c(:, :)
     !> Nodes in use; how those of them that vary get their coefficients.
     logical, allocatable :: is_used(:)
@@ -39,7 +39,7 @@ module tape_series
 
 contains
 
-  !> Makes room for the series of a system up to `order`: `rates` are the nodes of the rates of its variables, `wanted` other
+  !> Prepares the series of a system up to `order`: `rates` are the nodes of the rates of its variables, `wanted` other
   !> nodes whose series will be needed, `branches` the sign of every switching function. `only_used`: values of other nodes will
   !> not be needed either.
   pure subroutine prepare_series(tape, order, rates, wanted, branches, series, only_used)
@@ -68,12 +68,20 @@ contains
     if (allocated(series%parameters)) deallocate (series%parameters)
     series%value = [(0.0_wp, i=1, tape%count)]
     series%faults = [(0, i=1, tape%count)]
-    if (allocated(series%c)) then
-      if (ubound(series%c, 1) /= order .or. size(series%c, 2) /= tape%count) deallocate (series%c)
+    if (.not. allocated(series%c)) return
+    if (ubound(series%c, 1) /= order .or. size(series%c, 2) /= tape%count) then
+      deallocate (series%c)
+    else
+      series%c = 0
     end if
-    if (.not. allocated(series%c)) allocate (series%c(0:order, tape%count))
-    series%c = 0
   end subroutine prepare_series
+
+  !> Room for the coefficients, only where they are needed: prepared series are often copied.
+  pure subroutine make_room(nodes, series)
+    integer, intent(in) :: nodes
+    type(series_t), intent(inout) :: series
+    if (.not. allocated(series%c)) allocate (series%c(0:series%order, nodes), source=0.0_wp)
+  end subroutine make_room
 
   !> Coefficients at a point. `fault` is 0, or the node whose operation, or series, is not defined there; negative where a
   !> coefficient is too large, as the unit of time is.
@@ -94,6 +102,7 @@ contains
     integer, intent(out) :: fault
     logical :: is_known
     integer :: i
+    call make_room(tape%count, series)
     is_known = .false.
     if (allocated(series%parameters)) is_known = all(abs(series%parameters - parameters) <= 0)
     if (.not. is_known) then

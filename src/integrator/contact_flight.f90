@@ -249,8 +249,9 @@ contains
     end if
     if (.not. present(log)) return
     log%peak_penetration = max(log%peak_penetration, march%y(1))
-    if (pressed%pushing) call raise_peak_force(march%path(:, 1), march%path(:, 2), march%fraction, pressed%machine%contact, &
-                                               log%peak_force)
+    ! Searches of orbits, which keep no balance, need no forces; to find a peak takes longer than the step.
+    if (pressed%pushing .and. log%balance%kept) call raise_peak_force(march%path(:, 1), march%path(:, 2), march%fraction, &
+                                                                      pressed%machine%contact, log%peak_force)
     done = 0
     sample%mode = merge(mode_slip_plus, mode_slip_minus, pressed%direction > 0)
     sample%touch_speed = touch_speed

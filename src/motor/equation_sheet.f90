@@ -13,7 +13,8 @@ module equation_sheet
   implicit none
   private
 
-  public :: new_sheet, add_variable, add_parameter, add_optional, add_node, define, define_slope, node_of, parameter_number
+  public :: new_sheet, add_variable, add_parameter, add_optional, add_node, read_node, define, define_slope, node_of, &
+    parameter_number
 
   integer, parameter, public :: name_length = 24
 
@@ -74,18 +75,24 @@ contains
   pure subroutine define(sheet, name, text)
     type(sheet_t), intent(inout) :: sheet
     character(len=*), intent(in) :: name, text
-    type(error_t), allocatable :: error
     integer :: node
-    call read_expression(text, sheet%names, sheet%nodes, sheet%tape, node, error)
-    if (allocated(error)) then
-      node = 1
-      if (.not. allocated(sheet%error)) then
-        error%message = trim(name)//' = '//text//': '//error%message
-        call move_alloc(error, sheet%error)
-      end if
-    end if
+    call read_node(sheet, name, text, node)
     call add_name(sheet, name, node, 0)
   end subroutine define
+
+  !> Node of the expression `text`, which has a name in errors alone.
+  pure subroutine read_node(sheet, name, text, node)
+    type(sheet_t), intent(inout) :: sheet
+    character(len=*), intent(in) :: name, text
+    integer, intent(out) :: node
+    type(error_t), allocatable :: error
+    call read_expression(text, sheet%names, sheet%nodes, sheet%tape, node, error)
+    if (.not. allocated(error)) return
+    node = 1
+    if (allocated(sheet%error)) return
+    error%message = trim(name)//' = '//text//': '//error%message
+    call move_alloc(error, sheet%error)
+  end subroutine read_node
 
   !> Gives the derivative of `of` by the variable `by` a name.
   pure subroutine define_slope(sheet, name, of, by)
@@ -126,7 +133,7 @@ contains
     integer, intent(in) :: node, number
     character(len=name_length) :: padded
     padded = name
-    if (any(sheet%names == padded) .and. .not. allocated(sheet%error)) then
+    if (number_in(sheet%names, padded) > 0 .and. .not. allocated(sheet%error)) then
       call fail(sheet%error, exit_internal, trim(name)//': defined twice')
     end if
     sheet%names = [sheet%names, padded]

@@ -13,7 +13,7 @@ module motor_equations
   use constants, only: two_pi
   use contact_law, only: contact_constant, contact_of
   use crank_mechanism, only: add_mechanism
-  use equation_sheet, only: add_optional, add_parameter, add_variable, define, new_sheet, node_of, parameter_number
+  use equation_sheet, only: add_optional, add_parameter, add_variable, define, new_sheet, node_of, parameter_number, read_node
   use errors, only: error_t, fail
   use friction_law, only: friction_of
   use kinds, only: wp
@@ -26,8 +26,9 @@ module motor_equations
   use restoring_law, only: restoring_of, restoring_t
   use series_flight, only: guard_t, set_branches, start_flight
   use status, only: exit_bad_case, exit_internal
+  use tape_parts, only: needed
   use tape_series, only: prepare_series
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate, evaluate_some
   use text, only: to_text
   implicit none
   private
@@ -287,15 +288,15 @@ contains
     type(guard_t), intent(out) :: guards(guard_count)
     character(len=:), allocatable :: text(:)
     character(len=:), allocatable :: name
-    integer :: i
+    integer :: i, node
     text = [character(len=40) :: 'x - upper', 'x - lower', 'v', 'w', 'phi - 2*pi', 'phi', &
             'body_hold'//trim(suffix(mode))//' - static', 'body_hold'//trim(suffix(mode))//' + static', &
             'crank_hold'//trim(suffix(mode))//' - bearing_static', 'crank_hold'//trim(suffix(mode))//' + bearing_static', &
             'v_rate'//trim(merge(suffix(crank_held), suffix(both_move), mode == crank_held))]
     do i = 1, guard_fastest
       name = 'guard'//to_text(i)//trim(suffix(mode))
-      call define(system%sheet, name, trim(text(i)))
-      guards(i) = guard_t(node_of(system%sheet, name), 0)
+      call read_node(system%sheet, name, trim(text(i)), node)
+      guards(i) = guard_t(node, 0)
     end do
     guards(guard_ramp_end:) = [(guard_t(node_of(system%sheet, control_guards(i)), 0), i=1, size(control_guards))]
   end subroutine add_guards
@@ -315,10 +316,14 @@ contains
     type(motor_system_t), intent(in) :: system
     integer, parameter :: angles = 32
     real(wp) :: value(system%sheet%tape%count), foot(angles)
-    integer :: fault(system%sheet%tape%count), i
+    integer :: fault(system%sheet%tape%count), node, i
+    integer, allocatable :: used(:)
+    node = node_of(system%sheet, 'foot')
+    used = pack([(i, i=1, system%sheet%tape%count)], needed(system%sheet%tape, [node]))
     do i = 1, angles
-      call evaluate(system%sheet%tape, at_angle(system, i*two_pi/angles), system%sheet%parameters, value, fault)
-      foot(i) = value(node_of(system%sheet, 'foot'))
+      call evaluate_some(system%sheet%tape, used, at_angle(system, i*two_pi/angles), system%sheet%parameters, value, fault, &
+                         [integer ::])
+      foot(i) = value(node)
     end do
     size_of = (maxval(foot) - minval(foot))/2
   end function foot_half_range

@@ -35,27 +35,32 @@ contains
     real(wp), intent(in) :: value
     class(hybrid_t), allocatable, intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
-    type(one_body_t) :: body
-    type(structure_t) :: structure
-    type(motor_body_t) :: driven
-    type(own_body_t) :: own
     if (allocated(machine)) deallocate (machine)
     select case (kind_of(family%laws))
     case (kind_motor)
-      call motor_body_of_family(family, value, driven, error)
-      if (.not. allocated(error)) allocate (machine, source=driven)
+      allocate (motor_body_t :: machine)
     case (kind_bodies)
-      call structure_of_family(family, value, structure, error)
-      if (.not. allocated(error)) allocate (machine, source=structure)
+      allocate (structure_t :: machine)
     case (kind_own)
-      call own_body_of_family(family, value, own, error)
-      if (.not. allocated(error)) allocate (machine, source=own)
+      allocate (own_body_t :: machine)
     case (kind_body)
-      call body_of_family(family, value, body, error)
-      if (.not. allocated(error)) allocate (machine, source=body)
+      allocate (one_body_t :: machine)
     case default
       call fail(error, exit_bad_case, 'the variations of this kind of machine are not known')
+      return
     end select
+    ! Not built and then copied: machines with equations on tapes are large.
+    select type (machine)
+    type is (motor_body_t)
+      call motor_body_of_family(family, value, machine, error)
+    type is (structure_t)
+      call structure_of_family(family, value, machine, error)
+    type is (own_body_t)
+      call own_body_of_family(family, value, machine, error)
+    type is (one_body_t)
+      call body_of_family(family, value, machine, error)
+    end select
+    if (allocated(error)) deallocate (machine)
   end subroutine machine_of_family
 
   !> The machine and its neighbours in the parameter.
@@ -81,9 +86,10 @@ contains
     real(wp), intent(in) :: value
     type(neighbourhood_t), intent(inout) :: machines
     type(error_t), allocatable, intent(out) :: error
-    type(neighbour_t) :: near(4)
+    type(neighbour_t), allocatable :: near(:)
     real(wp) :: there
     integer :: i
+    allocate (near(4))
     do i = 1, size(near)
       there = value + stencil_offset(machines%side, i)*machines%step
       if (there < family%lowest .or. there > family%highest) call fail(error, exit_bad_case, 'parameter out of its range')
@@ -91,7 +97,7 @@ contains
       if (allocated(error)) return
       call near(i)%machine%take_sizes(machines%centre)
     end do
-    machines%near = near
+    call move_alloc(near, machines%near)
   end subroutine build_neighbours
 
 end module machine_family

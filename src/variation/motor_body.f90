@@ -22,7 +22,7 @@ module motor_body
   implicit none
   private
 
-  public :: motor_body_of, why_not_varied
+  public :: set_motor_body, why_not_varied
 
   integer, parameter, public :: x_of = 1, angle_of = 2, v_of = 3, speed_of = 4, own_of = 5
 
@@ -68,14 +68,12 @@ contains
     end associate
   end function why_not_varied
 
-  !> The hybrid machine. `sizes`: of a position [m] and of a speed [m/s].
-  pure function motor_body_of(machine, sizes) result(body)
-    type(motor_machine_t), intent(in) :: machine
+  !> Makes the hybrid machine of a body whose `machine` is prepared. `sizes`: of a position [m] and of a speed [m/s].
+  pure subroutine set_motor_body(sizes, body)
     real(wp), intent(in) :: sizes(2)
-    type(motor_body_t) :: body
+    type(motor_body_t), intent(inout) :: body
     integer, parameter :: order(5) = [3, 1, 4, 2, 5]
-    body%machine = machine
-    associate (system => machine%motor%system)
+    associate (machine => body%machine, system => body%machine%motor%system)
       body%n = system%variables
       body%positions = 2
       body%has_clock = .false.
@@ -97,7 +95,7 @@ contains
       allocate (body%hold_slopes(body%n))
       call add_slope_nodes(body%flows(2), system%body_hold(body_held), 1, body%hold_slopes)
     end associate
-  end function motor_body_of
+  end subroutine set_motor_body
 
   !> The crank of a state; the flights know the piece of its motor.
   pure type(motor_state_t) function crank_in(self, y) result(crank)

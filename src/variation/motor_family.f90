@@ -7,7 +7,7 @@ module motor_family
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
-  use motor_body, only: motor_body_of, motor_body_t, why_not_varied
+  use motor_body, only: motor_body_t, set_motor_body, why_not_varied
   use motor_machine, only: motor_machine_t, prepare_motor_machine
   use status, only: exit_bad_case
   implicit none
@@ -24,22 +24,21 @@ contains
     type(motor_body_t), intent(out) :: body
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
-    type(motor_machine_t) :: machine
     character(len=:), allocatable :: why
     real(wp) :: sizes(2)
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
-    call prepare_motor_machine(laws, family%options, machine, error)
+    call prepare_motor_machine(laws, family%options, body%machine, error)
     if (allocated(error)) return
-    why = why_not_varied(machine)
+    why = why_not_varied(body%machine)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, why)
       return
     end if
-    sizes = reach_of(machine)*[1.0_wp, machine%drive_frequency]
+    sizes = reach_of(body%machine)*[1.0_wp, body%machine%drive_frequency]
     if (family%sizes(1) > 0) sizes = family%sizes
-    body = motor_body_of(machine, sizes)
+    call set_motor_body(sizes, body)
   end subroutine motor_body_of_family
 
   !> Size of the positions [m]: at resonance that of the foot times the quality of the oscillator, up to ten, and as far as a stop

@@ -17,7 +17,7 @@ module own_body
   implicit none
   private
 
-  public :: own_body_of, why_not_varied
+  public :: set_own_body, why_not_varied
 
   integer, parameter, public :: x_of = 1, v_of = 2
   !> A speed at an event that is none, in sizes.
@@ -56,16 +56,15 @@ contains
     end if
   end function why_not_varied
 
-  !> The hybrid machine. `sizes`: of a position [m] and of a speed [m/s]; `smooth_turns`: no force depends on the direction.
-  pure function own_body_of(machine, sizes, smooth_turns) result(body)
-    type(own_machine_t), intent(in) :: machine
+  !> Makes the hybrid machine of a body whose `machine` is prepared. `sizes`: of a position [m] and of a speed [m/s];
+  !> `smooth_turns`: no force depends on the direction.
+  pure subroutine set_own_body(sizes, smooth_turns, body)
     real(wp), intent(in) :: sizes(2)
     logical, intent(in) :: smooth_turns
-    type(own_body_t) :: body
-    real(wp) :: scales(machine%coordinates())
+    type(own_body_t), intent(inout) :: body
+    real(wp) :: scales(body%machine%coordinates())
     integer :: k
-    body%machine = machine
-    associate (system => machine%motor%system)
+    associate (machine => body%machine, system => body%machine%motor%system)
       body%n = system%variables - x_at + 1
       body%positions = 1
       body%period = machine%period
@@ -93,7 +92,7 @@ contains
       end associate
       if (system%restitution > 0) call add_slope_nodes(body%flows(1), system%restitution, phi_at, body%restitution_slopes)
     end associate
-  end function own_body_of
+  end subroutine set_own_body
 
   !> The variables of the equations at a time since the first section.
   pure function variables_at(self, t, y) result(z)

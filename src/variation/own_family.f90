@@ -7,7 +7,7 @@ module own_family
   use errors, only: error_t, fail
   use kinds, only: wp
   use law_table, only: change_parameter, law_choice_t
-  use own_body, only: own_body_of, own_body_t, why_not_varied
+  use own_body, only: own_body_t, set_own_body, why_not_varied
   use own_machine, only: own_machine_t, prepare_own_machine
   use status, only: exit_bad_case
   implicit none
@@ -24,22 +24,21 @@ contains
     type(own_body_t), intent(out) :: body
     type(error_t), allocatable, intent(out) :: error
     type(law_choice_t), allocatable :: laws(:)
-    type(own_machine_t) :: machine
     character(len=:), allocatable :: why
     real(wp) :: sizes(2)
     logical :: known
     laws = family%laws
     if (allocated(family%path)) call change_parameter(laws, family%path, value, known)
-    call prepare_own_machine(laws, family%options, machine, error)
+    call prepare_own_machine(laws, family%options, body%machine, error)
     if (allocated(error)) return
-    why = why_not_varied(machine)
+    why = why_not_varied(body%machine)
     if (len(why) > 0) then
       call fail(error, exit_bad_case, why)
       return
     end if
-    sizes = machine%sizes%length*[1.0_wp, machine%drive_frequency]
+    sizes = body%machine%sizes%length*[1.0_wp, body%machine%drive_frequency]
     if (family%sizes(1) > 0) sizes = family%sizes
-    body = own_body_of(machine, sizes, turns_smoothly(laws, machine))
+    call set_own_body(sizes, turns_smoothly(laws, body%machine), body)
     if (any([body%flows%tape%is_full])) call fail(error, exit_bad_case, 'body.law: too many operations in the expressions of '// &
                                                   'the case for their derivatives')
   end subroutine own_body_of_family
