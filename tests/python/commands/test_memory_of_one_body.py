@@ -14,6 +14,7 @@ LAWS = {
     "bouc_wen": ("exponent = 1.5\nshape = 0.6", ""),
     "lugre": ("static_force = 1.5\nstribeck_velocity = 0.05\nbristle_damping = 3\ndamping = 0.1", ""),
 }
+LUGRE = f'[friction]\nlaw = "lugre"\nstiffness = 100\nforce = 1\n{LAWS["lugre"][0]}\n'
 FRICTION = 'law = "{law}"\nvelocity = 0.1\nstiffness = 100\nforce = 1\n'
 MOTION = """\
 amplitude = 1.5
@@ -119,12 +120,20 @@ def test_maps_over_the_friction_and_the_deflection(separatrix, tmp_path):
             '[force.friction]\nforce = "v"\n',
             "key 'force.friction': found the name that friction with memory has",
         ),
+        ('[friction]\nlaw = "elastic_coulomb"\n', "; elastic_coulomb in [friction.NAME] beside [body.NAME]"),
+        (
+            LUGRE.replace("1.5", "0.5"),
+            "key 'friction.static_force': found 0.5 N, allowed at least the force 1.0",
+        ),
         ("[effect.coulomb]\nforce = 1\n", "key 'effect.coulomb': not allowed with laws by expressions"),
     ],
 )
 def test_what_does_not_go_with_it(separatrix, tmp_path, more, problem):
     """Names that are taken, and effects."""
-    (tmp_path / "case.toml").write_text(ONE + FRICTION.format(law="dahl") + more)
+    text = FRICTION.format(law="dahl") + more
+    if "law =" in more:
+        text = more.partition("[friction]\n")[2]
+    (tmp_path / "case.toml").write_text(ONE + text)
     found = run(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
     assert found.code == 65
     assert problem in found.err
@@ -148,3 +157,17 @@ def test_exponents_pass_a_narrow_stribeck_curve(separatrix, tmp_path):
     out = succeed(separatrix, "stability", "case.toml", "--periods", "64", "--json", folder=tmp_path).out
     found = [json.loads(line) for line in out.splitlines() if '"event": "exponent"' in line]
     assert [one["value"] for one in found[:2]] == pytest.approx([-0.27216946, -0.83573918], abs=1e-7)
+
+
+@pytest.mark.long
+def test_a_map_of_motions_that_never_settle_ends(separatrix, tmp_path):
+    """On a belt every small amplitude stays: each of 256 starts was watched over 512 periods."""
+    axes = "".join(f'[[axis]]\nname = "{name}"\nfrom = -1\nto = 1\ncount = 3\n' for name in ("x0", "v0"))
+    drive = ONE[ONE.index("[drive]") : ONE.index("[start]")]
+    case = ONE.replace(drive, "").replace('average = "window"\n', "") + FRICTION.format(law="dahl") + axes
+    (tmp_path / "map.toml").write_text(case.replace("duration = 6", "duration = 20"))
+    out = succeed(separatrix, "basin", "map.toml", "-o", "map.h5", folder=tmp_path).out
+    assert "0 attractors and 8 motions not known to be periodic" in out
+    assert "After 8 such and no attractor in a slice, its other starts are not followed" in out
+    assert "ended as time_over: 9 points" in out
+    assert "second look" not in out
