@@ -11,7 +11,6 @@ module case_parameters
   use kinds, only: wp
   use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, rows_of, &
     part_family, path_of, split_element
-  use memory_rows, only: memory_names
   use motor_choices, only: has_motor
   use part_angles, only: is_of_angle, turns
   use restoring_law, only: position_is_angle
@@ -90,8 +89,8 @@ contains
     type(parameter_row_t), intent(in) :: row
     logical, intent(in) :: is_angle
     row_bounds = bounds_t(lower=row%range%lower, upper=row%range%upper, lower_open=row%range%lower_open, unit=row%unit)
-    if (is_of_position(row) .or. row%family == part_family .or. (row%family == 'friction' .and. &
-                                                                 any(memory_names == row%law))) then
+    if (is_of_position(row) .or. row%family == part_family .or. row%family == 'friction' .or. &
+        (row%family == 'drive' .and. row%law == 'force')) then
       row_bounds%unit = unit_of(row%unit, is_angle)
     end if
   end function row_bounds

@@ -92,6 +92,19 @@ def test_a_pendulum_has_moments(separatrix, tmp_path):
         assert 9e-4 < float(abs(file["state_deflection"][()]).max()) <= 1e-3
 
 
+def test_the_drive_and_the_damper_of_a_pendulum_are_moments(separatrix, tmp_path):
+    """N m was rejected, and N taken for it."""
+    drive = '[drive]\nlaw = "force"\namplitude = "0.2 N m"\nfrequency = 1\n'
+    damped = (
+        PENDULUM[: PENDULUM.index("[friction]")] + '[friction]\nlaw = "viscous"\ndamping = "0.1 N m s/rad"\n'
+    )
+    (tmp_path / "case.toml").write_text(damped + drive)
+    succeed(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
+    (tmp_path / "case.toml").write_text(damped + drive.replace("N m", "N"))
+    found = run(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
+    assert "key 'drive.amplitude': found \"0.2 N\", allowed a number in N m" in found.err
+
+
 def test_maps_over_the_friction_and_the_deflection(separatrix, tmp_path):
     """Axes of both. The force that holds a block depends on where its bristles begin."""
     axes = "".join(
