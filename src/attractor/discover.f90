@@ -19,7 +19,11 @@ module discover
   implicit none
   private
 
-  public :: discover_attractors, sort_attractors
+  public :: discover_attractors, sort_attractors, is_given_up, most_not_known
+
+  !> Entries of a catalogue that nobody knows what they are, and nothing else, after which no more starts are followed: where
+  !> motions creep or neither gain nor lose energy, every start would add one.
+  integer, parameter :: most_not_known = 8
 
   !> What a segment of a motion showed: its regime and amplitude [m], whether it converged, was given up, or came back exactly.
   type :: segment_t
@@ -34,7 +38,8 @@ contains
   !> Adds to `catalogue` what `starts` (rows x [m], v [m/s], crank angle [rad]) lead to and it does not yet hold.
   !> Cycles up to `max_period` drive periods are looked for after one, two, four ... durations, those that come back to the bit
   !> whatever their period. `within_span`: a motion that has converged to nothing by the end of the extension is left out; it is
-  !> not watched over the thousands of periods that distinguish chaos from a long transient.
+  !> not watched over the thousands of periods that distinguish chaos from a long transient. A catalogue of
+  !> `most_not_known` entries of which none is known gets no more.
   pure subroutine discover_attractors(moving, span, starts, max_period, catalogue, within_span)
     class(machine_t), intent(in) :: moving
     type(span_t), intent(in) :: span
@@ -53,6 +58,7 @@ contains
     if (.not. allocated(catalogue)) allocate (catalogue(0))
     if (.not. moving%has_section) return
     do i = 1, size(starts, 2)
+      if (is_given_up(catalogue)) return
       section = moving%start(starts(:, i))
       patience = span%duration
       do
@@ -73,6 +79,12 @@ contains
       end do
     end do
   end subroutine discover_attractors
+
+  !> Whether a catalogue gets no more: nothing is known of its entries, and they are many.
+  pure logical function is_given_up(catalogue)
+    type(attractor_t), intent(in) :: catalogue(:)
+    is_given_up = size(catalogue) >= most_not_known .and. all(catalogue%kind == kind_not_known)
+  end function is_given_up
 
   !> Adds an attractor that a catalogue does not hold yet.
   pure subroutine add(moving, found, catalogue)

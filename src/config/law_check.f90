@@ -82,6 +82,12 @@ contains
       call report(source, 'friction.static_coefficient', 'found '//to_text(static)// &
                   ', allowed at least the kinetic_coefficient '//to_text(kinetic)//at)
     end if
+    kinetic = parameter_value(laws, 'friction.force', 0.0_wp)
+    static = parameter_value(laws, 'friction.static_force', kinetic)
+    if (static < kinetic) then
+      call report(source, 'friction.static_force', 'found '//to_text(static)//' '//unit_of('N', position_is_angle(laws))// &
+                  ', allowed at least the force '//to_text(kinetic)//at)
+    end if
   end subroutine check_friction
 
   subroutine check_barriers(source, laws, at)

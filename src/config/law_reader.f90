@@ -288,8 +288,13 @@ contains
     type(law_choice_t), intent(inout) :: choices(:)
     integer :: law, static, kinetic
     call find_parameter(choices, 'friction.static_coefficient', law, static)
-    if (law == 0) return
-    call find_parameter(choices, 'friction.kinetic_coefficient', law, kinetic)
+    if (law > 0) then
+      call find_parameter(choices, 'friction.kinetic_coefficient', law, kinetic)
+    else
+      call find_parameter(choices, 'friction.static_force', law, static)
+      if (law == 0) return
+      call find_parameter(choices, 'friction.force', law, kinetic)
+    end if
     associate (parameters => choices(law)%parameters)
       if (parameters(static)%values(1) < 0) parameters(static)%values = parameters(kinetic)%values
     end associate

@@ -65,23 +65,23 @@ contains
     character(len=:), allocatable :: text
     select case (law)
     case ('dahl')
-      ! The deflection does not exceed F/s0, which it only approaches: the power keeps off its singularity there.
+      ! The deflection only approaches F/s0, from either side: the power keeps off its singularity there.
       text = u//'*if('//u//' > 0, '//left('-')//', '//left('+')//')'
     case ('bouc_wen')
       text = u//'*(1 - (friction.shape*sign('//u//'*'//z//') + 1 - friction.shape)*'// &
         unless_whole('friction.exponent', '1', 'abs('//share//')')//')'
     case default
-      text = u//' - abs('//u//')*'//s0//'*'//z//'/(friction.force + max(friction.static_force - friction.force, 0)'// &
+      text = u//' - abs('//u//')*'//s0//'*'//z//'/(friction.force + (friction.static_force - friction.force)'// &
         '*exp(-'//unless_whole('friction.stribeck_exponent', '2', '(abs('//u//')/friction.stribeck_velocity)')//'))'
     end select
   end function rate_text
 
-  !> (1 -+ z/z_m)^n.
+  !> |w|^n sgn w of w = 1 -+ z/z_m.
   pure function left(sign) result(text)
     character(len=1), intent(in) :: sign
     character(len=:), allocatable :: text
     text = '(1 '//sign//' '//share//')'
-    text = text//'*if((friction.exponent - 1)^2 > '//whole//', max('//text//', 1e-9)^(friction.exponent - 1), 1)'
+    text = text//'*if((friction.exponent - 1)^2 > '//whole//', max(abs('//text//'), 1e-9)^(friction.exponent - 1), 1)'
   end function left
 
   !> A power of `base` of the exponent of a key, as a product where it is the whole number `n`: that has a Taylor series at zero,

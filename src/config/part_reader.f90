@@ -4,7 +4,6 @@
 !> The tables of a machine of several bodies: [body.NAME], [structure.NAME], [spring.NAME], [friction.NAME],
 !> [contact.NAME], [drive.NAME] and [watch].
 module part_reader
-  use angle_units, only: unit_of
   use case_parameters, only: is_of_position
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
   use case_values, only: take_text
@@ -191,7 +190,7 @@ contains
     logical, intent(in) :: is_angle, turning
     type(law_choice_t), intent(inout) :: choice
     type(parameter_row_t), allocatable :: rows(:)
-    character(len=:), allocatable :: path, unit
+    character(len=:), allocatable :: path
     integer :: i
     logical :: from_record
     path = path_of(choice)
@@ -212,11 +211,6 @@ contains
       call read_own_law(source, choice)
     else if (part_kind(choice%name) == 'friction' .and. any(rows%name == 'static_force')) then
       ! Break-away friction that is not given equals sliding friction.
-      if (find(source, path//'.static_force') > 0 .and. value_of(choice, 'static_force') < 0) then
-        unit = unit_of('N', turning)
-        call report(source, path//'.static_force', 'found '//to_text(value_of(choice, 'static_force'))//' '//unit// &
-                    ', allowed at least the force')
-      end if
       if (value_of(choice, 'static_force') < 0) call set_value(choice, 'static_force', [value_of(choice, 'force')])
     end if
     if (choice%name == 'contact:massless') call set_flexibility(source, path, bodies, choice)

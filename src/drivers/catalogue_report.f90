@@ -9,6 +9,7 @@ module catalogue_report
   use build_motion, only: machine_of
   use crank_summary, only: crank_outcomes, crank_stalled, crank_summary_t
   use crank_turns, only: summarize_attractor
+  use discover, only: is_given_up, most_not_known
   use errors, only: error_t
   use journal, only: journal_t
   use kinds, only: wp
@@ -189,18 +190,23 @@ contains
     real(wp), intent(in) :: extension
     character(len=:), allocatable :: line
     integer :: slice, entries, slices, here
+    logical :: cut
+    cut = .false.
     entries = 0
     slices = 0
     do slice = 1, size(catalogues)
       here = count(catalogues(slice)%attractors%kind == kind_not_known)
       entries = entries + here
       if (here > 0) slices = slices + 1
+      cut = cut .or. is_given_up(catalogues(slice)%attractors)
     end do
     line = ''
     if (entries == 0) return
     line = 'warning: '//to_text(entries)//' entries of the catalogue, in '//to_text(slices)//' of '//to_text(size(catalogues))// &
       ' slices, are not known to be periodic, nor that neighbouring motions drift apart for good: perhaps long transients. A '// &
       'longer run.duration or run.extension (now '//to_text(extension, 3)//') decides'
+    if (cut) line = line//'. After '//to_text(most_not_known)//' such and no attractor in a slice, '// &
+      'its other starts are not followed'
   end function not_known_text
 
   !> How large an attractor may be that was not found: none of the `sample` starts of a slice went elsewhere. '' where

@@ -10,7 +10,7 @@ module second_look
   use basin_work, only: basin_work_t, needs_label, prepare_counts
   use catalogue_report, only: list_attractors
   use catalogue_search, only: pack_catalogues, unpack_catalogues
-  use discover, only: discover_attractors
+  use discover, only: discover_attractors, is_given_up
   use errors, only: error_t
   use grid, only: grid_t, point_slice, point_start, slice_neighbours
   use journal, only: journal_t
@@ -93,11 +93,14 @@ contains
     end associate
   end subroutine recall_second_look
 
-  !> Where the search has found nothing there is no section, or no start that ends anywhere.
+  !> Where the search has found nothing there is no section, or no start that ends anywhere; nor is there more to find where it was
+  !> given up.
   logical function is_offered(session, work)
     type(session_t), intent(in) :: session
     type(basin_work_t), intent(in) :: work
+    integer :: i
     is_offered = session%the_case%attractors%second_look > 0 .and. entries(work%catalogues) > 0
+    if (is_offered) is_offered = .not. all([(is_given_up(work%catalogues(i)%attractors), i=1, size(work%catalogues))])
   end function is_offered
 
   !> Looks again as long as points are without an attractor and the budget lasts. `complete` is false after a stop.

@@ -19,6 +19,8 @@ module memory_rows
   type(law_row_t), parameter, public :: memory_laws(3) = [(law_row_t('friction', memory_names(i), kept_laws(i)%meaning, &
     kept_laws(i)%source), i=1, 3)]
 
+  !> One body rubs on the ground.
+  character(len=len(part_parameters%meaning)), parameter :: belt = 'velocity of the surface of the ground: a belt'
   logical, parameter :: is_key(size(part_parameters)) = part_parameters%name /= 'first_end' .and. &
     part_parameters%name /= 'second_end'
   type(parameter_row_t), parameter :: dahl(4) = pack(part_parameters, is_key .and. &
@@ -28,11 +30,14 @@ module memory_rows
   type(parameter_row_t), parameter :: lugre(8) = pack(part_parameters, is_key .and. &
     part_parameters%law == table//memory_names(3))
   type(parameter_row_t), parameter, public :: memory_parameters(17) = [ &
-    (parameter_row_t('friction', memory_names(1), dahl(i)%name, dahl(i)%unit, dahl(i)%range, dahl(i)%meaning, &
+    (parameter_row_t('friction', memory_names(1), dahl(i)%name, dahl(i)%unit, dahl(i)%range, &
+     merge(belt, dahl(i)%meaning, dahl(i)%name == 'velocity'), &
      dahl(i)%optional, dahl(i)%default), i=1, 4), &
-    (parameter_row_t('friction', memory_names(2), bouc_wen(i)%name, bouc_wen(i)%unit, bouc_wen(i)%range, bouc_wen(i)%meaning, &
+    (parameter_row_t('friction', memory_names(2), bouc_wen(i)%name, bouc_wen(i)%unit, bouc_wen(i)%range, &
+     merge(belt, bouc_wen(i)%meaning, bouc_wen(i)%name == 'velocity'), &
      bouc_wen(i)%optional, bouc_wen(i)%default), i=1, 5), &
-    (parameter_row_t('friction', memory_names(3), lugre(i)%name, lugre(i)%unit, lugre(i)%range, lugre(i)%meaning, &
+    (parameter_row_t('friction', memory_names(3), lugre(i)%name, lugre(i)%unit, lugre(i)%range, &
+     merge(belt, lugre(i)%meaning, lugre(i)%name == 'velocity'), &
      lugre(i)%optional, lugre(i)%default), i=1, 8)]
 
 end module memory_rows

@@ -60,7 +60,7 @@ module part_rows
     law_row_t('part', frictions(7), 'a coefficient times the normal force, an expression `load` [N]; none where that is negative', &
               'Amontons, Mem. Acad. R. Sci. (1699)'), &
     law_row_t('part', frictions(8), 'elements of spring and slider in parallel', 'Iwan, J. Appl. Mech. 33 (1966)'), &
-    law_row_t('part', frictions(9), 'a deflection z with z'' = u |1 - sgn(u) z/z_m|^n, force stiffness z, z_m = force/stiffness', &
+    law_row_t('part', frictions(9), 'z'' = u |w|^n sgn w, w = 1 - sgn(u) z/z_m; force stiffness z, z_m = force/stiffness', &
               'Dahl, AIAA J. 14 (1976)'), &
     law_row_t('part', frictions(10), 'a deflection z with z'' = u (1 - (a sgn(u z) + 1 - a) |z/z_m|^n), a the shape', &
               'Wen, J. Eng. Mech. Div. 102 (1976)'), &
@@ -144,7 +144,7 @@ module part_rows
                      'second minus first where the spring is without force', optional=.true.), i=1, 4), &
     (parameter_row_t('part', frictions(i), 'force', 'N', not_negative, &
                      'friction while sliding; at high speed where it depends on the speed'), i=1, 6), &
-    (parameter_row_t('part', frictions(i), 'static_force', 'N', range_t(-1.0_wp, none_above), &
+    (parameter_row_t('part', frictions(i), 'static_force', 'N', not_negative, &
                      'friction at break-away; that of sliding if absent, never below it', optional=.true., &
                      default=-1.0_wp), i=1, 6), &
     (parameter_row_t('part', frictions(i), 'velocity', 'm/s', any_value, &
@@ -158,7 +158,7 @@ module part_rows
     parameter_row_t('part', frictions(5), 'fading_velocity', 'm/s', positive, 'v_f'), &
     parameter_row_t('part', frictions(6), 'drag', 'N s^2/m^2', not_negative, 'd'), &
     parameter_row_t('part', frictions(7), 'kinetic_coefficient', '1', not_negative, 'mu while sliding; at high speed'), &
-    parameter_row_t('part', frictions(7), 'static_coefficient', '1', range_t(-1.0_wp, none_above), &
+    parameter_row_t('part', frictions(7), 'static_coefficient', '1', not_negative, &
                     'mu_s at break-away; the kinetic coefficient if absent, never below it', optional=.true., default=-1.0_wp), &
     parameter_row_t('part', frictions(7), 'stribeck_velocity', 'm/s', not_negative, &
                     'v_s of mu + (mu_s - mu) exp(-|u/v_s|^delta); 0: mu at every speed', optional=.true.), &
@@ -172,7 +172,7 @@ module part_rows
                      default=1.0_wp), i=9, 10), &
     parameter_row_t('part', frictions(10), 'shape', '1', zero_to_one, 'a; 0.5: linear unloading', optional=.true., &
                     default=0.5_wp), &
-    parameter_row_t('part', frictions(11), 'static_force', 'N', range_t(-1.0_wp, none_above), &
+    parameter_row_t('part', frictions(11), 'static_force', 'N', not_negative, &
                     'F_s of g; the force if absent, never below it', optional=.true., default=-1.0_wp), &
     parameter_row_t('part', frictions(11), 'stribeck_velocity', 'm/s', positive, 'v_s of g = F + (F_s - F) exp(-|u/v_s|^delta)', &
                     optional=.true., default=1.0_wp), &

@@ -14,6 +14,7 @@ LAWS = {
     "bouc_wen": ("exponent = 1.5\nshape = 0.6", ""),
     "lugre": ("static_force = 1.5\nstribeck_velocity = 0.05\nbristle_damping = 3\ndamping = 0.1", ""),
 }
+LUGRE = f'[friction]\nlaw = "lugre"\nstiffness = 100\nforce = 1\n{LAWS["lugre"][0]}\n'
 FRICTION = 'law = "{law}"\nvelocity = 0.1\nstiffness = 100\nforce = 1\n'
 MOTION = """\
 amplitude = 1.5
@@ -91,6 +92,19 @@ def test_a_pendulum_has_moments(separatrix, tmp_path):
         assert 9e-4 < float(abs(file["state_deflection"][()]).max()) <= 1e-3
 
 
+def test_the_drive_and_the_damper_of_a_pendulum_are_moments(separatrix, tmp_path):
+    """N m was rejected, and N taken for it."""
+    drive = '[drive]\nlaw = "force"\namplitude = "0.2 N m"\nfrequency = 1\n'
+    damped = (
+        PENDULUM[: PENDULUM.index("[friction]")] + '[friction]\nlaw = "viscous"\ndamping = "0.1 N m s/rad"\n'
+    )
+    (tmp_path / "case.toml").write_text(damped + drive)
+    succeed(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
+    (tmp_path / "case.toml").write_text(damped + drive.replace("N m", "N"))
+    found = run(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
+    assert "key 'drive.amplitude': found \"0.2 N\", allowed a number in N m" in found.err
+
+
 def test_maps_over_the_friction_and_the_deflection(separatrix, tmp_path):
     """Axes of both. The force that holds a block depends on where its bristles begin."""
     axes = "".join(
@@ -119,12 +133,20 @@ def test_maps_over_the_friction_and_the_deflection(separatrix, tmp_path):
             '[force.friction]\nforce = "v"\n',
             "key 'force.friction': found the name that friction with memory has",
         ),
+        ('[friction]\nlaw = "elastic_coulomb"\n', "; elastic_coulomb in [friction.NAME] beside [body.NAME]"),
+        (
+            LUGRE.replace("1.5", "0.5"),
+            "key 'friction.static_force': found 0.5 N, allowed at least the force 1.0",
+        ),
         ("[effect.coulomb]\nforce = 1\n", "key 'effect.coulomb': not allowed with laws by expressions"),
     ],
 )
 def test_what_does_not_go_with_it(separatrix, tmp_path, more, problem):
     """Names that are taken, and effects."""
-    (tmp_path / "case.toml").write_text(ONE + FRICTION.format(law="dahl") + more)
+    text = FRICTION.format(law="dahl") + more
+    if "law =" in more:
+        text = more.partition("[friction]\n")[2]
+    (tmp_path / "case.toml").write_text(ONE + text)
     found = run(separatrix, "trajectory", "case.toml", "--validate", folder=tmp_path)
     assert found.code == 65
     assert problem in found.err
@@ -148,3 +170,17 @@ def test_exponents_pass_a_narrow_stribeck_curve(separatrix, tmp_path):
     out = succeed(separatrix, "stability", "case.toml", "--periods", "64", "--json", folder=tmp_path).out
     found = [json.loads(line) for line in out.splitlines() if '"event": "exponent"' in line]
     assert [one["value"] for one in found[:2]] == pytest.approx([-0.27216946, -0.83573918], abs=1e-7)
+
+
+@pytest.mark.long
+def test_a_map_of_motions_that_never_settle_ends(separatrix, tmp_path):
+    """On a belt every small amplitude stays: each of 256 starts was watched over 512 periods."""
+    axes = "".join(f'[[axis]]\nname = "{name}"\nfrom = -1\nto = 1\ncount = 3\n' for name in ("x0", "v0"))
+    drive = ONE[ONE.index("[drive]") : ONE.index("[start]")]
+    case = ONE.replace(drive, "").replace('average = "window"\n', "") + FRICTION.format(law="dahl") + axes
+    (tmp_path / "map.toml").write_text(case.replace("duration = 6", "duration = 20"))
+    out = succeed(separatrix, "basin", "map.toml", "-o", "map.h5", folder=tmp_path).out
+    assert "0 attractors and 8 motions not known to be periodic" in out
+    assert "After 8 such and no attractor in a slice, its other starts are not followed" in out
+    assert "ended as time_over: 9 points" in out
+    assert "second look" not in out

@@ -35,14 +35,19 @@ duration = 60
 average = "window"
 """
 OWN = 'law = "expression"\nfc = "0.4 N"\nfs = "1 N"\nvs = "0.1 m/s"\nc = "0.2 N s/m"\nforce = '
+STRIBECK = """law = "coulomb_stribeck"
+force = 0.4
+static_force = 1
+stribeck_velocity = 0.1
+stribeck_exponent = 2
+damping = 0.2"""
 PAIRS = {
     "hyperbolic": (
         'law = "coulomb_hyperbolic"\nforce = 0.4\nstatic_force = 1\nfading_velocity = 0.1',
         OWN.replace('c = "0.2 N s/m"\n', "") + '"fc + (fs - fc)/(1 + speed/vs)"',
     ),
     "stribeck": (
-        'law = "coulomb_stribeck"\nforce = 0.4\nstatic_force = 1\nstribeck_velocity = 0.1\nstribeck_exponent = 2\n'
-        "damping = 0.2",
+        STRIBECK,
         OWN + '"fc + (fs - fc)*exp(-(speed/vs)^2) + c*speed"',
     ),
 }
