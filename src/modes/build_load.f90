@@ -2,9 +2,9 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> The normal force of friction between parts, or a force on them, from its expression. It may name the time and the phase of a
-!> drive; x and v of the force; the sliding speed of friction; NAME.x and NAME.v of bodies and points; spring.NAME, the force by which a spring presses its ends
-!> apart; contact.NAME, that of a soft contact; the parameters of its own table by their names, and those of every table by their
-!> paths.
+!> drive; x and v of the force; the sliding speed of friction; NAME.x and NAME.v of bodies and points; spring.NAME, the force by
+!> which a spring presses its ends apart; contact.NAME, that of a soft contact; the parameters of its own table by their names, and
+!> those of every table by their paths.
 module build_load
   use angle_units, only: unit_of
   use errors, only: error_t, fail

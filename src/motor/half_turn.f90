@@ -3,6 +3,7 @@
 
 !> An angle without a drive passes half a turn by an event.
 module half_turn
+  use kinds, only: wp
   use motion_state, only: move_turn, state_t, tally_t
   use motor_system, only: guard_back, guard_section, motor_system_t
   use series_flight, only: flight_t
