@@ -77,6 +77,17 @@ def test_a_rank_without_a_slab_leaves_the_file_alone(mpi_separatrix, faulty_call
     assert len(count.read_text().split()) == 1
 
 
+def test_rank_0_reads_a_tile_at_most_once(mpi_separatrix, faulty_calls, tmp_path):
+    """A look at each tile before the first one would take rank 0 minutes for a million on a slow file system."""
+    life.write_case(tmp_path)
+    count = tmp_path / "count"
+    variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": f"{life.NAME}.part", "FAULT_RANK": "0"}
+    variables |= {"FAULT_COUNT": str(count), "FAULT_DO": "reads"}
+    tiles = ["--set", "axis[1].count=80", "--set", "grid.tile=[5, 5]"]
+    assert start(mpi_separatrix, tmp_path, 2, variables, *tiles) == 0
+    assert 16 * 52 < sum(map(int, count.read_text().split())) < 1.5 * 16 * 52
+
+
 @pytest.mark.parametrize(("ranks", "rank"), [(0, 0), (2, 0), (2, 1)])
 def test_a_fault_at_any_call(mpi_separatrix, faulty_calls, tmp_path, whole, amount, figures, ranks, rank):
     life.write_case(tmp_path)
