@@ -30,8 +30,8 @@ module last_wait
     private
     character(len=:), allocatable :: part
     integer :: bound = usual_bound
-    !> The working file tells which tiles of this run are done; false where they are computed again.
-    logical :: told = .true.
+    !> The working file marks the tiles of this run that are done; false where they are computed again.
+    logical :: in_file = .true.
     !> Tiles of this run, from the first one on, that are known to be done.
     integer :: done = 0
     !> When rank 0 saw first that no work is left, and when the next look is due [s].
@@ -53,7 +53,7 @@ contains
     character(len=16) :: text
     integer :: asked, status
     self%part = part
-    self%told = .not. again
+    self%in_file = .not. again
     if (.not. team%is_root() .or. team%size() == 1) return
     call get_environment_variable(variable, text, status=status)
     if (status == 0) call parse_integer(trim(text), asked, status)
@@ -90,13 +90,13 @@ contains
     now = monotonic_seconds()
     if (self%idle_since < 0 .and. now > self%next_look) then
       last = min(self%done + most_tiles, size(tiles))
-      do while (self%told .and. self%done < last)
+      do while (self%in_file .and. self%done < last)
         if (.not. store%has_done(tiles(self%done + 1))) exit
         self%done = self%done + 1
       end do
       ! One that is not done is looked at again later; the others are gone through without a pause.
       if (self%done < last) self%next_look = now + look_interval
-      if (stopped .or. self%told .and. self%done == size(tiles)) self%idle_since = now
+      if (stopped .or. self%in_file .and. self%done == size(tiles)) self%idle_since = now
     end if
     if (self%idle_since >= 0 .and. now - self%idle_since > self%bound) call fail(error, exit_resumable, &
       'a rank has not answered for '//to_text(self%bound)//' s after the end of its work (a lost link, or a host that fails); '// &

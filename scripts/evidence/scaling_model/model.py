@@ -28,7 +28,9 @@ class Setting(ctypes.Structure):
         ("polls_per_tile", ctypes.c_double),
         ("run", ctypes.c_double),
         ("write", ctypes.c_double),
+        ("lock", ctypes.c_double),
         ("write_tile", ctypes.c_double),
+        ("stripes", ctypes.c_int),
         ("seed", ctypes.c_ulonglong),
     ]
 
@@ -39,6 +41,7 @@ class _Outcome(ctypes.Structure):
         ("finish", ctypes.POINTER(ctypes.c_double)),
         ("tiles", ctypes.POINTER(ctypes.c_long)),
         ("questions", ctypes.POINTER(ctypes.c_long)),
+        ("writing", ctypes.POINTER(ctypes.c_double)),
         ("service", ctypes.c_double),
         ("writes", ctypes.c_long),
         ("longest_queue", ctypes.c_int),
@@ -63,12 +66,14 @@ def setting(
     polls_per_tile: float = 1024,
     share: float = SHARE,
     write: float = 0.0,
+    lock: float = 0.0,
     write_tile: float = 0.0,
+    stripes: int = 0,
     seed: int = 1,
 ) -> Setting:
     """Return a machine and what its messages and writes take."""
-    times = (latency, service, PAUSE, polls_per_tile, RUN, write, write_tile)
-    return Setting(ranks, ranks_per_node, share, *times, seed)
+    times = (latency, service, PAUSE, polls_per_tile, RUN, write, lock, write_tile)
+    return Setting(ranks, ranks_per_node, share, *times, stripes, seed)
 
 
 @dataclass
@@ -79,6 +84,7 @@ class Outcome:
     finish: np.ndarray
     tiles: np.ndarray
     questions: np.ndarray
+    writing: np.ndarray
     service: float
     writes: int
     longest_queue: int
@@ -130,14 +136,15 @@ class Model:
         """Hand out tiles of these costs, seconds in the order of the map."""
         order = handed_out(len(costs)) if spread else slice(None)
         costs = np.ascontiguousarray(costs[order], dtype=np.float64)
-        busy, finish = np.zeros(machine.ranks), np.zeros(machine.ranks)
+        busy, finish, writing = (np.zeros(machine.ranks) for _ in range(3))
         tiles, questions = np.zeros(machine.ranks, np.int64), np.zeros(machine.ranks, np.int64)
         raw = _Outcome(
             busy.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
             finish.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
             tiles.ctypes.data_as(ctypes.POINTER(ctypes.c_long)),
             questions.ctypes.data_as(ctypes.POINTER(ctypes.c_long)),
+            writing.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
         )
         if self.entry(ctypes.byref(machine), len(costs), costs, ctypes.byref(raw)):
             raise MemoryError("the model of the scheduler")
-        return Outcome(busy, finish, tiles, questions, raw.service, raw.writes, raw.longest_queue)
+        return Outcome(busy, finish, tiles, questions, writing, raw.service, raw.writes, raw.longest_queue)

@@ -43,6 +43,7 @@ struct model {
   long events, room;
   int *queue; /* nodes whose questions rank 0 has not answered yet */
   int queued, poll_due;
+  double *stripe_free; /* from when on each stripe of the file can be written */
   double root_begin, root_cost, serving_until;
   int root_idle;
   unsigned long long random;
@@ -124,16 +125,25 @@ static void take_run(struct model *m, int rank, struct node *pool) {
   pool->next += count;
 }
 
-/* Writes what a rank holds, in one call, and returns when it is done. */
+/* Writes what a rank holds, in one call, and returns when it is done. The stripe that it hits is locked by one
+ * call at a time. */
 static double write_tiles(struct model *m, double time, int rank) {
+  const struct scheduler_setting *setting = m->setting;
   struct rank *own = &m->own[rank];
   if (own->held == 0)
     return time;
-  time += m->setting->write + (double)own->held * m->setting->write_tile;
+  double start = time + setting->write;
+  double *stripe = setting->stripes > 0 ? &m->stripe_free[(int)(uniform(m) * setting->stripes)] : NULL;
+  if (stripe && *stripe > start)
+    start = *stripe;
+  double end = start + setting->lock + (double)own->held * setting->write_tile;
+  if (stripe)
+    *stripe = end;
   m->outcome->writes++;
+  m->outcome->writing[rank] += end - time;
   own->held = 0;
-  own->written = time;
-  return time;
+  own->written = end;
+  return end;
 }
 
 static double pause_end(struct model *m, double time) { return time + m->setting->pause * uniform(m); }
@@ -258,7 +268,8 @@ static int set_up(struct model *m, long tiles) {
   m->next_waiting = calloc((size_t)ranks, sizeof *m->next_waiting);
   m->queue = calloc((size_t)nodes, sizeof *m->queue);
   m->heap = calloc((size_t)m->room, sizeof *m->heap);
-  if (!m->nodes || !m->own || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
+  m->stripe_free = calloc((size_t)m->setting->stripes + 1, sizeof *m->stripe_free);
+  if (!m->stripe_free || !m->nodes || !m->own || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
     return 1;
   for (int i = 0; i < nodes; i++) {
     int first = i * per_node, size = per_node < ranks - first ? per_node : ranks - first;
@@ -301,6 +312,7 @@ int simulate(const struct scheduler_setting *setting, long tiles, const double *
   free(m.node_of);
   free(m.next_waiting);
   free(m.queue);
+  free(m.stripe_free);
   free(m.heap);
   return status;
 }
