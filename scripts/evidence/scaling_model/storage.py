@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 from packing import SLAB
 
+METADATA = ("open", "create", "stat", "rename", "unlink", "length", "lock", "sync")
+"""Calls that move no data; `length`: those that change the length of a file."""
 IO500_BYTES = 47_008
 """Of a record of the hard test of IOR, which many processes write into one file."""
 IO500_PROCESSES, IO500_STRIPES = 64, 16
@@ -41,6 +43,8 @@ class Storage:
     """Seconds, of that run."""
     sync: float = 0.05
     """Seconds until a sync is answered: an assumption."""
+    cached: float = 1
+    """1: a node answers what it has read before, and neighbouring writes of a rank lock once; 0: it does not."""
 
     def other(self, texts: list[str]) -> Storage:
         """Return this one with the values in texts as `stripes=72`."""
@@ -51,9 +55,27 @@ class Storage:
             if name not in names:
                 raise ValueError(f"--storage {text}: '{name}' is none of {', '.join(names)}")
             values[name] = float(value)
-            if not values[name] > 0:
+            if not (values[name] > 0 or (name == "cached" and values[name] == 0)):
                 raise ValueError(f"--storage {text}: {value} is not positive")
         return dataclasses.replace(self, **values)
+
+
+CLOUD = "IO500 (SC20) of 1 December 2021 on EXAScaler Cloud, 16 servers, 64 processes, as DDN prints it"
+SOURCES = {
+    "stripes": "servers of Perlmutter's scratch, NERSC documentation",
+    "bytes_per_second": "its acceptance test, 1382 nodes, records of 1 MiB, G. K. Lockwood's page on IOR",
+    "reads_per_second": "4 KiB at random places, NERSC documentation",
+    "opens_per_second": "creates by one metadata server, known usage, Lustre operations manual",
+    "stats_per_second": "the same table",
+    "lock": f"16 stripes / 7509 writes of 47 008 bytes per second into one file (0.328757 GiB/s), {CLOUD}",
+    "read": "64 processes / 20 619 reads of 47 008 bytes per second, the same run",
+    "open": "64 processes / 21 003 creates per second, the same run",
+    "stat": "64 processes / 63 395 per second, the same run",
+    "unlink": "64 processes / 11 506 per second, the same run",
+    "sync": "an assumption",
+    "cached": "an assumption",
+}
+"""Of each rate of `Storage`."""
 
 
 @dataclass(frozen=True)
@@ -141,26 +163,39 @@ def times(job: Job, storage: Storage, record: float) -> Times:
     """Return what a file system takes for the job; `record`: bytes of a tile.
 
     Calls of one rank follow one another; those of several ranks share the rates. Half of rank 0's calls on
-    names are before the tiles. The chunks of a slab are neighbours: a slab locks a stripe once. A sync asks
-    each stripe. The ranks of a node share the descriptions that one of them has read.
+    names are before the tiles. The chunks of a slab are neighbours, so that a slab locks a stripe once, and the
+    ranks of a node share the descriptions that one of them has read, if `cached`. A sync asks each stripe.
     """
     rounds = math.ceil(job.slabs / job.ranks)
     names = (ROOT["open"] + ROOT["create"] + ROOT["rename"] + ROOT["length"] + ROOT["lock"]) * storage.open
     names += ROOT["stat"] * storage.stat + ROOT["unlink"] * storage.unlink
     opens, stats = 1 / storage.opens_per_second, 1 / storage.stats_per_second
     per_stripe = storage.reads_per_second / storage.stripes
-    nodes = math.ceil(job.readers / job.per_node)
     reads = max(job.tiles / storage.reads_per_second, job.tiles * record / storage.bytes_per_second)
+    asking = math.ceil(job.readers / job.per_node) if storage.cached else job.readers
+    locking = job.slabs if storage.cached else job.chunks
     return Times(
-        begin=names / 2 + ROOT_WRITES["begun"] * storage.lock + 2 * storage.sync + job.ranks * (opens + stats),
-        tiles_read=2 * job.holders * opens + max(reads, rounds * job.tiles / job.slabs * storage.read),
-        chunks_written=max(job.slabs / storage.stripes, rounds) * storage.lock,
+        begin=names / 2
+        + ROOT_READS["part"] * storage.read
+        + ROOT_WRITES["begun"] * storage.lock
+        + 2 * storage.sync
+        + (job.ranks - 1) * (opens + stats)
+        + storage.open
+        + storage.stat,
+        tiles_read=2 * (job.holders * opens + storage.open)
+        + max(reads, rounds * job.tiles / job.slabs * (storage.read + storage.stripes * record / storage.bytes_per_second)),
+        chunks_written=max(locking / storage.stripes, rounds * locking / job.slabs) * storage.lock,
         synced=storage.sync + job.holders / per_stripe,
         read_back=job.readers * (opens + 2 * stats)
-        + nodes * DESCRIPTION_READS / per_stripe
+        + storage.open
+        + 2 * storage.stat
+        + max(asking * DESCRIPTION_READS / per_stripe, DESCRIPTION_READS * storage.read)
         + max(job.chunks / storage.reads_per_second, rounds * job.chunks / job.slabs * storage.read)
-        + VERIFIER_READS * storage.read,
-        end=names / 2 + ROOT_WRITES["new"] * storage.lock + 2 * storage.sync,
+        + (VERIFIER_READS - DESCRIPTION_READS) * storage.read,
+        end=names / 2
+        + ROOT_READS["new"] * storage.read
+        + ROOT_WRITES["new"] * storage.lock
+        + 2 * storage.sync,
     )
 
 

@@ -30,7 +30,6 @@ MEANS = {
     **dict.fromkeys(("read", "pread64", "readv", "preadv"), "read"),
     **dict.fromkeys(("write", "pwrite64", "writev", "pwritev"), "write"),
 }
-METADATA = ("open", "create", "stat", "rename", "unlink", "length", "lock")
 LINE = re.compile(r"^\d+ +(\w+)\((.*)\) += (-?\d+)")
 
 
