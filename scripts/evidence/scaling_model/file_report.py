@@ -30,9 +30,7 @@ def parts_table(parts: dict[int, simulation.Parts]) -> str:
         *((name, [job.seconds[name] for job in jobs]) for name in jobs[0].seconds),
     ]
     rows = [[name, *(f"{value:.2f}" for value in values)] for name, values in names]
-    rows.append(
-        ["writes into the working file per second", *(number(job.writes_per_second) for job in jobs)]
-    )
+    rows.append(["writes into the working file per second", *(number(job.writes_per_second) for job in jobs)])
     return table([f"seconds, tiles of {simulation.STATED:g} s", *(f"{number(r)} ranks" for r in parts)], rows)
 
 
@@ -50,8 +48,8 @@ def storage_table(storage: Storage) -> str:
 def storage_text(storage: Storage) -> str:
     """Return from which rate of writes on one file is the limit."""
     return (
-        f"The locks of one file on {storage.stripes:g} stripes allow {number(most_writes(storage))} writes per "
-        f"second, those of one stripe {number(1 / storage.lock)}."
+        f"The locks of one file on {storage.stripes:g} stripes allow {number(most_writes(storage))} writes "
+        f"per second, those of one stripe {number(1 / storage.lock)}."
     )
 
 

@@ -84,7 +84,7 @@ class Packing:
 
 @dataclass
 class Constants:
-    """Seconds of rank 0 alone, of it for each point of the map, and of a rank for each point that it packs."""
+    """Seconds of rank 0 alone, of it for each point of a map, and of a rank for each point that it packs."""
 
     fixed: float
     alone: float

@@ -235,7 +235,7 @@ def jobs_table(jobs: dict[int, list[float]], mean: float) -> str:
 
 
 def with_jobs(page: str, jobs: dict[int, list[float]], parts: str) -> str:
-    """Return a page with other efficiencies of whole jobs and parts of one of them, and the rest as it was."""
+    """Return a page with other efficiencies of whole jobs and parts of one of them, the rest as it was."""
     kept = read_jobs(page)
     before, section = page.split(JOBS_BEGIN)
     section, after = section.split(JOBS_END)
@@ -272,7 +272,9 @@ def read_jobs(page: str) -> KeptJobs:
         *([float(value.strip(" %")) / 100 for value in row.split("|")] for _, row in rows), strict=True
     )
     jobs = dict(zip(simulation.JOB_RANKS, map(list, columns), strict=True))
-    return KeptJobs(start, search, float(rows[0][0]), jobs, made, parts.split(PARTS_END)[0].strip(), constants)
+    return KeptJobs(
+        start, search, float(rows[0][0]), jobs, made, parts.split(PARTS_END)[0].strip(), constants
+    )
 
 
 def with_jobs_at_top(page: str) -> str:

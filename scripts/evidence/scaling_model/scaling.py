@@ -9,8 +9,8 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import file_report
+import numpy as np
 import plots
 import report
 import slow_files
@@ -231,7 +231,9 @@ def only_operations(build: Path, page: Path) -> None:
 def operations_of(page: Path) -> str:
     """Return the section on calls of a page that exists."""
     if page.exists() and file_report.BEGIN in (text := page.read_text()):
-        return file_report.BEGIN + text.split(file_report.BEGIN)[1].split(file_report.END)[0] + file_report.END
+        return (
+            file_report.BEGIN + text.split(file_report.BEGIN)[1].split(file_report.END)[0] + file_report.END
+        )
     return f"{file_report.BEGIN}\n{file_report.END}"
 
 
@@ -296,9 +298,9 @@ def main() -> None:
         progress("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
-        results.simulated = Simulation(model, base.costs, mean, results.packing.constants, storage).everything(
-            BAR, time_before(program, base, results.v0_count)
-        )
+        results.simulated = Simulation(
+            model, base.costs, mean, results.packing.constants, storage
+        ).everything(BAR, time_before(program, base, results.v0_count))
         progress("memory")
         sizes = results.sizes
         results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)

@@ -125,8 +125,8 @@ static void take_run(struct model *m, int rank, struct node *pool) {
   pool->next += count;
 }
 
-/* Writes what a rank holds, in one call, and returns when it is done. The stripe that it hits is locked by one
- * call at a time. */
+/* Writes what a rank holds, in one call, and returns when it is done. The stripe that it hits is locked by
+ * one call at a time. */
 static double write_tiles(struct model *m, double time, int rank) {
   const struct scheduler_setting *setting = m->setting;
   struct rank *own = &m->own[rank];

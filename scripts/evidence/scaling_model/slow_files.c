@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: The Separatrix developers */
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 
-/* slow_files FOLDER MILLISECONDS MOUNT_POINT -f: shows a folder as a file system on which each operation takes
- * so long. Nothing is cached: each read and write of a process is an operation of this program. */
+/* slow_files FOLDER MILLISECONDS MOUNT_POINT -f: shows a folder as a file system on which each operation
+ * takes so long. Nothing is cached: each read and write of a process is an operation of this program. */
 #define FUSE_USE_VERSION 35
 #define _GNU_SOURCE
 #include <errno.h>

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs on a file system of this machine that delays each operation, beside what the model predicts for them."""
+"""Runs on a file system of this machine that delays each operation, beside what the model predicts."""
 
 from __future__ import annotations
 
@@ -156,7 +156,5 @@ def compare(program: Program, model: Model, words: list[str], jobs: dict[int, Jo
 def waits(model: Model, job: Job, storage: Storage, costs: np.ndarray) -> float:
     """Seconds of the tiles and of all other calls."""
     one = RECORD_BYTES / storage.bytes_per_second
-    machine = setting(
-        job.ranks, job.ranks, lock=storage.lock, write_tile=one, stripes=int(storage.stripes)
-    )
+    machine = setting(job.ranks, job.ranks, lock=storage.lock, write_tile=one, stripes=int(storage.stripes))
     return model.run(machine, costs).makespan + times(job, storage, RECORD_BYTES).total

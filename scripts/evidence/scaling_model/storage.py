@@ -44,7 +44,7 @@ class Storage:
     sync: float = 0.05
     """Seconds until a sync is answered: an assumption."""
     cached: float = 1
-    """1: a node answers what it has read before, and neighbouring writes of a rank lock once; 0: it does not."""
+    """1: a node answers what it has read before, and neighbouring writes of a rank lock once; 0: not."""
 
     def other(self, texts: list[str]) -> Storage:
         """Return this one with the values in texts as `stripes=72`."""
@@ -163,7 +163,7 @@ def times(job: Job, storage: Storage, record: float) -> Times:
     """Return what a file system takes for the job; `record`: bytes of a tile.
 
     Calls of one rank follow one another; those of several ranks share the rates. Half of rank 0's calls on
-    names are before the tiles. The chunks of a slab are neighbours, so that a slab locks a stripe once, and the
+    names are before the tiles. A slab locks a stripe once, as its chunks are neighbours, and the
     ranks of a node share the descriptions that one of them has read, if `cached`. A sync asks each stripe.
     """
     rounds = math.ceil(job.slabs / job.ranks)
@@ -183,7 +183,13 @@ def times(job: Job, storage: Storage, record: float) -> Times:
         + storage.open
         + storage.stat,
         tiles_read=2 * (job.holders * opens + storage.open)
-        + max(reads, rounds * job.tiles / job.slabs * (storage.read + storage.stripes * record / storage.bytes_per_second)),
+        + max(
+            reads,
+            rounds
+            * job.tiles
+            / job.slabs
+            * (storage.read + storage.stripes * record / storage.bytes_per_second),
+        ),
         chunks_written=max(locking / storage.stripes, rounds * locking / job.slabs) * storage.lock,
         synced=storage.sync + job.holders / per_stripe,
         read_back=job.readers * (opens + 2 * stats)

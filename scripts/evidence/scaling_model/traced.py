@@ -60,7 +60,7 @@ class Traced:
 
 
 def file_of(words: str, folder: Path) -> str | None:
-    """Which file of the run a call names: 'part', 'new', 'lock', 'other'; None for files outside its folder."""
+    """Which file a call names: 'begun', 'part', 'new', 'lock', 'other'; None outside the run's folder."""
     if str(folder) not in words:
         return None
     name = words.split(str(folder), 1)[1]
@@ -94,7 +94,8 @@ def trace(program: Program, ranks: int, case: Path, *words: object) -> Traced:
     (folder / "out").mkdir(parents=True)
     times = folder / "tiles.csv"
     map_of = [program.program, "basin", case, "-o", folder / "out" / "map.h5", "-q", "--tile-times", times]
-    strace = f"strace -f -y -qq -s 0 -e signal=none --seccomp-bpf -o {folder}/$OMPI_COMM_WORLD_RANK -e trace={CALLS}"
+    strace = f"strace -f -y -qq -s 0 -e signal=none --seccomp-bpf -e trace={CALLS}"
+    strace += f" -o {folder}/$OMPI_COMM_WORLD_RANK"
     start = ["mpirun", "--bind-to", "none", "-n", ranks, "bash", "-c", f'exec {strace} "$@"', "bash"]
     subprocess.run([str(word) for word in (*start, *map_of, *words)], check=True, stdout=subprocess.DEVNULL)
     result = Traced(ranks)
