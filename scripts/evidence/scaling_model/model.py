@@ -30,6 +30,7 @@ class Setting(ctypes.Structure):
         ("write", ctypes.c_double),
         ("lock", ctypes.c_double),
         ("write_tile", ctypes.c_double),
+        ("most_held", ctypes.c_long),
         ("stripes", ctypes.c_int),
         ("seed", ctypes.c_ulonglong),
     ]
@@ -52,6 +53,8 @@ class _Outcome(ctypes.Structure):
 SHARE = 0.5
 PAUSE = 100e-6
 RUN = 0.5
+# src/io/tile_store.f90: 4 MiB of records of 1024 points of the case of the packing runs
+MOST_HELD = 85
 # a message, and an answer of rank 0, on a usual cluster
 LATENCY = 5e-6
 SERVICE = 5e-6
@@ -68,12 +71,13 @@ def setting(
     write: float = 0.0,
     lock: float = 0.0,
     write_tile: float = 0.0,
+    most_held: int = MOST_HELD,
     stripes: int = 0,
     seed: int = 1,
 ) -> Setting:
     """Return a machine and what its messages and writes take."""
     times = (latency, service, PAUSE, polls_per_tile, RUN, write, lock, write_tile)
-    return Setting(ranks, ranks_per_node, share, *times, stripes, seed)
+    return Setting(ranks, ranks_per_node, share, *times, most_held, stripes, seed)
 
 
 @dataclass

@@ -28,6 +28,8 @@ struct node {
 struct rank {
   long next, last; /* positions of its run, from 0; empty if last < next */
   long held;       /* tiles done and not written */
+  long pieces;     /* that they are in the file: each is written by a call */
+  long done;       /* position after the last tile done */
   double written;  /* when it wrote last */
   int waits;       /* its last tile is accounted for */
 };
@@ -125,25 +127,28 @@ static void take_run(struct model *m, int rank, struct node *pool) {
   pool->next += count;
 }
 
-/* Writes what a rank holds, in one call, and returns when it is done. The stripe that it hits is locked by
- * one call at a time. */
+/* Writes what a rank holds, neighbours in one call, and returns when it is done. The stripe that a call hits
+ * is locked by one call at a time. */
 static double write_tiles(struct model *m, double time, int rank) {
   const struct scheduler_setting *setting = m->setting;
   struct rank *own = &m->own[rank];
   if (own->held == 0)
     return time;
-  double start = time + setting->write;
-  double *stripe = setting->stripes > 0 ? &m->stripe_free[(int)(uniform(m) * setting->stripes)] : NULL;
-  if (stripe && *stripe > start)
-    start = *stripe;
-  double end = start + setting->lock + (double)own->held * setting->write_tile;
-  if (stripe)
-    *stripe = end;
-  m->outcome->writes++;
-  m->outcome->writing[rank] += end - time;
+  const double begun = time, each = (double)own->held / (double)own->pieces * setting->write_tile;
+  for (; own->pieces > 0; own->pieces--) {
+    double *stripe = setting->stripes > 0 ? &m->stripe_free[(int)(uniform(m) * setting->stripes)] : NULL;
+    time += setting->write;
+    if (stripe && *stripe > time)
+      time = *stripe;
+    time += setting->lock + each;
+    if (stripe)
+      *stripe = time;
+    m->outcome->writes++;
+  }
+  m->outcome->writing[rank] += time - begun;
   own->held = 0;
-  own->written = end;
-  return end;
+  own->written = time;
+  return time;
 }
 
 static double pause_end(struct model *m, double time) { return time + m->setting->pause * uniform(m); }
@@ -201,9 +206,11 @@ static void rank_free(struct model *m, double time, int rank) {
     return;
   }
   if (own->waits) {
+    own->pieces += own->held == 0 || own->next - 1 != own->done;
+    own->done = own->next;
     own->held++;
     own->waits = 0;
-    if (time - own->written >= m->setting->run)
+    if (time - own->written >= m->setting->run || own->held == m->setting->most_held)
       time = write_tiles(m, time, rank);
   }
   if (own->next > own->last)

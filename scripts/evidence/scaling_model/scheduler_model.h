@@ -15,6 +15,7 @@ struct scheduler_setting {
   double write;          /* time of a call that writes beside that of the stripe, seconds */
   double lock;           /* time for which a call locks its stripe, seconds */
   double write_tile;     /* and of each tile in it */
+  long most_held;        /* tiles that a rank holds at most before it writes */
   int stripes;           /* of the file, each with a lock of its own; 0: nothing is waited for */
   unsigned long long seed;
 };

@@ -109,6 +109,7 @@ def rates(folder: Path) -> Storage:
         reads_per_second=1 / shared,
         opens_per_second=1 / opens,
         stats_per_second=1 / stats,
+        node_bytes_per_second=1e12,
         lock=locked,
         read=read,
         open=(created + opened) / 2,

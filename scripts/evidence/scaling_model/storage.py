@@ -31,6 +31,8 @@ class Storage:
     """One metadata server opens or creates so many: operations manual of Lustre, table of known usage."""
     stats_per_second: float = 200e3
     """As before."""
+    node_bytes_per_second: float = 15e9
+    """Of one node: operations manual of Lustre, table of known usage."""
     lock: float = IO500_STRIPES * IO500_BYTES / (0.328757 * 2**30)
     """Seconds for which a write of others into the same stripe waits: IO500 of a Lustre with 16 stripes."""
     read: float = IO500_PROCESSES * IO500_BYTES / (0.902677 * 2**30)
@@ -67,6 +69,7 @@ SOURCES = {
     "reads_per_second": "4 KiB at random places, NERSC documentation",
     "opens_per_second": "creates by one metadata server, known usage, Lustre operations manual",
     "stats_per_second": "the same table",
+    "node_bytes_per_second": "one client, known usage, Lustre operations manual",
     "lock": f"16 stripes / 7509 writes of 47 008 bytes per second into one file (0.328757 GiB/s), {CLOUD}",
     "read": "64 processes / 20 619 reads of 47 008 bytes per second, the same run",
     "open": "64 processes / 21 003 creates per second, the same run",
@@ -114,7 +117,9 @@ def job_of(ranks: int, tiles: int, points: float, chunks_per_slab: float, per_no
 # What rank 0 does on any number of ranks, and each of the others beside what lies in proportion to the map.
 # The case has 13 variables on the grid; their number changes the calls on descriptions.
 ROOT = {"open": 14, "create": 5, "stat": 44, "rename": 2, "unlink": 4, "length": 5, "lock": 1, "sync": 4}
-ROOT_WRITES, ROOT_READS = {"begun": 23, "new": 125}, {"part": 29, "new": 29}
+ROOT_WRITES, ROOT_READS = {"begun": 23, "new": 74}, {"part": 29, "new": 29}
+CHUNK_BYTES = 12_700
+"""Of a compressed chunk of this case, mean."""
 DESCRIPTION_READS, VERIFIER_READS = 78, 215
 """Of the final file, by each rank that reads back, and by the one that reads the rest."""
 
@@ -124,14 +129,15 @@ def counts(job: Job) -> dict[str, int]:
     others = job.holders - 1
     found = dict(ROOT)
     found["open"] += job.several + (job.ranks - 1) + 2 * others + job.readers + 1
-    found["stat"] += 2 * job.several + (job.ranks - 1) + 2 * job.readers + 2
+    found["stat"] += (job.ranks - 1) + 2 * job.readers + 2
     found["sync"] += job.several + others
     found["read of tiles"] = ROOT_READS["part"] + job.tiles
     found["read of the final file"] = (
         ROOT_READS["new"] + VERIFIER_READS + DESCRIPTION_READS * job.readers + job.chunks
     )
     found["write of descriptions"] = sum(ROOT_WRITES.values())
-    found["write of chunks"] = job.chunks
+    # Rank 0 writes zeros to reserve the place of each chunk.
+    found["write of chunks"] = 2 * job.chunks
     return found
 
 
@@ -142,6 +148,8 @@ class Times:
     begin: float
     """The working file is made and opened."""
     tiles_read: float
+    reserved: float
+    """Rank 0 writes zeros where chunks will be."""
     chunks_written: float
     synced: float
     read_back: float
@@ -190,6 +198,8 @@ def times(job: Job, storage: Storage, record: float) -> Times:
             / job.slabs
             * (storage.read + storage.stripes * record / storage.bytes_per_second),
         ),
+        reserved=job.chunks
+        * (CHUNK_BYTES / storage.node_bytes_per_second if storage.cached else storage.lock),
         chunks_written=max(locking / storage.stripes, rounds * locking / job.slabs) * storage.lock,
         synced=storage.sync + job.holders / per_stripe,
         read_back=job.readers * (opens + 2 * stats)
