@@ -191,7 +191,7 @@ def only_model(build: Path, page: Path, storage: Storage) -> None:
     with tempfile.TemporaryDirectory(prefix="scaling-") as name:
         program = Program(build, Path(name))
         # the least of some: other work on the machine would make the costs more even
-        runs = [program.uneven(1, Sizes.ratios, 32 * TILE).costs for _ in range(Sizes.repetitions)]
+        runs = [program.uneven(1, QUICK.ratios, 32 * TILE).costs for _ in range(Sizes.repetitions)]
         costs = np.min(runs, axis=0)
         simulation = Simulation(Model(Path(name)), costs, kept.mean, kept.packing, storage)
         jobs = simulation.whole_jobs(kept.start + kept.search)

@@ -127,28 +127,26 @@ static void take_run(struct model *m, int rank, struct node *pool) {
   pool->next += count;
 }
 
-/* Writes what a rank holds, neighbours in one call, and returns when it is done. The stripe that a call hits
- * is locked by one call at a time. */
+/* Writes what a rank holds, neighbours in one call, and returns when it is done. A stripe is locked by one
+ * rank at a time; the calls of a rank follow one another in one stripe. */
 static double write_tiles(struct model *m, double time, int rank) {
   const struct scheduler_setting *setting = m->setting;
   struct rank *own = &m->own[rank];
   if (own->held == 0)
     return time;
-  const double begun = time, each = (double)own->held / (double)own->pieces * setting->write_tile;
-  for (; own->pieces > 0; own->pieces--) {
-    double *stripe = setting->stripes > 0 ? &m->stripe_free[(int)(uniform(m) * setting->stripes)] : NULL;
-    time += setting->write;
-    if (stripe && *stripe > time)
-      time = *stripe;
-    time += setting->lock + each;
-    if (stripe)
-      *stripe = time;
-    m->outcome->writes++;
-  }
-  m->outcome->writing[rank] += time - begun;
+  double start = time + (double)own->pieces * setting->write;
+  double *stripe = setting->stripes > 0 ? &m->stripe_free[(int)(uniform(m) * setting->stripes)] : NULL;
+  if (stripe && *stripe > start)
+    start = *stripe;
+  double end = start + (double)own->pieces * setting->lock + (double)own->held * setting->write_tile;
+  if (stripe)
+    *stripe = end;
+  m->outcome->writes += own->pieces;
+  m->outcome->writing[rank] += end - time;
   own->held = 0;
-  own->written = time;
-  return time;
+  own->pieces = 0;
+  own->written = end;
+  return end;
 }
 
 static double pause_end(struct model *m, double time) { return time + m->setting->pause * uniform(m); }

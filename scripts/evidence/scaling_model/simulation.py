@@ -164,7 +164,7 @@ class Simulation:
             "working file: created, opened by all ranks": waits.begin,
             "final file: tiles read": waits.tiles_read,
             "final file: compressed, offsets taken by rank 0": self.packing.seconds(points, ranks),
-            "final file: places of chunks reserved by rank 0": waits.reserved,
+            "final file: chunks reserved by rank 0": waits.reserved,
             "final file: chunks written": waits.chunks_written,
             "final file: synchronised": waits.synced,
             "final file: read back": waits.read_back,

@@ -26,7 +26,7 @@ class Storage:
     bytes_per_second: float = 3_427_179.21 * 2**20
     """Of all stripes: its acceptance test with records of 1 MiB."""
     reads_per_second: float = 4e6
-    """Of all stripes, at random places: NERSC's page on it."""
+    """Of all stripes, at random offsets: NERSC's page on it."""
     opens_per_second: float = 100e3
     """One metadata server opens or creates so many: operations manual of Lustre, table of known usage."""
     stats_per_second: float = 200e3
@@ -62,15 +62,14 @@ class Storage:
         return dataclasses.replace(self, **values)
 
 
-CLOUD = "IO500 (SC20) of 1 December 2021 on EXAScaler Cloud, 16 servers, 64 processes, as DDN prints it"
 SOURCES = {
     "stripes": "servers of Perlmutter's scratch, NERSC documentation",
     "bytes_per_second": "its acceptance test, 1382 nodes, records of 1 MiB, G. K. Lockwood's page on IOR",
-    "reads_per_second": "4 KiB at random places, NERSC documentation",
+    "reads_per_second": "4 KiB at random offsets, NERSC documentation",
     "opens_per_second": "creates by one metadata server, known usage, Lustre operations manual",
     "stats_per_second": "the same table",
     "node_bytes_per_second": "one client, known usage, Lustre operations manual",
-    "lock": f"16 stripes / 7509 writes of 47 008 bytes per second into one file (0.328757 GiB/s), {CLOUD}",
+    "lock": "16 stripes / 7509 writes per second of `ior-hard-write`, IO500 on a cloud with 16 servers, see below",
     "read": "64 processes / 20 619 reads of 47 008 bytes per second, the same run",
     "open": "64 processes / 21 003 creates per second, the same run",
     "stat": "64 processes / 63 395 per second, the same run",
@@ -136,7 +135,7 @@ def counts(job: Job) -> dict[str, int]:
         ROOT_READS["new"] + VERIFIER_READS + DESCRIPTION_READS * job.readers + job.chunks
     )
     found["write of descriptions"] = sum(ROOT_WRITES.values())
-    # Rank 0 writes zeros to reserve the place of each chunk.
+    # Rank 0 writes zeros to reserve the bytes of each chunk.
     found["write of chunks"] = 2 * job.chunks
     return found
 
