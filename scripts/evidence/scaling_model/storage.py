@@ -69,7 +69,7 @@ SOURCES = {
     "opens_per_second": "creates by one metadata server, known usage, Lustre operations manual",
     "stats_per_second": "the same table",
     "node_bytes_per_second": "one client, known usage, Lustre operations manual",
-    "lock": "16 stripes / 7509 writes per second of `ior-hard-write`, IO500 on a cloud with 16 servers, see below",
+    "lock": "16 stripes / 7509 writes per second, `ior-hard-write`, IO500 on a cloud, see above",
     "read": "64 processes / 20 619 reads of 47 008 bytes per second, the same run",
     "open": "64 processes / 21 003 creates per second, the same run",
     "stat": "64 processes / 63 395 per second, the same run",
