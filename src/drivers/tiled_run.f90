@@ -129,8 +129,7 @@ contains
     watch%unfinished = size(unfinished)
     if (session%command%resume .and. .not. work%again) call session%journal%line('resumed', &
       to_text(size(mine) - size(unfinished))//' of '//to_text(size(mine))//' tiles were done before')
-    ! Before a rank can write a tile.
-    call last_wait%begin(working_path(file%path), size(mine), size(mine) - size(unfinished), session%team)
+    call last_wait%begin(working_path(file%path), work%again, session%team)
     call make_scheduler(session%team, scheduler_options_t(time_left(session), session%command%ranks_per_node, &
                         len(session%command%tile_times) > 0), scheduler, error)
     if (.not. allocated(error)) call scheduler%start(size(unfinished), error)
@@ -157,7 +156,7 @@ contains
     call file%flush(error)
     call session%abort_if(error)
     if (scheduler%stop_requested()) call session%report_how_to_resume(working_path(file%path))
-    call last_wait%wait(session%team, scheduler, error)
+    call last_wait%wait(session%team, scheduler, file%store, unfinished, error)
     call session%abort_if(error)
     begun = scheduler%started
     call scheduler%finish()

@@ -75,7 +75,8 @@ contains
     schema = whole_schema(file, extra)
     call packing%begin(file%names(), file%types(), file%tiling%lengths, file%tile_count())
     if (team%is_root()) call create(name, schema, new, error)
-    if (.not. allocated(error)) call file%store%open(working_path(file%path), .true., error)
+    ! A rank without a slab opens, and syncs, nothing.
+    if (packing%has_slab(team%rank()) .and. .not. allocated(error)) call file%store%open(working_path(file%path), .true., error)
     call team%agree(error)
     alone = alone + monotonic_seconds()
     if (.not. allocated(error)) then

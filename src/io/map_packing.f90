@@ -48,6 +48,7 @@ module map_packing
     real(real64), public :: alone = 0
   contains
     procedure :: begin => begin_packing
+    procedure :: has_slab
     procedure :: pack => pack_variables
     procedure :: finish => finish_packing
     procedure :: check => check_packed
@@ -74,6 +75,13 @@ contains
     allocate (self%checked(0), self%expected(self%most_chunks, size(names), 0))
   end subroutine begin_packing
 
+  !> Whether a rank packs anything.
+  pure logical function has_slab(self, rank)
+    class(packing_t), intent(in) :: self
+    integer, intent(in) :: rank
+    has_slab = rank < slab_count(self%lengths)
+  end function has_slab
+
   !> Compresses and writes all chunks into the file `path`, which rank 0 has open as `new`, with the datasets in it. Collective;
   !> code 74, the same on all ranks. `finish` follows.
   subroutine pack_variables(self, store, path, new, team, error)
@@ -89,7 +97,7 @@ contains
     integer :: i
     self%is_packed = .true.
     call keep_memory(kept)
-    call self%file%open(path, .true., error)
+    if (self%has_slab(team%rank())) call self%file%open(path, .true., error)
     do i = 1, size(datasets)
       if (team%is_root() .and. .not. allocated(error)) call h5_open_dataset(new, trim(self%names(i)), datasets(i), error)
     end do

@@ -9,7 +9,7 @@ module tile_store
   use kinds, only: int64, int8, real64
   use system, only: monotonic_seconds
   use tile_order, only: new_tile_order, tile_order_t
-  use tile_record, only: new_record, record_t, is_done, values_t
+  use tile_record, only: head_bytes, is_done, new_record, record_t, values_t
   use tiles, only: tiling_t
   implicit none
   private
@@ -50,6 +50,7 @@ module tile_store
     procedure :: flush => flush_records
     procedure :: get
     procedure :: look
+    procedure :: has_done
     procedure :: drop
     procedure :: read_block
   end type tile_store_t
@@ -229,6 +230,17 @@ contains
       at = at + count
     end do
   end subroutine look
+
+  !> Whether the file marks a tile as done; its values are not read. A file that cannot be read has none.
+  logical function has_done(self, tile)
+    class(tile_store_t), intent(in) :: self
+    integer, intent(in) :: tile
+    type(error_t), allocatable :: error
+    integer(int8) :: head(head_bytes)
+    call self%file%read(head, offset_of(self, self%order%slot_of(tile)), error)
+    has_done = .not. allocated(error)
+    if (has_done) has_done = is_done(head)
+  end function has_done
 
   !> What a record holds of its tile, and the checksum of the values in it.
   subroutine assess(self, tile, bytes, state, checksum)

@@ -7,8 +7,8 @@
    MPI run. `late`: the first opening of such a file for writing takes $FAULT_AT seconds; `read`: each opening
    for reading. `slow`: each such call takes $FAULT_AT milliseconds. `unlockable`: no such file can be locked,
    as on file systems without locks. `arrive`: the first barrier of MPI without waiting takes $FAULT_AT
-   seconds, once there is such a file. The number of calls is added as a line to the file $FAULT_COUNT when
-   the process ends. */
+   seconds, once there is such a file. `reads`: reads are counted too. The number of calls is added as a line
+   to the file $FAULT_COUNT when the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -146,6 +146,23 @@ ssize_t writev(int descriptor, const struct iovec *parts, int count) {
   if (number < 0)
     die();
   return done;
+}
+
+static void count_read(int descriptor) {
+  char path[PATH_MAX];
+  if (name != NULL && action != NULL && strcmp(action, "reads") == 0 && path_of(descriptor, path) &&
+      strstr(path, name) != NULL)
+    calls++;
+}
+
+ssize_t pread(int descriptor, void *data, size_t size, off_t offset) {
+  count_read(descriptor);
+  return REAL(pread)(descriptor, data, size, offset);
+}
+
+ssize_t pread64(int descriptor, void *data, size_t size, off64_t offset) {
+  count_read(descriptor);
+  return REAL(pread64)(descriptor, data, size, offset);
 }
 
 int ftruncate(int descriptor, off_t length) {

@@ -33,12 +33,12 @@ def packed(path):
     return found
 
 
-def start(program, folder, ranks, variables):
+def start(program, folder, ranks, variables, *more):
     """Compute the map with faults; the exit code."""
     command = ["mpirun", "-n", str(ranks)] if ranks else []
     with (folder / "log").open("a") as log:
         return subprocess.run(
-            [*command, program, *RUN],
+            [*command, program, *RUN, *more],
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=log,
@@ -65,6 +65,27 @@ def test_the_same_chunks_for_any_ranks(mpi_separatrix, tmp_path, whole):
         life.succeed(mpi_separatrix, *RUN, folder=tmp_path, ranks=ranks)
         assert packed(tmp_path / life.NAME) == expected
         assert life.content_hash(tmp_path / life.NAME) == life.content_hash(whole)
+
+
+def test_a_rank_without_a_slab_leaves_the_file_alone(mpi_separatrix, faulty_calls, tmp_path):
+    """With thousands of ranks, each that syncs the file asks every server for it."""
+    life.write_case(tmp_path)
+    count = tmp_path / "count"
+    variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": NEW, "FAULT_COUNT": str(count)}
+    one_slab = ["--set", "axis[1].count=80"]
+    assert start(mpi_separatrix, tmp_path, 3, variables, *one_slab) == 0
+    assert len(count.read_text().split()) == 1
+
+
+def test_rank_0_reads_a_tile_at_most_once(mpi_separatrix, faulty_calls, tmp_path):
+    """A look at each tile before the first one would take rank 0 minutes for a million on a slow file system."""
+    life.write_case(tmp_path)
+    count = tmp_path / "count"
+    variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": f"{life.NAME}.part", "FAULT_RANK": "0"}
+    variables |= {"FAULT_COUNT": str(count), "FAULT_DO": "reads"}
+    tiles = ["--set", "axis[1].count=80", "--set", "grid.tile=[5, 5]"]
+    assert start(mpi_separatrix, tmp_path, 2, variables, *tiles) == 0
+    assert 16 * 52 < sum(map(int, count.read_text().split())) < 1.5 * 16 * 52
 
 
 @pytest.mark.parametrize(("ranks", "rank"), [(0, 0), (2, 0), (2, 1)])

@@ -28,7 +28,10 @@ class Setting(ctypes.Structure):
         ("polls_per_tile", ctypes.c_double),
         ("run", ctypes.c_double),
         ("write", ctypes.c_double),
+        ("lock", ctypes.c_double),
         ("write_tile", ctypes.c_double),
+        ("most_held", ctypes.c_long),
+        ("stripes", ctypes.c_int),
         ("seed", ctypes.c_ulonglong),
     ]
 
@@ -39,6 +42,7 @@ class _Outcome(ctypes.Structure):
         ("finish", ctypes.POINTER(ctypes.c_double)),
         ("tiles", ctypes.POINTER(ctypes.c_long)),
         ("questions", ctypes.POINTER(ctypes.c_long)),
+        ("writing", ctypes.POINTER(ctypes.c_double)),
         ("service", ctypes.c_double),
         ("writes", ctypes.c_long),
         ("longest_queue", ctypes.c_int),
@@ -49,6 +53,8 @@ class _Outcome(ctypes.Structure):
 SHARE = 0.5
 PAUSE = 100e-6
 RUN = 0.5
+# src/io/tile_store.f90: 4 MiB of records of 1024 points of the case of the packing runs
+MOST_HELD = 85
 # a message, and an answer of rank 0, on a usual cluster
 LATENCY = 5e-6
 SERVICE = 5e-6
@@ -63,12 +69,15 @@ def setting(
     polls_per_tile: float = 1024,
     share: float = SHARE,
     write: float = 0.0,
+    lock: float = 0.0,
     write_tile: float = 0.0,
+    most_held: int = MOST_HELD,
+    stripes: int = 0,
     seed: int = 1,
 ) -> Setting:
     """Return a machine and what its messages and writes take."""
-    times = (latency, service, PAUSE, polls_per_tile, RUN, write, write_tile)
-    return Setting(ranks, ranks_per_node, share, *times, seed)
+    times = (latency, service, PAUSE, polls_per_tile, RUN, write, lock, write_tile)
+    return Setting(ranks, ranks_per_node, share, *times, most_held, stripes, seed)
 
 
 @dataclass
@@ -79,6 +88,7 @@ class Outcome:
     finish: np.ndarray
     tiles: np.ndarray
     questions: np.ndarray
+    writing: np.ndarray
     service: float
     writes: int
     longest_queue: int
@@ -130,14 +140,15 @@ class Model:
         """Hand out tiles of these costs, seconds in the order of the map."""
         order = handed_out(len(costs)) if spread else slice(None)
         costs = np.ascontiguousarray(costs[order], dtype=np.float64)
-        busy, finish = np.zeros(machine.ranks), np.zeros(machine.ranks)
+        busy, finish, writing = (np.zeros(machine.ranks) for _ in range(3))
         tiles, questions = np.zeros(machine.ranks, np.int64), np.zeros(machine.ranks, np.int64)
         raw = _Outcome(
             busy.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
             finish.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
             tiles.ctypes.data_as(ctypes.POINTER(ctypes.c_long)),
             questions.ctypes.data_as(ctypes.POINTER(ctypes.c_long)),
+            writing.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
         )
         if self.entry(ctypes.byref(machine), len(costs), costs, ctypes.byref(raw)):
             raise MemoryError("the model of the scheduler")
-        return Outcome(busy, finish, tiles, questions, raw.service, raw.writes, raw.longest_queue)
+        return Outcome(busy, finish, tiles, questions, writing, raw.service, raw.writes, raw.longest_queue)

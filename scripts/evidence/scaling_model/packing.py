@@ -76,11 +76,25 @@ class Packing:
         points = self.runs[-1][0].points
         return RANKS * (self.middle(-1, "packed") - self.middle(-1, "alone")) / points
 
+    @property
+    def constants(self) -> Constants:
+        """What other maps need."""
+        return Constants(self.fixed, self.alone_per_point, self.shared_per_point)
+
+
+@dataclass
+class Constants:
+    """Seconds of rank 0 alone, of it for each point of a map, and of a rank for each point that it packs."""
+
+    fixed: float
+    alone: float
+    shared: float
+
     def seconds(self, points: float, ranks: int) -> float:
         """What so many ranks would take for such a map: whole slabs, in rounds of one for each rank."""
         slabs = math.ceil(points / SLAB)
         packed = min(points / slabs, SLAB) * math.ceil(slabs / ranks)
-        return self.fixed + points * self.alone_per_point + packed * self.shared_per_point
+        return self.fixed + points * self.alone + packed * self.shared
 
 
 def seconds_of(words: str) -> float:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import file_report
 import memory
 import model
 import packing
@@ -20,6 +21,7 @@ import simulation
 from costs import spread_of
 from evidence_rows import processor, table
 from runs import POINTS_PER_TILE, X0_COUNT, Run
+from storage import Storage
 
 if TYPE_CHECKING:
     from scaling import Results
@@ -32,6 +34,7 @@ BAR_MEMORY = 1.1
 """Largest over smallest peak that counts as constant."""
 MIB = 2**20
 JOBS_BEGIN, JOBS_END = "<!-- jobs -->", "<!-- /jobs -->"
+PARTS_BEGIN, PARTS_END = "<!-- parts -->", "<!-- /parts -->"
 MOST_TILES = 2**20
 """Of src/config/case_setup.f90."""
 
@@ -191,6 +194,14 @@ class KeptJobs:
     mean: float
     jobs: dict[int, list[float]]
     made: str
+    parts: str
+    packing: packing.Constants
+
+
+def parts_text(parts: dict[int, simulation.Parts], storage: Storage) -> str:
+    """Return what the parts of the stated job take, and the rates."""
+    tables = [file_report.parts_table(parts), file_report.storage_table(storage)]
+    return "\n\n".join([*tables, file_report.storage_text(storage)])
 
 
 def jobs_made(found: packing.Packing, version: dict[str, str]) -> str:
@@ -204,8 +215,8 @@ def jobs_made(found: packing.Packing, version: dict[str, str]) -> str:
     )
 
 
-def jobs_section(jobs: dict[int, list[float]], mean: float, before: simulation.Before, made: str) -> str:
-    """Return the table of whole jobs with what it was made from."""
+def jobs_table(jobs: dict[int, list[float]], mean: float) -> str:
+    """Return the efficiencies of whole jobs."""
     means = (mean, *simulation.JOB_TILE_SECONDS)
     header = ["mean time of a tile (of the tiles of a rank)"]
     header += [f"{number(ranks)} ranks" for ranks in jobs]
@@ -220,6 +231,23 @@ def jobs_section(jobs: dict[int, list[float]], mean: float, before: simulation.B
         f"* {number(ranks)} ranks: {reached(jobs[ranks], bar, means)}"
         for ranks, bar in simulation.JOB_RANKS.items()
     ]
+    return "\n".join([table(header, rows), "", *lines])
+
+
+def with_jobs(page: str, jobs: dict[int, list[float]], parts: str) -> str:
+    """Return a page with other efficiencies of whole jobs and parts of one of them, the rest as it was."""
+    kept = read_jobs(page)
+    before, section = page.split(JOBS_BEGIN)
+    section, after = section.split(JOBS_END)
+    begin = section[: section.index("| mean time")]
+    texts = [jobs_table(jobs, kept.mean), "", PARTS_BEGIN, parts, PARTS_END]
+    return before + JOBS_BEGIN + begin + "\n".join(texts) + "\n" + JOBS_END + after
+
+
+def jobs_section(
+    jobs: dict[int, list[float]], mean: float, before: simulation.Before, made: str, parts: str
+) -> str:
+    """Return the table of whole jobs with what it was made from; `parts`: of `parts_text`."""
     search, points = before.search, before.ranks_points
     taken = (
         f"Start {before.start:.2f} s; search {search.seconds(points):.2f} s: "
@@ -227,20 +255,26 @@ def jobs_section(jobs: dict[int, list[float]], mean: float, before: simulation.B
         f"{search.whole / search.slices:.3f} s each in the mean,\n"
         f"and {search.longest:.2f} s for the slice that takes longest (commit {before.commit})."
     )
-    return "\n".join([JOBS_BEGIN, made, "", taken, "", table(header, rows), "", *lines, JOBS_END])
+    begin = [JOBS_BEGIN, made, "", taken, "", jobs_table(jobs, mean), ""]
+    return "\n".join([*begin, PARTS_BEGIN, parts, PARTS_END, JOBS_END])
 
 
 def read_jobs(page: str) -> KeptJobs:
     """Read the section on whole jobs of a page, whose efficiencies have one digit."""
     section = page.split(JOBS_BEGIN)[1].split(JOBS_END)[0]
+    section, parts = section.split(PARTS_BEGIN)
     made = section[: section.index("Start ")].strip()
+    fixed = re.search(r"final file ([\d.]+) ms, ([\d.]+) ns of rank 0 alone .*, ([\d.]+) ns", made)
+    constants = packing.Constants(1e-3 * float(fixed[1]), 1e-9 * float(fixed[2]), 1e-9 * float(fixed[3]))
     start, search = (float(value) for value in re.findall(r"(?:Start|search) ([\d.]+) s", section))
     rows = re.findall(r"^\| ([\d.]+) s \(.*?\) \|(.*)\|$", section, re.MULTILINE)
     columns = zip(
         *([float(value.strip(" %")) / 100 for value in row.split("|")] for _, row in rows), strict=True
     )
     jobs = dict(zip(simulation.JOB_RANKS, map(list, columns), strict=True))
-    return KeptJobs(start, search, float(rows[0][0]), jobs, made)
+    return KeptJobs(
+        start, search, float(rows[0][0]), jobs, made, parts.split(PARTS_END)[0].strip(), constants
+    )
 
 
 def with_jobs_at_top(page: str) -> str:
@@ -423,8 +457,12 @@ def page(results: Results, quick: bool) -> str:
         per_tile=f"{found.bytes_per_tile:.0f}",
         per_attractor=f"{found.bytes_per_attractor / 1000:.1f}",
         jobs=jobs_section(
-            simulated.jobs, simulated.mean, simulated.before, jobs_made(results.packing, results.version)
+            simulated.jobs,
+            simulated.mean,
+            simulated.before,
+            jobs_made(results.packing, results.version),
+            parts_text(simulated.parts, simulated.storage),
         ),
-        rate=max(simulation.STORES, key=simulation.STORES.get),
+        operations=results.operations,
         conditions=conditions(results),
     )

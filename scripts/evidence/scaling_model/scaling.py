@@ -9,20 +9,35 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import file_report
 import numpy as np
 import plots
 import report
+import slow_files
 from costs import stretched
 from memory import Memory, measure
 from model import Model, setting
-from packing import Packing, time_files
+from packing import CASE, Packing, time_files
 from runs import POINTS_PER_TILE, SOURCE, TILE, Program, Replay, Run
-from simulation import TRAJECTORIES_PER_TILE, Before, Simulated, Simulation, jobs_after
+from simulation import (
+    CHUNKS_PER_SLAB,
+    RECORD_BYTES,
+    TRAJECTORIES_PER_TILE,
+    Before,
+    Simulated,
+    Simulation,
+    jobs_after,
+)
+from storage import Storage, job_of
+from traced import trace
 
 BAR = 0.9
 MOST_SECONDS = 240.0
 """Of all repetitions."""
 REPLAY_POLLS = 16
+TRACED_RANKS = (1, 2, 4, 8, 16, 32)
+SIDE, TILE_SIDE = 1024, 32
+"""Of the map whose calls are counted."""
 
 
 @dataclass
@@ -72,6 +87,8 @@ class Results:
     simulated: Simulated | None = None
     memory: Memory | None = None
     packing: Packing | None = None
+    operations: str = ""
+    """The section on calls, as it was."""
     version: dict[str, str] = field(default_factory=dict)
     load: tuple[float, float] = (0.0, 0.0)
     seconds: float = 0.0
@@ -140,7 +157,7 @@ def check_model(program: Program, model: Model, results: Results) -> None:
         results.checks.append(Check("program", ranks, per_node, found, expected))
 
 
-def only_jobs(build: Path, page: Path) -> None:
+def only_jobs(build: Path, page: Path, storage: Storage) -> None:
     """Measure what the section on whole jobs needs, and replace that section."""
     with tempfile.TemporaryDirectory(prefix="scaling-") as name:
         folder = Path(name)
@@ -148,11 +165,12 @@ def only_jobs(build: Path, page: Path) -> None:
         base = program.uneven(1, Sizes.ratios, 32 * TILE)
         packing = time_files(program, Sizes.packed, Sizes.repetitions)
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
-        simulation = Simulation(Model(folder), base.costs, mean, packing)
+        simulation = Simulation(Model(folder), base.costs, mean, packing.constants, storage)
         before = time_before(program, base, 32 * TILE)
-        jobs = simulation.whole_jobs(before)
+        jobs = simulation.whole_jobs(before.seconds)
         made = report.jobs_made(packing, program.version)
-        section = report.jobs_section(jobs, mean, before, made)
+        parts = report.parts_text(simulation.stated_jobs(), storage)
+        section = report.jobs_section(jobs, mean, before, made, parts)
     put_jobs(page, section)
 
 
@@ -164,7 +182,59 @@ def only_search(build: Path, page: Path) -> None:
         search = program.search(Sizes.ratios, 32 * TILE)
     before = Before(kept.start, search, program.version["commit"])
     jobs = jobs_after(kept.jobs, kept.mean, kept.start + kept.search, before.seconds)
-    put_jobs(page, report.jobs_section(jobs, kept.mean, before, kept.made))
+    put_jobs(page, report.jobs_section(jobs, kept.mean, before, kept.made, kept.parts))
+
+
+def only_model(build: Path, page: Path, storage: Storage) -> None:
+    """Simulate the whole jobs again, with the durations that the page has and the shape of costs now."""
+    kept = report.read_jobs(page.read_text())
+    with tempfile.TemporaryDirectory(prefix="scaling-") as name:
+        program = Program(build, Path(name))
+        # the least of some: other work on the machine would make the costs more even
+        runs = [program.uneven(1, QUICK.ratios, 32 * TILE).costs for _ in range(Sizes.repetitions)]
+        costs = np.min(runs, axis=0)
+        simulation = Simulation(Model(Path(name)), costs, kept.mean, kept.packing, storage)
+        jobs = simulation.whole_jobs(kept.start + kept.search)
+        parts = report.parts_text(simulation.stated_jobs(), storage)
+    page.write_text(report.with_jobs_at_top(report.with_jobs(page.read_text(), jobs, parts)))
+
+
+def only_operations(build: Path, page: Path) -> None:
+    """Count the calls on files here, time runs on a slow file system, and replace the section on them."""
+    load = os.getloadavg()[0]
+    words = ["--set", f"axis[1].count={SIDE}", "--set", f"axis[2].count={SIDE}"]
+    words += ["--set", f"grid.tile=[{TILE_SIDE}, {TILE_SIDE}]"]
+    tiles = (SIDE // TILE_SIDE) ** 2
+    with tempfile.TemporaryDirectory(prefix="scaling-") as name:
+        program = Program(build, Path(name))
+        model = Model(Path(name))
+        jobs = {
+            ranks: job_of(ranks, tiles, SIDE**2, CHUNKS_PER_SLAB, ranks)
+            for ranks in {*TRACED_RANKS, *slow_files.RANKS}
+        }
+        traced = []
+        for ranks in TRACED_RANKS:
+            progress(f"the calls of {ranks} ranks")
+            run = trace(program, ranks, CASE, *words)
+            writes = model.run(setting(ranks, ranks), run.costs).writes
+            traced.append((run, jobs[ranks], writes))
+        slow = []
+        if Path("/dev/fuse").exists():
+            progress("a slow file system")
+            slow = slow_files.compare(program, model, words, {n: jobs[n] for n in slow_files.RANKS})
+        section = file_report.section(traced, slow, RECORD_BYTES, program.version["commit"], load)
+    before, rest = page.read_text().split(file_report.BEGIN)
+    page.write_text(before + section + rest.split(file_report.END)[1])
+    print(section)
+
+
+def operations_of(page: Path) -> str:
+    """Return the section on calls of a page that exists."""
+    if page.exists() and file_report.BEGIN in (text := page.read_text()):
+        return (
+            file_report.BEGIN + text.split(file_report.BEGIN)[1].split(file_report.END)[0] + file_report.END
+        )
+    return f"{file_report.BEGIN}\n{file_report.END}"
 
 
 def time_before(program: Program, base: Run, v0_count: int) -> Before:
@@ -190,15 +260,29 @@ def main() -> None:
     parser.add_argument(
         "--search", action="store_true", help="only the search for attractors of that section"
     )
+    parser.add_argument("--model", action="store_true", help="only the simulation of whole jobs")
+    parser.add_argument("--operations", action="store_true", help="only the section on calls on files")
+    parser.add_argument("--storage", action="append", default=[], metavar="NAME=VALUE", help="another rate")
     options = parser.parse_args()
+    try:
+        storage = Storage().other(options.storage)
+    except ValueError as error:
+        parser.error(str(error))
+    if options.operations:
+        only_operations(options.build, options.output)
+        return
+    if options.model:
+        only_model(options.build, options.output, storage)
+        return
     if options.search:
         only_search(options.build, options.output)
         return
     if options.jobs:
-        only_jobs(options.build, options.output)
+        only_jobs(options.build, options.output, storage)
         return
     began = time.perf_counter()
     results = Results(QUICK if options.quick else Sizes(), ranks_here())
+    results.operations = operations_of(options.output)
     before = os.getloadavg()[0]
     with tempfile.TemporaryDirectory(prefix="scaling-") as name:
         folder = Path(name)
@@ -214,9 +298,9 @@ def main() -> None:
         progress("simulating up to 100 000 ranks")
         base = results.base
         mean = float(base.costs.mean()) * TRAJECTORIES_PER_TILE / POINTS_PER_TILE
-        results.simulated = Simulation(model, base.costs, mean, results.packing).everything(
-            BAR, time_before(program, base, results.v0_count)
-        )
+        results.simulated = Simulation(
+            model, base.costs, mean, results.packing.constants, storage
+        ).everything(BAR, time_before(program, base, results.v0_count))
         progress("memory")
         sizes = results.sizes
         results.memory = measure(program, sizes.whole, sizes.started, sizes.tiles, sizes.slices)

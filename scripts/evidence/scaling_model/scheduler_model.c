@@ -28,6 +28,8 @@ struct node {
 struct rank {
   long next, last; /* positions of its run, from 0; empty if last < next */
   long held;       /* tiles done and not written */
+  long pieces;     /* that they are in the file: each is written by a call */
+  long done;       /* position after the last tile done */
   double written;  /* when it wrote last */
   int waits;       /* its last tile is accounted for */
 };
@@ -43,6 +45,7 @@ struct model {
   long events, room;
   int *queue; /* nodes whose questions rank 0 has not answered yet */
   int queued, poll_due;
+  double *stripe_free; /* from when on each stripe of the file can be written */
   double root_begin, root_cost, serving_until;
   int root_idle;
   unsigned long long random;
@@ -124,16 +127,26 @@ static void take_run(struct model *m, int rank, struct node *pool) {
   pool->next += count;
 }
 
-/* Writes what a rank holds, in one call, and returns when it is done. */
+/* Writes what a rank holds, neighbours in one call, and returns when it is done. A stripe is locked by one
+ * rank at a time; the calls of a rank follow one another in one stripe. */
 static double write_tiles(struct model *m, double time, int rank) {
+  const struct scheduler_setting *setting = m->setting;
   struct rank *own = &m->own[rank];
   if (own->held == 0)
     return time;
-  time += m->setting->write + (double)own->held * m->setting->write_tile;
-  m->outcome->writes++;
+  double start = time + (double)own->pieces * setting->write;
+  double *stripe = setting->stripes > 0 ? &m->stripe_free[(int)(uniform(m) * setting->stripes)] : NULL;
+  if (stripe && *stripe > start)
+    start = *stripe;
+  double end = start + (double)own->pieces * setting->lock + (double)own->held * setting->write_tile;
+  if (stripe)
+    *stripe = end;
+  m->outcome->writes += own->pieces;
+  m->outcome->writing[rank] += end - time;
   own->held = 0;
-  own->written = time;
-  return time;
+  own->pieces = 0;
+  own->written = end;
+  return end;
 }
 
 static double pause_end(struct model *m, double time) { return time + m->setting->pause * uniform(m); }
@@ -191,9 +204,11 @@ static void rank_free(struct model *m, double time, int rank) {
     return;
   }
   if (own->waits) {
+    own->pieces += own->held == 0 || own->next - 1 != own->done;
+    own->done = own->next;
     own->held++;
     own->waits = 0;
-    if (time - own->written >= m->setting->run)
+    if (time - own->written >= m->setting->run || own->held == m->setting->most_held)
       time = write_tiles(m, time, rank);
   }
   if (own->next > own->last)
@@ -258,7 +273,8 @@ static int set_up(struct model *m, long tiles) {
   m->next_waiting = calloc((size_t)ranks, sizeof *m->next_waiting);
   m->queue = calloc((size_t)nodes, sizeof *m->queue);
   m->heap = calloc((size_t)m->room, sizeof *m->heap);
-  if (!m->nodes || !m->own || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
+  m->stripe_free = calloc((size_t)m->setting->stripes + 1, sizeof *m->stripe_free);
+  if (!m->stripe_free || !m->nodes || !m->own || !m->node_of || !m->next_waiting || !m->queue || !m->heap)
     return 1;
   for (int i = 0; i < nodes; i++) {
     int first = i * per_node, size = per_node < ranks - first ? per_node : ranks - first;
@@ -301,6 +317,7 @@ int simulate(const struct scheduler_setting *setting, long tiles, const double *
   free(m.node_of);
   free(m.next_waiting);
   free(m.queue);
+  free(m.stripe_free);
   free(m.heap);
   return status;
 }

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from costs import tiles_for
 from model import Model, Outcome, setting
-from packing import Packing
+from packing import Constants
 from runs import Search
+from storage import Storage, job_of, times
 
 RANKS_PER_NODE = 128
 SPREADS = (1, 10, 100, 1000)
@@ -32,6 +33,12 @@ JOB_RANKS = {1000: 0.9, 10_000: 0.9, 100_000: 0.8}
 JOB_TILE_SECONDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 RECORD_BYTES = 48 * TRAJECTORIES_PER_TILE + 16
 """A tile in the working file of the case of the packing runs."""
+
+
+CHUNKS_PER_SLAB = 52
+"""Of the case of the packing runs: 13 variables, 4 chunks of each."""
+STATED = 2.0
+"""Seconds of a tile of the job whose parts are shown."""
 
 
 @dataclass
@@ -64,6 +71,28 @@ class Simulated:
     """ranks: efficiency of whole jobs for the mean and each of JOB_TILE_SECONDS"""
     before: "Before"
     """What is before the first tile of a whole job."""
+    parts: dict[int, "Parts"]
+    """ranks: of the job with tiles of STATED seconds"""
+    storage: Storage
+
+
+@dataclass
+class Parts:
+    """Seconds of a whole job without its start and search, and what it asks of its working file."""
+
+    busy: float
+    """Of a rank in tiles, mean; the next two as well."""
+    writing: float
+    idle: float
+    seconds: dict[str, float]
+    """Of the parts before and after the tiles."""
+    writes_per_second: float
+    """Of all ranks, into the working file."""
+
+    @property
+    def total(self) -> float:
+        """Of all parts."""
+        return self.busy + self.writing + self.idle + sum(self.seconds.values())
 
 
 @dataclass
@@ -98,37 +127,66 @@ def jobs_after(jobs: dict[int, list[float]], mean: float, old: float, new: float
 class Simulation:
     """The model with the measured costs."""
 
-    def __init__(self, model: Model, costs: np.ndarray, mean: float, packing: Packing) -> None:
+    def __init__(
+        self, model: Model, costs: np.ndarray, mean: float, packing: Constants, storage: Storage
+    ) -> None:
         self.model, self.costs, self.mean, self.packing = model, costs, mean, packing
+        self.storage = storage
 
     def efficiency(self, ranks: int, per_rank: int, spread: float, *, mean: float = 0, **more) -> float:
         """Efficiency of a map with so many tiles per rank."""
         machine, tiles = self.problem(ranks, per_rank, spread, mean or self.mean, **more)
         return self.model.run(machine, tiles).efficiency
 
-    def stored(self, ranks: int, rate: float, mean: float = 0) -> Outcome:
+    def stored(self, ranks: int, rate: float) -> Outcome:
         """Run a map of the usual size and the bar's spread whose ranks share a rate of writing."""
-        times = {"write": CALL, "write_tile": RECORD_BYTES * ranks / rate}
-        return self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, mean or self.mean, **times))
+        slow = {"write": CALL, "write_tile": RECORD_BYTES * ranks / rate}
+        return self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, self.mean, **slow))
 
-    def with_file(self, ranks: int, rate: float, mean: float = 0, before: float = 0) -> float:
-        """Efficiency with writing and the final file, for which the tiles are read back at the same rate.
+    def with_file(self, ranks: int, rate: float) -> float:
+        """Efficiency with writing and the final file, for which the tiles are read back at the same rate."""
+        found = self.stored(ranks, rate)
+        finish = self.packing.seconds(ranks * USUAL * TRAJECTORIES_PER_TILE, ranks)
+        finish += ranks * USUAL * RECORD_BYTES / rate
+        return float(found.busy.sum() / (ranks * (found.makespan + finish)))
+
+    def parts(self, ranks: int, mean: float) -> Parts:
+        """Return what a whole job takes after its search, with all calls on its files."""
+        storage = self.storage
+        one = RECORD_BYTES * storage.stripes / storage.bytes_per_second
+        stripes = {"lock": storage.lock, "write_tile": one, "stripes": int(storage.stripes)}
+        found = self.model.run(*self.problem(ranks, USUAL, BAR_SPREAD, mean, **stripes))
+        points = ranks * USUAL * TRAJECTORIES_PER_TILE
+        job = job_of(ranks, ranks * USUAL, points, CHUNKS_PER_SLAB, RANKS_PER_NODE)
+        waits = times(job, storage, RECORD_BYTES)
+        busy, writing = float(found.busy.mean()), float(found.writing.mean())
+        seconds = {
+            "working file: created, opened by all ranks": waits.begin,
+            "final file: tiles read": waits.tiles_read,
+            "final file: compressed, offsets taken by rank 0": self.packing.seconds(points, ranks),
+            "final file: chunks reserved by rank 0": waits.reserved,
+            "final file: chunks written": waits.chunks_written,
+            "final file: synchronised": waits.synced,
+            "final file: read back": waits.read_back,
+            "final file: small objects, names": waits.end,
+        }
+        idle = found.makespan - busy - writing
+        return Parts(busy, writing, idle, seconds, found.writes / found.makespan)
+
+    def whole_jobs(self, before: float) -> dict[int, list[float]]:
+        """Efficiency of whole jobs: for each number of ranks the measured mean, then JOB_TILE_SECONDS.
 
         `before`: seconds before the first tile.
         """
-        found = self.stored(ranks, rate, mean)
-        finish = self.packing.seconds(ranks * USUAL * TRAJECTORIES_PER_TILE, ranks)
-        finish += ranks * USUAL * RECORD_BYTES / rate
-        return float(found.busy.sum() / (ranks * (before + found.makespan + finish)))
+        found = {}
+        for ranks in JOB_RANKS:
+            parts = [self.parts(ranks, mean) for mean in (self.mean, *JOB_TILE_SECONDS)]
+            found[ranks] = [one.busy / (before + one.total) for one in parts]
+        return found
 
-    def whole_jobs(self, before: Before) -> dict[int, list[float]]:
-        """Efficiency of whole jobs: for each number of ranks the measured mean, then JOB_TILE_SECONDS."""
-        rate = max(STORES.values())
-        means = (self.mean, *JOB_TILE_SECONDS)
-        return {
-            ranks: [self.with_file(ranks, rate, mean, before.seconds) for mean in means]
-            for ranks in JOB_RANKS
-        }
+    def stated_jobs(self) -> dict[int, Parts]:
+        """Return the parts of the jobs with tiles of STATED seconds."""
+        return {ranks: self.parts(ranks, STATED) for ranks in JOB_RANKS}
 
     def problem(self, ranks: int, per_rank: int, spread: float, mean: float, **more):
         """Return the machine and the tiles."""
@@ -174,6 +232,8 @@ class Simulation:
             questions=int(many.questions.sum()),
             longest_queue=many.longest_queue,
             least_tiles=self.least_tiles(bar),
-            jobs=self.whole_jobs(before),
+            jobs=self.whole_jobs(before.seconds),
             before=before,
+            parts=self.stated_jobs(),
+            storage=self.storage,
         )
