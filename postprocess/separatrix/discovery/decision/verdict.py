@@ -323,6 +323,8 @@ def _records(findings: Findings) -> list[dict]:
             )
             if one.sensor_noise:
                 found[-1]["sensors"] = one.sensor_noise
+            if findings.context.options.compare == "force":
+                found[-1]["deviation"] = float(np.sqrt(np.mean(one.deviation(slice(None)) ** 2)))
     return found
 
 

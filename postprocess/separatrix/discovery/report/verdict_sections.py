@@ -200,6 +200,7 @@ def _compared(verdict: dict) -> Section:
             one["use"],
             str(one["samples"]),
             number(one["sigma"], 3),
+            *([number(one["deviation"], 3)] if "deviation" in one else []),
             number(one["resolution"], 3),
             *_drive(one),
         ]
@@ -211,7 +212,11 @@ def _compared(verdict: dict) -> Section:
             "record",
             "use",
             "samples",
-            f"noise ({unit})",
+            *(
+                [f"noise of the sensor ({unit})", f"with that of mass times acceleration ({unit})"]
+                if any("deviation" in one for one in verdict["records"])
+                else [f"noise ({unit})"]
+            ),
             f"resolution ({unit})",
             "drive (rad/s)",
             "crank angle",
