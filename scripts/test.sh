@@ -11,6 +11,10 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+# Where nothing keeps compiled modules, every process of Python compiles NumPy and SciPy again: 3 s each.
+unset PYTHONDONTWRITEBYTECODE
+export PYTHONPYCACHEPREFIX=$PWD/build/pycache
+
 chosen="not long"
 names=()
 for argument in "$@"; do

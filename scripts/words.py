@@ -46,10 +46,15 @@ def files(paths: list[str]) -> list[Path]:
 
 def found_in(text: str, listed: list[tuple[re.Pattern, str]]) -> list[tuple[int, str, str]]:
     """Line, word and what to write instead, of each word in a text."""
+    # most texts have none of them: lines are searched only for words that are among those of the text
+    words = "\n".join(sorted(set(re.findall("[a-z]+", text.lower()))))
+    somewhere = [one for one in listed if one[0].search(words)]
+    if not somewhere:
+        return []
     return [
         (number, match.group(0), instead)
         for number, line in enumerate(text.splitlines(), 1)
-        for pattern, instead in listed
+        for pattern, instead in somewhere
         for match in pattern.finditer(OLD_NAMES.sub("", line))
     ]
 
