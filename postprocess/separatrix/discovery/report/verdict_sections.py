@@ -207,22 +207,11 @@ def _compared(verdict: dict) -> Section:
         for one in verdict["records"]
     ]
     unit = verdict["units"]["force" if verdict["compared"] == "force" else "position"]
-    table = Table(
-        [
-            "record",
-            "use",
-            "samples",
-            *(
-                [f"noise of the sensor ({unit})", f"with that of mass times acceleration ({unit})"]
-                if any("deviation" in one for one in verdict["records"])
-                else [f"noise ({unit})"]
-            ),
-            f"resolution ({unit})",
-            "drive (rad/s)",
-            "crank angle",
-        ],
-        rows,
-    )
+    noises = [f"noise ({unit})"]
+    if any("deviation" in one for one in verdict["records"]):
+        noises = [f"noise of the sensor ({unit})", f"with that of mass times acceleration ({unit})"]
+    head = ["record", "use", "samples", *noises, f"resolution ({unit})", "drive (rad/s)", "crank angle"]
+    table = Table(head, rows)
     return Section(
         "compared",
         "What was compared",
