@@ -3,7 +3,12 @@
 """Many short segments of a motion by libseparatrix, with their derivatives (docs/library.md)."""
 
 import ctypes
-from dataclasses import dataclass
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +18,33 @@ from separatrix.errors import CaseError
 __all__ = ["Impacts", "Segments"]
 
 _IMPACT_NUMBERS = 5
+# fewer segments than this are not worth a thread
+_FEWEST_OF_A_THREAD = 4
+
+
+@dataclass(frozen=True)
+class _Threads:
+    """Threads that fly segments, and how many they are."""
+
+    pool: ThreadPoolExecutor
+    count: int
+
+
+_THREADS: ContextVar[_Threads | None] = ContextVar("threads", default=None)
+
+
+@contextmanager
+def flown_in_threads(count: int) -> Iterator[None]:
+    """Segments that are flown within are shared out to so many threads; the results have the same bits."""
+    if count == 1:
+        yield
+        return
+    with ThreadPoolExecutor(count) as pool:
+        token = _THREADS.set(_Threads(pool, count))
+        try:
+            yield
+        finally:
+            _THREADS.reset(token)
 
 
 @dataclass(frozen=True)
@@ -119,6 +151,57 @@ def propagate(
     `directions` None: without derivatives. `force` is the interval [s] and the samples [N] of a measured
     force; no samples: that of the case.
     """
+
+    def fly(part: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Segments:
+        return _propagated(handle, chosen, directions, part, force, sample_numbers, tolerance)
+
+    threads = _THREADS.get()
+    parts = [starts] if threads is None else _shared_out(starts, threads.count)
+    return fly(starts) if len(parts) == 1 else _joined(list(threads.pool.map(fly, parts)))
+
+
+def _shared_out(starts: tuple[np.ndarray, np.ndarray, np.ndarray], count: int) -> list[tuple]:
+    """Return starts, first samples and times in at most so many parts of about as many samples."""
+    start, first, times = starts
+    count = max(1, min(count, len(start) // _FEWEST_OF_A_THREAD))
+    ends = np.unique(np.searchsorted(first, np.linspace(0, times.size, count + 1)[1:-1]))
+    bounds = [0, *ends[(ends > 0) & (ends < len(start))], len(start)]
+    return [
+        (start[a:b], first[a : b + 1] - first[a], times[first[a] : first[b]]) for a, b in pairwise(bounds)
+    ]
+
+
+def _joined(parts: list[Segments]) -> Segments:
+    """Return the segments of all parts, one after the other."""
+    counts = np.cumsum([0, *(len(one.reason) for one in parts[:-1])], dtype=np.int32)
+    impacts = [
+        replace(one.impact, segment=one.impact.segment + before)
+        for one, before in zip(parts, counts, strict=True)
+    ]
+
+    def together(name: str, of: list) -> np.ndarray:
+        return np.concatenate([getattr(one, name) for one in of])
+
+    return Segments(
+        together("motion", parts),
+        None if parts[0].jacobian is None else together("jacobian", parts),
+        together("impacts", parts),
+        Impacts(*(together(one.name, impacts) for one in fields(Impacts))),
+        together("steady", parts),
+        together("reason", parts),
+    )
+
+
+def _propagated(
+    handle: ctypes.c_void_p,
+    chosen: tuple[int, ctypes.Array, ctypes.Array],
+    directions: np.ndarray | None,
+    starts: tuple[np.ndarray, np.ndarray, np.ndarray],
+    force: list,
+    sample_numbers: int,
+    tolerance: float,
+) -> Segments:
+    """Fly them in one call of the library."""
     start, first, times = starts
     interval, series = force
     rows, count = sample_numbers, len(start)

@@ -57,6 +57,7 @@ def discover(
     quick: bool = False,
     seed: int = 1,
     time_limit: float | None = None,
+    workers: int = 1,
     progress: bool | Report | None = None,
 ) -> Discovery:
     """Find where records and a case disagree, name the missing effect or abstain, and add it to the case.
@@ -83,6 +84,8 @@ def discover(
     time_limit
         Seconds after which the search ends with the best verdict so far, which is not tested to the end. An
         error where nothing may be named yet.
+    workers
+        Threads that share the segments, which do not change the verdict.
     progress
         As for `basin`; what is counted are thousandths of the work.
 
@@ -109,7 +112,7 @@ def discover(
     with Progress(progress) as report:
         options = Options(
             seed=seed, quick=quick, partial=partial, candidates=tuple(effects) if effects else None,
-            compare=compare, time_limit=time_limit,
+            compare=compare, time_limit=time_limit, workers=workers,
             progress=lambda stage, done: report("steps", round(1000 * done), 1000),
         )  # fmt: skip
         if out is not None:

@@ -84,6 +84,7 @@ def _run(chosen: argparse.Namespace) -> None:
         segment_periods=chosen.segment_periods,
         segment_seconds=chosen.segment_seconds,
         time_limit=chosen.time_limit,
+        workers=chosen.workers,
         candidates=chosen.effects and tuple(chosen.effects),
         progress=(lambda stage, done: None) if chosen.quiet else Progress(),
     )
@@ -226,6 +227,13 @@ def _parser() -> Parser:
         metavar="S",
         type=positive,
         help="end the search after so many seconds with the best verdict so far, marked as such",
+    )
+    parser.add_argument(
+        "--workers",
+        metavar="N",
+        type=whole_number(1),
+        default=1,
+        help="threads that share the segments, which do not change the verdict [1]",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument("--version", action="version", version=f"separatrix-discover {__version__}")

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from separatrix.checks import count
 from separatrix.discovery.policy.row import row
 from separatrix.errors import USAGE, SeparatrixError
 
@@ -32,6 +33,8 @@ class Options:
     partial: bool = False
     # seconds after which the search ends with what it knows; None = no limit
     time_limit: float | None = None
+    # threads that fly segments, which do not change the verdict
+    workers: int = 1
     # None = the whole catalogue
     candidates: tuple[str, ...] | None = None
     # fmt: off
@@ -70,3 +73,4 @@ class Options:
         """Refuse what cannot be compared."""
         if self.compare not in COMPARED:
             raise SeparatrixError(f"compare: found '{self.compare}', allowed {' and '.join(COMPARED)}", USAGE)
+        count("workers", self.workers)

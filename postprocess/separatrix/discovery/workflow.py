@@ -23,6 +23,7 @@ from separatrix.discovery.options import Options
 from separatrix.discovery.policy import RECORDS
 from separatrix.errors import STOPPED, USAGE, SeparatrixError
 from separatrix.library import Model
+from separatrix.segments import flown_in_threads
 
 
 def discover(
@@ -63,7 +64,7 @@ def investigate(
     data = seen.gather(prepared[0], options)
     predicted = seen.gather(prepared[1], options) if held_out else None
     limit = TimeLimit(began + (options.time_limit or np.inf))
-    with kept(limit):
+    with kept(limit), flown_in_threads(options.workers):
         fitted = _fitted_base(data, predicted, seen, options)
         scales = seen.scales(data, fitted)
         found = search(SearchState(SearchContext(data, predicted, scales, options, limit=limit), fitted))

@@ -10,6 +10,7 @@ from separatrix.discovery.decision.rounds import SearchContext
 from separatrix.discovery.decision.scoring import ScoredCandidate
 from separatrix.discovery.decision.stages import function_of_name as functions
 from separatrix.discovery.decision.state import Decision, SearchState
+from separatrix.discovery.fitting.shapes import closed_forms
 from separatrix.discovery.options import Options
 
 
@@ -43,3 +44,28 @@ def test_a_form_that_its_function_refutes_leads_only_where_it_predicts_better(
     assert (given.outcome, [one.name for one in given.accepted]) == ("ambiguous", [first])
     assert [one.name for one in given.rivals] == [{form.name: table, table.name: form}[first].name]
     assert "has another form than restitution_slope" in given.reasons[-1]
+
+
+@pytest.mark.parametrize(("falloff", "size", "alike"), [
+    # of a power, of a line; then as precise that the bend decides
+    (0.2, 30.0, ["power", "exponential", "viscoelastic"]),
+    (None, 30.0, ["power", "exponential", "viscoelastic"]),
+    (0.2, 1e4, []),
+    (None, 1e4, []),
+])  # fmt: skip
+def test_a_line_that_a_power_follows_as_well_is_not_named_without_a_word(falloff, size, alike):
+    """Of both truths: where the values do not distinguish them, the other form is in the reasons."""
+    at = np.linspace(0.5, 4, 8)
+    value = 0.7 - 0.03 * at if falloff is None else 0.7 * at**-falloff
+    best = ScoredCandidate(SimpleNamespace(names=("restitution_slope",)), None, 0.0, 0.0, np.zeros(0), 1)
+    rows = size * np.eye(8)
+    forms = closed_forms("restitution_curve", at, value, rows, rows @ value)
+    member = SimpleNamespace(family="restitution over impact speed")
+    function = SimpleNamespace(forms=forms, member=member)
+    decision = Decision("named", [best], [], [], [], None, None, function=function)
+    state = SearchState(SearchContext(None, None, None, Options()), best.fitted, decision=decision)
+    assert functions.forms_alike(state) == alike
+    if alike:
+        given = functions.form_in_doubt(state).decision
+        assert (given.outcome, given.accepted) == ("named", [best])
+        assert "from the power or exponential or viscoelastic form" in given.reasons[-1]

@@ -97,6 +97,24 @@ def test_derivatives_of_residuals(tmp_path: Path) -> None:
         assert np.quantile(error, 0.9) < 1e-3 * np.max(np.abs(numeric)), one.path
 
 
+def test_an_impact_beside_a_sample_is_no_acceleration(tmp_path: Path) -> None:
+    """Moved past the samples by a barrier that moves, it never shows as a jump of the speed over no time."""
+    case_of(tmp_path, "", ("a", "phi"))
+    model, data = data_of(tmp_path)
+    free = data.unknowns(model)
+    paths, values = [one.path for one in free], np.array([one.value for one in free])
+    problem, largest = data.problem(model, 1, free), []
+    for shift in np.linspace(0, 2e-3, 12):
+        moved = values + shift * (np.array(paths) == "contact.upper")
+        whole = problem.evaluate(moved, data.smoothed_starts(1), derivatives=False)
+        assert whole.hits.sum() > 5
+        # of the first sensor
+        residual = whole.residual[~whole.failed, : problem.segments.inside.shape[1]]
+        largest.append(np.abs(residual).max())
+    # as a jump it would be 19000 noises
+    assert max(largest) < 50
+
+
 def test_pulses_show_the_zero(tmp_path: Path) -> None:
     """A pulse somewhere on the turn: where is found from the motion of the body."""
     case_of(tmp_path, "", ("x", "pulse"))

@@ -26,7 +26,7 @@ from separatrix.discovery.measured.records import make_record
 from separatrix.discovery.options import Options
 from separatrix.discovery.report import comparison
 from separatrix.discovery.report.document import write_report
-from separatrix.discovery.report.loop_figures import loops
+from separatrix.discovery.report.loop_figures import loops, periods_of
 from separatrix.discovery.report.phrases import PHRASES, explained
 from separatrix.discovery.report.verdict_sections import sections
 from separatrix.discovery.workflow import investigate
@@ -434,17 +434,48 @@ def test_numbers_of_the_rig_have_no_key() -> None:
 
 
 def test_records_of_a_force_have_their_loops(tmp_path: Path) -> None:
+    """One period each, and what the machines leave of the force in it."""
     make(tmp_path, "named")
     with h5py.File(tmp_path / "details.h5", "a") as file:
         assert loops(file) is None
         file.attrs["compared"], file.attrs["force_unit"] = "force", "N"
         shown = [file[f"{use}/{name}"] for use, name in (("training", "f0"), ("held_out", "f1"))]
         for group in (*file["records"].values(), *(one[stage] for one in shown for stage in one)):
-            group["force"] = 3 * group["x"][:] + np.sin(12 * group["t"][:])
+            t, x = group["t"][:], np.cos(12 * group["t"][:])
+            group["x"][:] = x
+            group["force"] = 3 * x + np.sin(12 * t)
+        for group in shown:
+            group["before/force"][:] += 0.5
         axes = loops(file).axes
-        assert [ax.get_title(loc="left") for ax in axes] == ["f0, training", "f1, held out"]
-        for ax, name in zip(axes, ("f0", "f1"), strict=True):
-            measured, before, after = ax.lines
-            np.testing.assert_array_equal(measured.get_ydata(), file[f"records/{name}/force"][:])
-            # a segment does not run on into the next one
-            assert all(np.isnan(one.get_ydata()).sum() == 11 for one in (before, after))
+        assert [ax.get_title(loc="left").rpartition(",")[0] for ax in axes[:2]] == [
+            "f0, training", "f1, held out",
+        ]  # fmt: skip
+        for top, bottom in zip(axes[:2], axes[2:], strict=True):
+            x, force = top.lines[0].get_data()
+            # a loop from the middle, three of four samples of which are far from where it began
+            assert 10 < x.size < 100
+            assert np.ptp(x) > 1.9
+            assert np.ptp(force) > 5.9
+            missed = [line.get_ydata() for line in bottom.lines[:2]]
+            assert missed[0] == pytest.approx(-0.5, abs=0.02)
+            assert missed[1] == pytest.approx(0, abs=0.02)
+
+
+def test_periods_of_a_motion_are_between_its_turns() -> None:
+    """Noise about the middle is no passage; a motion without two is one piece."""
+    t = np.linspace(0, 10, 5001)
+    x = 0.3 + np.sin(2 * np.pi * t) + 0.05 * np.random.default_rng(1).normal(size=t.size)
+    found = np.array(periods_of(t, x))
+    assert len(found) == 8
+    assert np.diff(found, axis=1) == pytest.approx(1, abs=0.05)
+    assert periods_of(t, t) == [(0, 10)]
+
+
+def test_noise_of_a_force_is_of_its_sensor_and_of_mass_times_acceleration() -> None:
+    reported = verdict("named")
+    for one in reported["records"]:
+        one["deviation"] = 0.0375
+    table = next(one for one in sections(reported) if one.key == "compared").body[1]
+    at = table.head.index(next(name for name in table.head if name.startswith("with that of mass")))
+    assert [row[at] for row in table.rows] == ["0.0375"] * len(reported["records"])
+    assert len(table.head) == len(table.rows[0])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hidden_bodies import Sprung, flown
 from separatrix.library import CaseError, Model
+from separatrix.segments import flown_in_threads
 from structures import Friction, Rigid, Structure
 
 CASE = """
@@ -69,6 +70,27 @@ def test_segments_are_the_motion_of_another_simulator() -> None:
     assert found.impacts.sum() >= 3
     assert set(found.impact.contact) == {0}
     assert found.impact.speed_after == pytest.approx(0.7 * found.impact.speed_before)
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("derivatives", [True, False])
+def test_threads_share_segments_and_change_no_bit(derivatives: bool) -> None:
+    """With numbers of samples that differ, and fewer segments than threads could take."""
+    model = Model.from_text(CASE)
+    for count in (23, 5, 0):
+        start, *_ = segments(count, 1)
+        sizes = 1 + np.arange(count) * 7 % 40
+        first = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+        times = np.concatenate([[0.0], *(np.linspace(0, 0.9, size) for size in sizes)])[1:]
+        given = (PATHS, VALUES, start, first, times, None, derivatives)
+        alone = model.segments(*given)
+        assert count < 23 or (np.unique(alone.impact.segment).size > 3 and alone.impact.segment.max() > 12)
+        with flown_in_threads(3):
+            shared = model.segments(*given)
+        for name in ("motion", "jacobian", "impacts", "steady", "reason"):
+            np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
+        for name in ("segment", "time", "contact", "speed_before", "speed_after", "side"):
+            np.testing.assert_array_equal(getattr(shared.impact, name), getattr(alone.impact, name))
 
 
 @pytest.mark.usefixtures("library")

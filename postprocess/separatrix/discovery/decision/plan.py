@@ -12,7 +12,9 @@ from separatrix.discovery.decision.stages.cut_short import cut_short
 from separatrix.discovery.decision.stages.filtered_sensor import filtered_sensor, may_be_filtered
 from separatrix.discovery.decision.stages.function import function, function_alone, of_several, only_follows
 from separatrix.discovery.decision.stages.function_of_name import (
+    form_in_doubt,
     form_refuted,
+    forms_alike,
     function_of_name,
     has_function,
     table_or_form,
@@ -186,6 +188,8 @@ PLAN = (
         "an effect is part of the machine", work=2),
     Stage("table or form", lambda state: not state.in_part and form_refuted(state), table_or_form,
         "the function of the family has another form than the one that is named"),
+    Stage("form in doubt", lambda state: not state.in_part and bool(forms_alike(state)), form_in_doubt,
+        "another form of the family follows the records as well"),
     Stage("lagging force", may_lag, lagging_force,
         "friction that falls with the speed may be a force that lags"),
     Stage("filtered sensor", lambda state: not state.in_part and may_be_filtered(state), filtered_sensor,

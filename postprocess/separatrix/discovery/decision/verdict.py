@@ -306,7 +306,6 @@ def _records(findings: Findings) -> list[dict]:
     found = []
     for use, data, fitted in _final(findings):
         for index, one in enumerate(data.prepared):
-            machine = fitted.problem.machine_values(index, fitted.fit.values)
             found.append(
                 {
                     "name": one.record.name,
@@ -318,11 +317,12 @@ def _records(findings: Findings) -> list[dict]:
                     "drive_frequency": one.frequency,
                     "drive_scale": one.drive_scale,
                     "phase_known": one.phase_known,
-                    "sensor_bias": machine.get(SENSOR_BIAS),
+                    "sensor_bias": fitted.problem.machine_values(index, fitted.fit.values).get(SENSOR_BIAS),
+                    **({"sensors": one.sensor_noise} if one.sensor_noise else {}),
                 }
             )
-            if one.sensor_noise:
-                found[-1]["sensors"] = one.sensor_noise
+            if findings.context.options.compare == "force":
+                found[-1]["deviation"] = float(np.sqrt(np.mean(one.deviation(slice(None)) ** 2)))
     return found
 
 

@@ -24,6 +24,7 @@ from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
 from separatrix.discovery.policy import FIT
 from separatrix.discovery.wording import Units
 from separatrix.library import Effect
+from separatrix.segments import Impacts
 
 
 class CoordinateProblem(Problem):
@@ -191,6 +192,11 @@ class CoordinateProblem(Problem):
             columns = slice(channel * length, (channel + 1) * length)
             shows, by_all = self._shown(sensor, part, motion, jacobian, active, given, directions)
             residual = self._missed(sensor, sensor.values[part["samples"]] - shows, values) / sensor.sigma
+            if sensor.kind == "a":
+                hidden = _beside_impacts(part, hits)
+                residual[hidden] = 0.0
+                if derivatives:
+                    by_all[hidden] = 0.0
             out.residual[rows, columns] = np.nan_to_num(padded_table(residual, inside))
             out.used[rows, columns] = self.compared[rows, columns]
             if derivatives:
@@ -258,3 +264,16 @@ class CoordinateProblem(Problem):
         if jacobian is None:
             return found, None
         return found, sum(w * one[:, n + body] for w, one in zip(weights, jacobian, strict=True))
+
+
+def _beside_impacts(part: dict, impact: Impacts) -> np.ndarray:
+    """Samples with an impact before the last instant that their acceleration is from.
+
+    The jump of the speed is no acceleration, and would be a wall that no step of a fit passes.
+    """
+    found = np.zeros(part["times"].size, bool)
+    for segment, time in zip(impact.segment, impact.time, strict=True):
+        first, last = part["offsets"][segment : segment + 2]
+        passed = time - part["times"][first:last]
+        found[first:last] |= (passed >= 0) & (passed <= 2 * part["instant"])
+    return found

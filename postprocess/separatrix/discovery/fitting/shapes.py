@@ -101,6 +101,8 @@ FORM_OF = {
     "compliant_contact": "hertz",
 }
 """Closed form of its family that an effect is."""
+UNNAMED_FORMS = {"restitution_slope": ("power", "exponential", "viscoelastic")}
+"""Closed forms of as many parameters that no effect is, so that none competes with the effect."""
 
 
 def through(at: np.ndarray, value: np.ndarray) -> CubicHermiteSpline:

@@ -66,8 +66,9 @@ def illustrated(verdict: dict, details: h5py.File) -> list[Section]:
         by_key["gap"],
         "loops",
         loops(details),
-        "Force over position: measured, of the base machine and of the machine of the verdict. The area of a "
-        "loop is the energy that a cycle takes.",
+        "Top: force over position in a period in which the base machine misses as much as it usually does: "
+        "measured, of the base machine and of the machine of the verdict. The area of a loop is the energy "
+        "that a cycle takes. Bottom: what both machines leave of the force.",
     )
     _show(
         by_key["where"],

@@ -200,24 +200,18 @@ def _compared(verdict: dict) -> Section:
             one["use"],
             str(one["samples"]),
             number(one["sigma"], 3),
+            *([number(one["deviation"], 3)] if "deviation" in one else []),
             number(one["resolution"], 3),
             *_drive(one),
         ]
         for one in verdict["records"]
     ]
     unit = verdict["units"]["force" if verdict["compared"] == "force" else "position"]
-    table = Table(
-        [
-            "record",
-            "use",
-            "samples",
-            f"noise ({unit})",
-            f"resolution ({unit})",
-            "drive (rad/s)",
-            "crank angle",
-        ],
-        rows,
-    )
+    noises = [f"noise ({unit})"]
+    if any("deviation" in one for one in verdict["records"]):
+        noises = [f"noise of the sensor ({unit})", f"with that of mass times acceleration ({unit})"]
+    head = ["record", "use", "samples", *noises, f"resolution ({unit})", "drive (rad/s)", "crank angle"]
+    table = Table(head, rows)
     return Section(
         "compared",
         "What was compared",

@@ -16,7 +16,7 @@ from separatrix.discovery.decision.scoring import clear_of, lead
 from separatrix.discovery.decision.stages.conclusions import conclude
 from separatrix.discovery.decision.state import SearchState
 from separatrix.discovery.fitting.rig import share_with_imperfections
-from separatrix.discovery.fitting.shapes import FORM_OF
+from separatrix.discovery.fitting.shapes import FORM_OF, UNNAMED_FORMS
 from separatrix.discovery.fitting.smooth import function_of
 from separatrix.discovery.policy import FIT
 
@@ -86,3 +86,32 @@ def table_or_form(state: SearchState) -> SearchState:
         equivalent=False,
     )
     return state.decided(doubtful)
+
+
+def forms_alike(state: SearchState) -> list[str]:
+    """Closed forms without a name that follow the function of a single named one as well as its own does.
+
+    They are behind it by less than the log-likelihood by which a name must lead.
+    """
+    decision, function = state.decision, state.decision.function
+    best = decision.accepted[0] if decision.accepted else None
+    if best is None or function is None or decision.outcome != "named" or len(best.fitted.names) != 1:
+        return []
+    own = function.forms.get(FORM_OF.get(best.name, ""))
+    if own is None or not own["fits"]:
+        return []
+    within = 2 * state.context.options.separation
+    others = {
+        name: function.forms[name] for name in UNNAMED_FORMS.get(best.name, ()) if name in function.forms
+    }
+    return [name for name, one in others.items() if one["fits"] and one["misfit"] < own["misfit"] + within]
+
+
+def form_in_doubt(state: SearchState) -> SearchState:
+    """State the other forms beside the name."""
+    best, others = state.decision.accepted[0], " or ".join(forms_alike(state))
+    reason = (
+        f"the records do not distinguish the {FORM_OF[best.name]} {state.decision.function.member.family} of "
+        f"{best.name} from the {others} form: the family is known, the form is not"
+    )
+    return state.decided(state.decision.because(reason))
