@@ -78,7 +78,7 @@ def test_a_rank_without_a_slab_leaves_the_file_alone(mpi_separatrix, faulty_call
 
 
 def test_rank_0_reads_a_tile_at_most_once(mpi_separatrix, faulty_calls, tmp_path):
-    """A look at each tile before the first one would take rank 0 minutes for a million on a slow file system."""
+    """A look at each tile before the first one would take minutes for a million on a slow file system."""
     life.write_case(tmp_path)
     count = tmp_path / "count"
     variables = {"LD_PRELOAD": str(faulty_calls), "FAULT_NAME": f"{life.NAME}.part", "FAULT_RANK": "0"}

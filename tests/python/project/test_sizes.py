@@ -33,7 +33,6 @@ WHOLE = {
     "note_peaks": 63,
     "prepare_search": 62,
     "raise_together": 71,
-    "run_tiles": 61,
     "salt": 71,
     "set_guards": 61,
 }
