@@ -19,6 +19,7 @@ from separatrix.figures.page import Figures
 from separatrix.given_up import refuse
 from separatrix.labels import plain
 from separatrix.open import open_result, reading
+from separatrix.printed import show
 from separatrix.save import FORMATS, save
 from separatrix.version import __version__
 
@@ -44,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for path in options.files:
         try:
             for written in make(path, options):
-                print(written, flush=True)
+                show(written)
         except SeparatrixError as error:
             reported = _report(error)
             code = code or reported
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             continue
         try:
             for written in together(options):
-                print(written, flush=True)
+                show(written)
         except SeparatrixError as error:
             return _report(error)
     return code

@@ -3,7 +3,6 @@
 """The command `separatrix-noise`: motions of a case under noise, survival and first passage over starts."""
 
 import argparse
-import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from separatrix.arguments import Parser, positive, whole_number
 from separatrix.cases import Case, load
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
 from separatrix.noise import first_passage, noisy
+from separatrix.printed import show
 from separatrix.version import __version__
 
 
@@ -29,9 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("separatrix-noise: stopped", file=sys.stderr)
         return 130
-    with contextlib.suppress(BrokenPipeError):
-        # who reads may have had enough
-        print(text, flush=True)
+    show(text)
     return 0
 
 

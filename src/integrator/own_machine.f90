@@ -19,13 +19,12 @@ module own_machine
   use status, only: reason_time_over
   use stored_jumps, only: jump_until_now
   use tape_value, only: evaluate
+  use turn_section, only: longest_return, motion_at_turn, turn_coordinate
   implicit none
   private
 
   public :: prepare_own_machine, start_of_states
 
-  !> Longest return to the section, in periods of the slowest mode.
-  integer, parameter :: longest_return = 256
   !> Angles of a period at which the forces are looked at.
   integer, parameter :: angles = 32
 
@@ -185,7 +184,7 @@ contains
     real(wp), intent(in) :: point(:)
     type(section_state_t) :: section
     if (self%by_event) then
-      section = begin(self, [at_turn(self, point(1)), point(2:1 + size(self%starts))], 0.0_wp)
+      section = begin(self, [motion_at_turn(self%turn, self%drive_frequency, point(1)), point(2:1 + size(self%starts))], 0.0_wp)
     else
       section = begin(self, point(:2 + size(self%starts)), 0.0_wp)
     end if
@@ -212,22 +211,9 @@ contains
     integer :: n
     n = size(self%starts)
     point = 0
-    point(:1 + n) = [section%state%x, section%motor%own(:n)]
-    if (abs(section%state%x) >= self%turn/2 .and. abs(section%state%v) > 0 .and. self%turn > 0) then
-      point(1) = sign(self%turn/2 + abs(section%state%v)/self%drive_frequency, section%state%v)
-    end if
+    point(1) = turn_coordinate(self%turn, self%drive_frequency, section%state%x, section%state%v)
+    point(2:1 + n) = section%motor%own(:n)
   end function turn_point
-
-  !> x and v for the coordinate `s` of the section without a drive, see `turn_section`.
-  pure function at_turn(self, s) result(state)
-    class(own_machine_t), intent(in) :: self
-    real(wp), intent(in) :: s
-    real(wp) :: state(2)
-    state = [s, 0.0_wp]
-    associate (half => self%turn/2)
-      if (half > 0 .and. abs(s) > half) state = [-sign(half, s), sign(abs(s) - half, s)*self%drive_frequency]
-    end associate
-  end function at_turn
 
   pure function scales(self, half_range)
     class(own_machine_t), intent(in) :: self

@@ -20,7 +20,7 @@ module turn_section
   private
 
   public :: advance_body_to_turn, advance_multibody_to_turn, body_at_turn, body_turn_point, coordinates_at_turn, &
-    multibody_at_turn, multibody_turn_point, scales_at_turn
+    motion_at_turn, multibody_at_turn, multibody_turn_point, scales_at_turn, turn_coordinate
 
   !> Longest return to the section, in periods of the slowest mode: a belt may carry a body for long.
   integer, parameter, public :: longest_return = 256
@@ -37,22 +37,32 @@ contains
   pure type(state_t) function body_at_turn(moving, s) result(state)
     type(motion_t), intent(in) :: moving
     real(wp), intent(in) :: s
-    associate (half => moving%machine%turn/2)
-      if (abs(s) > half) then
-        state = start_state(moving, -sign(half, s), sign(abs(s) - half, s)*moving%machine%drive_frequency, 0.0_wp)
-      else
-        state = start_state(moving, s, 0.0_wp, 0.0_wp)
-      end if
-    end associate
+    real(wp) :: motion(2)
+    motion = motion_at_turn(moving%machine%turn, moving%machine%drive_frequency, s)
+    state = start_state(moving, motion(1), motion(2), 0.0_wp)
   end function body_at_turn
 
   !> The coordinate of a body on the section.
   pure real(wp) function body_turn_point(moving, state) result(s)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(in) :: state
-    s = state%x
-    if (passes_half_turn(moving, state)) s = sign(moving%machine%turn/2 + abs(state%v)/moving%machine%drive_frequency, state%v)
+    s = turn_coordinate(moving%machine%turn, moving%machine%drive_frequency, state%x, state%v)
   end function body_turn_point
+
+  !> x and v for the coordinate `s` of the section of a body. `turn`: of an angle, 0 of a position; `frequency` is w [rad/s].
+  pure function motion_at_turn(turn, frequency, s) result(motion)
+    real(wp), intent(in) :: turn, frequency, s
+    real(wp) :: motion(2)
+    motion = [s, 0.0_wp]
+    if (turn > 0 .and. abs(s) > turn/2) motion = [-sign(turn/2, s), sign(abs(s) - turn/2, s)*frequency]
+  end function motion_at_turn
+
+  !> The coordinate s of the section for x and v on it.
+  pure real(wp) function turn_coordinate(turn, frequency, x, v) result(s)
+    real(wp), intent(in) :: turn, frequency, x, v
+    s = x
+    if (turn > 0 .and. abs(x) >= turn/2 .and. abs(v) > 0) s = sign(turn/2 + abs(v)/frequency, v)
+  end function turn_coordinate
 
   pure logical function passes_half_turn(moving, state) result(passes)
     type(motion_t), intent(in) :: moving

@@ -24,6 +24,7 @@ from separatrix.discovery.results import FILES, replacing, require_writable, wri
 from separatrix.discovery.wording import at_knot, misfit, of_effects, searched, with_error
 from separatrix.discovery.workflow import investigate
 from separatrix.errors import INTERNAL, INTERRUPTED, NO_MEMORY, TERMINATED, SeparatrixError
+from separatrix.printed import show
 from separatrix.version import __version__
 
 
@@ -94,10 +95,10 @@ def _run(chosen: argparse.Namespace) -> None:
         write_results(draft, verdict, findings)
         write_report(draft, chosen.base, options)
     for line in summary(verdict):
-        print(line)
+        show(line)
     for path in (chosen.out / name for name in FILES):
         if path.exists():
-            print(f"wrote {path}")
+            show(f"wrote {path}")
 
 
 # the report has the last tenth of the steps and takes about a third of the time

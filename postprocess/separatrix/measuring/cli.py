@@ -3,7 +3,6 @@
 """The command `separatrix-measures`: dynamical integrity, size and fractality of the basins of a map."""
 
 import argparse
-import contextlib
 import json
 import sys
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from separatrix.measuring.along import measures_along
 from separatrix.measuring.api import NAMES, measures, tipping
 from separatrix.measuring.tipping import Tipping
 from separatrix.open import open_result, reading
+from separatrix.printed import show
 from separatrix.version import __version__
 
 
@@ -33,9 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("separatrix-measures: stopped", file=sys.stderr)
         return 130
-    with contextlib.suppress(BrokenPipeError):
-        # who reads may have had enough
-        print(text, flush=True)
+    show(text)
     return 0
 
 

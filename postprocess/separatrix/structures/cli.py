@@ -11,6 +11,7 @@ import numpy as np
 
 from separatrix.arguments import Parser, positive, whole_number
 from separatrix.errors import CANNOT_CREATE, USAGE, SeparatrixError
+from separatrix.printed import show
 from separatrix.structures.content import Matrices, Modes, add_points
 from separatrix.structures.files import write
 from separatrix.structures.readers import ROLES, read_matrices
@@ -39,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         for line in run(options):
-            print(line, flush=True)
+            show(line)
     except SeparatrixError as error:
         print(f"separatrix-structure: {error}", file=sys.stderr)
         return error.code

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from separatrix.arguments import Parser, whole_number
 from separatrix.errors import USAGE, SeparatrixError
+from separatrix.printed import show
 from separatrix.version import __version__
 
 _CANNOT_CREATE = 73
@@ -66,7 +67,7 @@ def _export(options: argparse.Namespace) -> int:
     if options.export.exists() and not options.force:
         raise SeparatrixError(f"{options.export}: exists; --force replaces it", _CANNOT_CREATE)
     size = export_page(options.files, options.export, options.motions)
-    print(f"wrote {options.export} ({size / 1e6:.2f} MB)")
+    show(f"wrote {options.export} ({size / 1e6:.2f} MB)")
     return 0
 
 
