@@ -165,11 +165,11 @@ def _range_text(values: xr.DataArray, mine: np.ndarray) -> str:
 
 
 def _rotation_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:
-    """Return ', -1 turns per drive period' for a cycle of an angle that goes round; '' for any other."""
+    """Return ', -1 turns per period' for a cycle of an angle that goes round; '' for any other."""
     if "rotation_number" not in catalogue:
         return ""
     turns = np.unique(catalogue["rotation_number"].values[mine])
-    return f", {turns[0]:+.4g} turns per drive period" if turns.size == 1 and abs(turns[0]) > 0 else ""
+    return f", {turns[0]:+.4g} turns per period" if turns.size == 1 and abs(turns[0]) > 0 else ""
 
 
 def _aperiodic_text(catalogue: xr.Dataset, mine: np.ndarray) -> str:

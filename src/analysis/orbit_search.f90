@@ -184,7 +184,7 @@ contains
       do k = 1, size(start)
         slopes(k, k) = slopes(k, k) - 1
       end do
-      call solve(slopes, point - image, step, ok)
+      call solve(slopes, point - machines%centre%nearest_copy(image, point), step, ok)
       if (.not. ok) return
       if (norm2(step/sizes) > 0.3_wp) step = 0.3_wp*step/norm2(step/sizes)
       point = point + step

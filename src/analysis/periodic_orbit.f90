@@ -107,7 +107,7 @@ contains
     call machine%fly(mode, t, y, closing_time(machine, orbit), arrived, flight)
     change = matmul(flight, change)
     if (m > 0 .and. machine%has_clock) change(:, states + m) = change(:, states + m) - matmul(flight, machine%slope(mode, t, y))
-    miss(m + 1:) = arrived - orbit%y
+    miss(m + 1:) = machine%nearest_copy(arrived, orbit%y) - orbit%y
     slopes(m + 1:, :) = change
     do k = 1, states
       slopes(m + k, k) = slopes(m + k, k) - 1
@@ -136,7 +136,7 @@ contains
       end associate
     end do
     call machine%fly(mode, t, y, closing_time(machine, orbit), arrived)
-    miss(m + 1:) = arrived - orbit%y
+    miss(m + 1:) = machine%nearest_copy(arrived, orbit%y) - orbit%y
   end subroutine shoot_only
 
   !> Derivatives of what does not fit by the parameter, from the neighbours of the machine.

@@ -64,6 +64,8 @@ contains
     if (attractor%turn > 0) tally%turns = tally%turns + nint((image(1) - attractor%points(1, 1))/attractor%turn)
     if (moving%by_event) then
       attractor%features = features_over(moving, tally, attractor%duration/moving%period)
+      ! Turns of a whole cycle: those in the time of a small oscillation mean nothing.
+      attractor%features%rotation = real(tally%turns, wp)
     else
       attractor%features = features_over(moving, tally, real(attractor%period, wp))
     end if

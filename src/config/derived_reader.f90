@@ -77,7 +77,8 @@ contains
     if (len(text) == 0) return
     call read_unit(text, unit, column)
     if (column > 0) then
-      call report(source, path, 'found "'//text//'", allowed a unit, as in "m^2/s"; "1" for a pure number')
+      call report(source, path, 'found "'//text//'", allowed '//known_units()// &
+                  '; "1" for a pure number')
     else if (abs(unit%multiplier - unit%divisor) > 0) then
       call report(source, path, 'found "'//text//'", allowed the SI unit, "'//unit%si//'"')
     end if

@@ -138,8 +138,7 @@ contains
     call read_unit(unit, wanted, columns(2))
     if (any(columns > 0)) return
     if (any(given%exponents /= wanted%exponents)) return
-    if ((index(given%si, 'rad') > 0) .neqv. (index(wanted%si, 'rad') > 0)) return
-    if ((index(given%si, 'Hz') > 0) .neqv. (index(wanted%si, 'Hz') > 0)) return
+    if (given%angle /= wanted%angle .or. given%hertz /= wanted%hertz) return
     value = value*given%multiplier/given%divisor
     status = 0
   end subroutine read_composed
@@ -152,7 +151,7 @@ contains
       text = 'a number, or a text with %'
     else if (any(rows%si == unit)) then
       text = 'a number in '//trim(unit)//', or a text with one of the units '// &
-             join(pack(rows%spelling, rows%si == unit), ', ')
+             join(pack(rows%spelling, rows%si == unit), ', ')//', or another of this dimension'
     else
       text = 'a number in '//trim(unit)
     end if

@@ -39,6 +39,10 @@ contains
       name = 'N m/rad^n'
     case ('N s/m')
       name = 'N m s/rad'
+    case ('N s^3/m^3')
+      name = 'N m s^3/rad^3'
+    case ('1/m')
+      name = '1/rad'
     case ('N s^2/m^2')
       name = 'N m s^2/rad^2'
     case ('N/(m s)')

@@ -20,6 +20,8 @@ module composed_units
     !> SI value = number*multiplier/divisor. Dividing by powers of ten keeps "12.5 mm" equal to 0.0125 to the bit.
     real(wp) :: multiplier = 1, divisor = 1
     integer :: exponents(base_count) = 0
+    !> Powers of an angle and of Hz, which count as pure numbers and 1/s in the exponents.
+    integer :: angle = 0, hertz = 0
   end type composed_unit_t
 
   type :: symbol_t
@@ -76,7 +78,7 @@ contains
     below = .false.
     if (text == ' rpm' .or. text == 'rpm') then
       ! Alone: a product with a quotient would be ambiguous.
-      unit = composed_unit_t('rad/s', two_pi, 60.0_wp, [0, 0, -1, 0, 0])
+      unit = composed_unit_t('rad/s', two_pi, 60.0_wp, [0, 0, -1, 0, 0], 1)
       return
     end if
     do
@@ -148,6 +150,8 @@ contains
       end if
     end do
     unit%exponents = unit%exponents + power*symbol%exponents
+    if (symbol%si == 'rad') unit%angle = unit%angle + power
+    if (symbol%si == 'Hz') unit%hertz = unit%hertz + power
   end subroutine read_factor
 
   !> A symbol, perhaps with a prefix; blank if there is none of the name.

@@ -4,10 +4,10 @@
 !> Builds the catalogues of all slices of a grid on a team: slices are handed out to the ranks, for their costs differ,
 !> then all are known to all. The result does not depend on the number of ranks.
 module catalogue_search
-  use attractors, only: attractor_t, is_packed, least_packed, pack_attractor, packed_length, unpack_attractor
+  use attractors, only: attractor_t, is_packed, kind_not_known, least_packed, pack_attractor, packed_length, unpack_attractor
   use basin, only: catalogue_t, label_slices, open_ensemble, open_slice, search_starts
   use case_type, only: attractors_t
-  use discover, only: discover_attractors, sort_attractors
+  use discover, only: discover_attractors, is_given_up, sort_attractors
   use errors, only: error_t, fail
   use grid, only: grid_t, slice_neighbours
   use journal, only: journal_t
@@ -94,6 +94,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(scheduler_t), allocatable :: slices
     real(wp), allocatable :: starts(:, :)
+    type(catalogue_t) :: unknown
     integer(int64) :: slice
     integer :: position
     allocate (mine(size(catalogues)), source=.false.)
@@ -111,8 +112,10 @@ contains
         starts = search_starts(grid, settings%sample, settings%seed, &
                                attractors_of(first_round, slice_neighbours(grid, slice, .true.)))
       end if
+      call set_aside(catalogues(position), size(first_round) > 0, unknown)
       call search_slice(journal, slices, grid, span, slice, starts, settings%max_period, time_limit, &
                         catalogues(position), error)
+      call take_back(unknown, catalogues(position))
       if (allocated(error)) call slices%request_stop()
       if (slices%stop_requested()) exit
       mine(position) = .true.
@@ -124,6 +127,27 @@ contains
     if (slices%stop_requested()) call fail(error, exit_resumable, 'stopped while searching for attractors; '// &
       nothing_kept)
   end subroutine search_round
+
+  !> The attractors of neighbours are followed also in a slice whose search was given up: its entries are put aside.
+  subroutine set_aside(catalogue, again, unknown)
+    type(catalogue_t), intent(inout) :: catalogue
+    logical, intent(in) :: again
+    type(catalogue_t), intent(out) :: unknown
+    allocate (unknown%attractors(0))
+    if (.not. again .or. .not. allocated(catalogue%attractors)) return
+    if (.not. is_given_up(catalogue%attractors)) return
+    call move_alloc(catalogue%attractors, unknown%attractors)
+    allocate (catalogue%attractors(0))
+  end subroutine set_aside
+
+  !> Of what was found then, what is known joins the entries put aside.
+  subroutine take_back(unknown, catalogue)
+    type(catalogue_t), intent(in) :: unknown
+    type(catalogue_t), intent(inout) :: catalogue
+    if (size(unknown%attractors) == 0) return
+    catalogue%attractors = [unknown%attractors, pack(catalogue%attractors, catalogue%attractors%kind /= kind_not_known)]
+    call sort_attractors(catalogue%attractors)
+  end subroutine take_back
 
   !> Adds to the catalogue of a slice what `starts` lead to, one by one, so that a stop is noticed between them. Those that lead to
   !> what is known are found many at once, where lanes can fly them.

@@ -168,9 +168,11 @@ contains
              all_of_them%features%mean_impact_speed)
     call add('grazing_margin', type_float64, 'm', 'smallest distance to a barrier missed', &
              margin_or_infinite(all_of_them%features%grazing_margin))
-    if (any(all_of_them%turn > 0)) call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards', &
+    if (any(all_of_them%turn > 0 .or. abs(all_of_them%features%rotation) > 0)) then
+      call add('rotation_number', type_float64, '1', 'turns of the angle per drive period, upwards; without a drive, per cycle', &
       merge(all_of_them%features%rotation, ieee_value(1.0_wp, ieee_quiet_nan), all_of_them%kind /= kind_chaotic .and. &
             all_of_them%kind /= kind_not_known))
+    end if
     call add('count', type_int64, '1', 'points of the map captured', real(counts, wp))
     call schema%add_variable('kind', type_int8, ['entry'], units=coded_unit, group='catalogue', &
       long_name='whether it is a cycle, rest, chaotic, a family of cycles, or nothing of them is known', &

@@ -21,8 +21,8 @@ module last_wait
   !> Seconds to wait for ranks that have nothing left to do, before the first look into the working file, and between two of them.
   integer, parameter :: usual_bound = 120
   real(wp), parameter :: first_look = 5, look_interval = 1
-  !> Tiles that a look goes through at most: the others may ask rank 0, and a slow file system takes milliseconds for each.
-  integer, parameter :: most_tiles = 1000
+  !> Longest look [s]: the others may ask rank 0, and a slow file system takes milliseconds for each tile.
+  real(wp), parameter :: longest_look = 0.05_wp
   !> Pause between two questions, in microseconds: no core is burnt while waiting.
   integer, parameter :: pause_us = 100
 
@@ -86,16 +86,17 @@ contains
     integer, intent(in) :: tiles(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: now
-    integer :: last
     now = monotonic_seconds()
     if (self%idle_since < 0 .and. now > self%next_look) then
-      last = min(self%done + most_tiles, size(tiles))
-      do while (self%in_file .and. self%done < last)
-        if (.not. store%has_done(tiles(self%done + 1))) exit
+      do while (self%in_file .and. self%done < size(tiles))
+        if (monotonic_seconds() - now > longest_look) exit
+        if (.not. store%has_done(tiles(self%done + 1))) then
+          ! It is looked at again later; the others are gone through without a pause.
+          self%next_look = now + look_interval
+          exit
+        end if
         self%done = self%done + 1
       end do
-      ! One that is not done is looked at again later; the others are gone through without a pause.
-      if (self%done < last) self%next_look = now + look_interval
       if (stopped .or. self%in_file .and. self%done == size(tiles)) self%idle_since = now
     end if
     if (self%idle_since >= 0 .and. now - self%idle_since > self%bound) call fail(error, exit_resumable, &

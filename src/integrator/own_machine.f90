@@ -169,6 +169,8 @@ contains
     ! Where nothing repeats, the time begins at the start.
     if (self%motor%system%aperiodic) section%motor%phi = -time
     call take_turns(self%turn, section%state)
+    ! At half a turn, downwards, it has just passed from the other side.
+    if (self%turn > 0 .and. section%state%v < 0 .and. section%state%x <= -self%turn/2) section%state%x = self%turn/2
   end function begin
 
   pure function resume(self, before, angle) result(section)

@@ -61,14 +61,20 @@ contains
   pure real(wp) function turn_coordinate(turn, frequency, x, v) result(s)
     real(wp), intent(in) :: turn, frequency, x, v
     s = x
-    if (turn > 0 .and. abs(x) >= turn/2 .and. abs(v) > 0) s = sign(turn/2 + abs(v)/frequency, v)
+    if (is_over(turn, x, v)) s = sign(turn/2 + abs(v)/frequency, v)
   end function turn_coordinate
 
   pure logical function passes_half_turn(moving, state) result(passes)
     type(motion_t), intent(in) :: moving
     type(state_t), intent(in) :: state
-    passes = abs(state%x) >= moving%machine%turn/2 .and. abs(state%v) > 0
+    passes = is_over(moving%machine%turn, state%x, state%v)
   end function passes_half_turn
+
+  !> Whether an angle is at half a turn and moves.
+  pure logical function is_over(turn, x, v)
+    real(wp), intent(in) :: turn, x, v
+    is_over = turn > 0 .and. abs(x) >= turn/2 .and. abs(v) > 0
+  end function is_over
 
   !> Moves a body to the section and starts the clock anew; `lasted` [s] is the time that it took. `reason` is
   !> `reason_time_over` where it does not come to the section.

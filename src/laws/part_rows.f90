@@ -60,13 +60,13 @@ module part_rows
     law_row_t('part', frictions(7), 'a coefficient times the normal force, an expression `load` [N]; none where that is negative', &
               'Amontons, Mem. Acad. R. Sci. (1699)'), &
     law_row_t('part', frictions(8), 'elements of spring and slider in parallel', 'Iwan, J. Appl. Mech. 33 (1966)'), &
-    law_row_t('part', frictions(9), 'z'' = u |w|^n sgn w, w = 1 - sgn(u) z/z_m; force stiffness z, z_m = force/stiffness', &
+    law_row_t('part', frictions(9), 'a deflection z: z'' = u |w|^n sgn w, w = 1 - sgn(u) z/z_m, z_m = force/stiffness', &
               'Dahl, AIAA J. 14 (1976)'), &
     law_row_t('part', frictions(10), 'a deflection z with z'' = u (1 - (a sgn(u z) + 1 - a) |z/z_m|^n), a the shape', &
               'Wen, J. Eng. Mech. Div. 102 (1976)'), &
     law_row_t('part', frictions(11), 'bristles: z'' = u - |u| s0 z/g(u), force s0 z + s1 z'' + s2 u', &
               'Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)'), &
-    law_row_t('part', frictions(12), 'an expression `force` [N] of speed, t, phase, NAME.x; that at rest is the limit', ''), &
+    law_row_t('part', frictions(12), 'an expression `force` [N] of speed, t, phase, NAME.x; none below 0', ''), &
     law_row_t('part', contacts(1), 'rigid stops of the distance of two bodies: v+ = -e v-, all that touch together', &
               'Glocker, Set-Valued Force Laws (2001)'), &
     law_row_t('part', contacts(2), 'stops with spring K and damper D', ''), &

@@ -8,7 +8,7 @@ module motor_modes
   use motion_state, only: mode_lower_barrier, mode_slip_minus, mode_upper_barrier, state_t
   use motor_system, only: guard_back, guard_body_down, guard_body_up, guard_crank_down, guard_crank_up, guard_fastest, &
     guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t, &
-    passes_half_turn
+    stays_within_half_turn
   use motor_limits, only: active_limits
   use motor_now, only: parameters_now, state_vector
   use motor_rest, only: equation_mode, low_series, size_of_forces, slips, zero_order
@@ -88,7 +88,7 @@ contains
       if (slip > 0 .and. needs_v_max) call watch(flight, guard_fastest, -1)
       if (.not. abs(state%v) > 0) call mark_start(flight, series, guard_turning, flight%rates(4), &
                                                   least(system, state, series), is_decided)
-      if (passes_half_turn(system)) then
+      if (stays_within_half_turn(system)) then
         call watch(flight, merge(guard_section, guard_back, slip > 0), slip)
         call mark_zeros(flight, series, [merge(guard_section, guard_back, slip > 0)], 0.0_wp, is_decided)
       end if

@@ -13,7 +13,7 @@ module motor_system
   implicit none
   private
 
-  public :: passes_half_turn
+  public :: stays_within_half_turn
 
   !> Variables.
   integer, parameter, public :: phi_at = 1, w_at = 2, x_at = 3, v_at = 4, y_at = 5
@@ -76,9 +76,9 @@ module motor_system
 contains
 
   !> Whether an angle without a drive stays within half a turn, which it passes by an event.
-  pure logical function passes_half_turn(system)
+  pure logical function stays_within_half_turn(system)
     type(motor_system_t), intent(in) :: system
-    passes_half_turn = system%turn > 0 .and. .not. system%period > 0 .and. .not. system%aperiodic
-  end function passes_half_turn
+    stays_within_half_turn = system%turn > 0 .and. .not. system%period > 0 .and. .not. system%aperiodic
+  end function stays_within_half_turn
 
 end module motor_system

@@ -5,7 +5,7 @@
 module own_flights
   use equation_sheet, only: define, node_of
   use motor_system, only: body_held, both_move, guard_back, guard_body_down, guard_body_up, guard_count, guard_fastest, &
-    guard_lower, guard_section, guard_turning, guard_upper, motor_system_t, passes_half_turn, phi_at, v_at, w_at, x_at
+    guard_lower, guard_section, guard_turning, guard_upper, motor_system_t, stays_within_half_turn, phi_at, v_at, w_at, x_at
   use series_flight, only: guard_t, start_flight
   use text, only: to_text
   implicit none
@@ -58,7 +58,7 @@ contains
       guards(guard_body_up)%node = node_of(sheet, 'up')
       guards(guard_body_down)%node = node_of(sheet, 'down')
       guards(guard_fastest)%node = node_of(sheet, 'v_rate')
-      if (.not. passes_half_turn(system)) return
+      if (.not. stays_within_half_turn(system)) return
       call define(sheet, 'over_half', 'x - half_turn')
       call define(sheet, 'under_half', 'x + half_turn')
       guards(guard_section)%node = node_of(sheet, 'over_half')

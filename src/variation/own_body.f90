@@ -68,6 +68,7 @@ contains
       body%n = system%variables - x_at + 1
       body%positions = 1
       body%period = machine%period
+      body%turn = machine%turn
       body%lower = machine%lower
       body%upper = machine%upper
       body%barriers = [body%lower, body%upper]

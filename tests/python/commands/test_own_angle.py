@@ -108,16 +108,34 @@ def test_a_driven_pendulum_is_that_of_the_catalogue(separatrix, tmp_path):
     assert np.mean(senses[ours - 1] == other[theirs - 1]) > 0.98
 
 
-def test_lanes_and_the_event_loop_count_the_same_turns(separatrix, tmp_path):
-    write(tmp_path, **DRIVEN | {"duration": 20})
-    ends = []
+@pytest.mark.parametrize("values", [DRIVEN, BIASED, BIASED | {"size": -1.2}])
+def test_lanes_and_the_event_loop_find_the_same_rotations(separatrix, tmp_path, values):
+    write(tmp_path, **values)
+    found = []
     for lanes in ("auto", "off"):
-        settings = ["--set", f'integrator.lanes="{lanes}"', "--set", "axis.v0.count=2"]
+        settings = ["--set", f'integrator.lanes="{lanes}"', "--set", "attractors.sample=64"]
         succeed(separatrix, "basin", "case.toml", "-o", f"{lanes}.h5", "-q", *settings, folder=tmp_path)
-        ends.append(succeed(separatrix, "verify", f"{lanes}.h5", "--sample", "1", folder=tmp_path).out)
-    for printed in ends:
-        deviation = float(printed.split("largest deviation after the duration ")[1].split()[0])
-        assert deviation < 1e-9
+        with h5py.File(tmp_path / f"{lanes}.h5") as file:
+            turns = file["catalogue"]["rotation_number"][:]
+            found.append((turns, file["attractor"][:], file["x_max"][:]))
+    assert set(np.abs(found[0][0])) <= {0, 1}
+    assert values["size"] > -1 or list(found[0][0]) == [-1]
+    for one, other in zip(*found, strict=True):
+        assert one == pytest.approx(other, rel=1e-6)
+
+
+def test_a_rotation_keeps_its_label_over_the_torque(separatrix, tmp_path):
+    write(tmp_path, **BIASED)
+    more = '[[axis]]\nname = "force.torque.torque"\nfrom = 0.6\nto = 0.7\ncount = 3\n'
+    with (tmp_path / "case.toml").open("a") as file:
+        file.write(more)
+    settings = ["--set", "axis.x0.count=3", "--set", "axis.v0.count=3", "--set", "attractors.sample=32"]
+    succeed(separatrix, "basin", "case.toml", "-o", "map.h5", "-q", *settings, folder=tmp_path)
+    with h5py.File(tmp_path / "map.h5") as file:
+        catalogue = file["catalogue"]
+        labels = catalogue["attractor"][:][np.abs(catalogue["rotation_number"][:]) > 0]
+    assert len(labels) == 3
+    assert len(set(labels)) == 1
 
 
 def test_a_torque_that_knows_whole_turns_is_no_angle_on_a_circle(separatrix, tmp_path):
@@ -147,3 +165,20 @@ def test_units_of_a_pendulum_are_those_of_rotation(separatrix, tmp_path, key, wr
     assert ended.code == 65
     assert f"key '{key}': found \"{wrong}\"" in ended.err
     assert allowed in ended.err
+
+
+def test_branches_of_rotations_are_followed(separatrix, tmp_path):
+    """Both senses of rotation, each once, stable, with the product of multipliers exp(-c T/J)."""
+    write(tmp_path, **DRIVEN | {"size": 1.35})
+    limits = ["--from", "1.34", "--to", "1.36", "--searches", "1"]
+    command = ["branches", "case.toml", "--parameter", "force.torque.torque", *limits, "-o", "out.h5", "-q"]
+    succeed(separatrix, *command, folder=tmp_path)
+    with h5py.File(tmp_path / "out.h5") as file:
+        stable = file["stable"][:] > 0
+        rounds = file["x_max"][:] - file["x_min"][:] > 2 * math.pi * (1 - 1e-9)
+        branch, period = file["branch"][:], file["period"][:]
+        values = file["multiplier_real"][:] + 1j * file["multiplier_imag"][:]
+    turning = rounds & (period == 1) & stable
+    assert len(np.unique(branch[turning])) == 2
+    products = np.prod(values[turning], axis=1)
+    assert products.real == pytest.approx(math.exp(-0.5 * 3 * math.pi), rel=1e-8)

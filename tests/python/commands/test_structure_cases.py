@@ -66,7 +66,7 @@ def test_numbers_of_a_file_are_reported_as_they_are(tmp_path):
     )
     for text, message in (
         (structure, "stiffness.mtx:4: found the end of the file, allowed a number for row 1 of column 2"),
-        (friction, "key 'friction.f.static_force': found -0.5 N, allowed at least the force"),
+        (friction, "key 'friction.f.static_force': found -0.5 N, allowed at least 0"),
     ):
         (tmp_path / "case.toml").write_text(text + "[run]\nduration = 5\n")
         with pytest.raises(sx.CaseError) as refused:
