@@ -278,7 +278,7 @@ def _caption(result: xr.Dataset, look: Look) -> list[str]:
     pieces.append(f"amplitude {attributes['amplitude']:.4g} {unit(result['x'])}")
     pieces.append(rf"$v_\mathrm{{max}}$ = {attributes['v_max']:.4g} {unit(result['v'])}")
     if attributes.get("rotation_number"):
-        pieces.append(f"{attributes['rotation_number']:.4g} turns per drive period")
+        pieces.append(f"{attributes['rotation_number']:.4g} turns per period")
     if attributes["impacts_per_period"] > 0:
         rate = f"impacts per drive period {attributes['impacts_per_period']:.4g}"
         if not attributes.get("driven", 1):
