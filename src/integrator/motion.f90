@@ -21,7 +21,7 @@ module motion
     event_touch_lower, event_touch_upper, event_turning_point, flight_adaptive, flight_exact, log_t, &
     mode_lower_barrier, mode_slip_minus, mode_slip_plus, mode_upper_barrier, note_position, options_t, record_event, &
     state_t, tally_t, word_chatter_lower, word_chatter_upper, word_lower, word_period, &
-    word_stick, word_upper
+    watches_between_events, word_stick, word_upper
   use oscillator, only: oscillator_t
   use pressed_flight, only: fly_pressed_body, prepare_pressed, pressed_flow_t
   use rest, only: chatter_time, mode_from_rest
@@ -274,7 +274,9 @@ contains
       call fly_adaptive(moving%machine, moving%options, state, time_end, exit_speed, barrier, tally, outcome, log)
       return
     end if
-    if (present(log)) call sample_crossing(moving, state, crossed%time, barrier, log)
+    if (present(log)) then
+      if (watches_between_events(log)) call sample_crossing(moving, state, crossed%time, barrier, log)
+    end if
     state = crossed
     state%v = merge(0.0_wp, direction*exit_speed, inward)
     outcome = merge(flight_speed_reached, flight_layer_left, inward)

@@ -9,7 +9,7 @@ module pressed_flight
   use exact_flight, only: flight_barrier, fly_exact
   use exact_flow, only: flow_t, prepare_flow
   use kinds, only: wp
-  use motion_state, only: log_t, mode_slip_plus, options_t, state_t, tally_t
+  use motion_state, only: log_t, mode_slip_plus, options_t, state_t, tally_t, watches_between_events
   use oscillator, only: oscillator_t
   implicit none
   private
@@ -57,7 +57,8 @@ contains
   end subroutine prepare_pressed
 
   !> Flies from `state` (mode slip_plus or slip_minus) up to `time_end` [s after the section], pressed on the barrier on
-  !> `side`. Ends as `fly_contact` does. Samples, peaks and energy are those of a copy that is flown adaptively.
+  !> `side`. Ends as `fly_contact` does. Samples, peaks and energy are those of a copy that is flown adaptively; a log of events
+  !> alone, without a balance, needs none.
   pure subroutine fly_pressed_body(pressed, machine, options, side, state, time_end, tally, outcome, log)
     type(pressed_flow_t), intent(in) :: pressed
     type(oscillator_t), intent(in) :: machine
@@ -85,7 +86,8 @@ contains
     call fly_exact(pressed%flow(side), state, time_end, 0.0_wp, barrier, tally, outcome)
     state%x = surface + state%x
     if (outcome == flight_barrier) state%x = surface
-    if (present(log)) call fly_contact(machine, options, side, start, state%time, unused, ended, log)
+    if (.not. present(log)) return
+    if (watches_between_events(log)) call fly_contact(machine, options, side, start, state%time, unused, ended, log)
   end subroutine fly_pressed_body
 
 end module pressed_flight

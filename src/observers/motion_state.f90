@@ -11,7 +11,7 @@ module motion_state
 
   public :: sample_time, sample_due, samples_before, make_room, closing_error, reset_tally, sticks_in, note_position, &
     position_of, take_turns, move_turn, append_word, open_log, record_event, put_in_order, record_sample, put_sample_balance, &
-    put_column
+    put_column, watches_between_events
 
   !> Modes. While slipping the velocity keeps its sign; a turning point starts a new flight.
   integer, parameter, public :: mode_slip_plus = 1, mode_slip_minus = 2, mode_stick = 3, &
@@ -124,6 +124,12 @@ module motion_state
   end type log_t
 
 contains
+
+  !> Whether a log holds more of a motion than its events.
+  pure logical function watches_between_events(log)
+    type(log_t), intent(in) :: log
+    watches_between_events = log%balance%kept .or. log%sample_interval > 0
+  end function watches_between_events
 
   !> Time of the next sample [s after the section].
   pure real(wp) function sample_time(log)
