@@ -32,7 +32,9 @@ DAMAGE = (
 
 def why_absent(path: Path) -> str:
     """Return why there is no file at a path."""
-    return "a folder, expected a file" if path.is_dir() else "no such file"
+    if path.is_dir():
+        return "a folder, expected a file"
+    return "not a regular file" if path.exists() else "no such file"
 
 
 class SeparatrixError(Exception):

@@ -16,7 +16,7 @@ module bindings
     c_folder_status, c_free_bytes, c_reserve_file, c_publish_file, c_remove_file, c_take_lock, c_give_lock, &
     c_open_append, c_append, c_error_text, c_atomic_bytes, c_atomic_load, c_atomic_store, c_atomic_fetch_add, &
     c_atomic_try_lock, c_yield, c_lock_calls, c_unlock_calls, c_string_length, c_share_upper_limit, c_is_special, &
-    c_core_list, c_may_use_core, c_online_cores, c_core_quota, c_cpu_name, c_environment, &
+    c_is_same_file, c_core_list, c_may_use_core, c_online_cores, c_core_quota, c_cpu_name, c_environment, &
     c_crc32_combine, c_compress_bound, c_compress, c_shuffle, c_open_bytes, c_read_bytes, c_write_bytes, c_has_name, &
     c_length_of, c_set_length, c_close_bytes
 
@@ -93,6 +93,11 @@ module bindings
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
     end function c_is_special
+
+    integer(c_int) function c_is_same_file(path, other) bind(c, name='separatrix_is_same_file')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*), other(*)
+    end function c_is_same_file
 
     real(c_double) function c_share_upper_limit(found, sample, confidence) &
         bind(c, name='separatrix_share_upper_limit')

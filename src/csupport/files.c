@@ -44,6 +44,13 @@ int separatrix_is_special(const char *path) {
   return stat(path, &facts) == 0 && !S_ISREG(facts.st_mode);
 }
 
+/* Whether two names are of one file, also by links. */
+int separatrix_is_same_file(const char *path, const char *other) {
+  struct stat one, two;
+  return stat(path, &one) == 0 && stat(other, &two) == 0 && one.st_dev == two.st_dev &&
+         one.st_ino == two.st_ino;
+}
+
 /* Creates a file in a folder and removes it: folders of the system may be writable and yet take no file. */
 static int try_folder(const char *folder) {
   char *probe = NULL;

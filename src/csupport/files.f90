@@ -4,7 +4,7 @@
 !> File operations that Fortran lacks. Errors name the file and the system's reason.
 module files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
-  use bindings, only: c_append, c_error_text, c_file_exists, c_is_special, c_folder_status, c_free_bytes, &
+  use bindings, only: c_append, c_error_text, c_file_exists, c_is_same_file, c_is_special, c_folder_status, c_free_bytes, &
     c_give_lock, c_open_append, c_publish_file, c_remove_file, c_reserve_file, c_take_lock
   use errors, only: error_t, fail
   use kinds, only: int64
@@ -13,8 +13,8 @@ module files
   implicit none
   private
 
-  public :: file_exists, is_empty, is_special, is_text, check_folder, free_bytes, reserve_file, publish_file, remove_file, &
-    take_lock, give_lock, open_append, append_line, test_status
+  public :: file_exists, is_empty, is_same_file, is_special, is_text, check_folder, free_bytes, reserve_file, publish_file, &
+    remove_file, take_lock, give_lock, open_append, append_line, test_status
 
 contains
 
@@ -29,6 +29,12 @@ contains
     character(len=*), intent(in) :: path
     is_special = c_is_special(path//c_null_char) == 1
   end function is_special
+
+  !> Whether two names are of one file that exists, also by links.
+  logical function is_same_file(path, other)
+    character(len=*), intent(in) :: path, other
+    is_same_file = c_is_same_file(path//c_null_char, other//c_null_char) == 1
+  end function is_same_file
 
   !> Whether it is a file without a byte.
   logical function is_empty(path)

@@ -9,10 +9,12 @@ module merge_driver
   use catalogue_search, only: unpack_catalogues
   use command_line, only: command_t
   use errors, only: error_t, fail
+  use files, only: is_same_file
   use kinds, only: int64
   use map_file, only: map_file_t
   use map_schema, only: name_length, schema_t
   use list_work, only: describe_list, end_points, list_work_t, points_per_tile, read_list
+  use output_check, only: working_path
   use second_look, only: look_again
   use serial_team, only: serial_team_t
   use session, only: session_t
@@ -26,8 +28,9 @@ module merge_driver
 
 contains
 
-  !> Runs the command; ends the program with the exit code on errors. Code 65 for a file that is no share or is given
-  !> twice, 66 for a share that is missing, 74 for a damaged one, 75 for one that is not done, 76 for one of another case.
+  !> Runs the command; ends the program with the exit code on errors. Code 64 if the output would replace a share, 65 for a
+  !> file that is no share or is given twice, 66 for a share that is missing, 74 for a damaged one, 75 for one that is not
+  !> done, 76 for one of another case.
   subroutine run_merge(command)
     type(command_t), intent(in) :: command
     type(session_t) :: session
@@ -40,6 +43,7 @@ contains
     call session%journal%open_copy(command%log, error)
     if (.not. allocated(error)) call install_signals(error)
     if (.not. allocated(error)) call read_shares(command%shards, shares, error)
+    if (.not. allocated(error)) call check_names(command, error)
     if (.not. allocated(error)) call load_case_text(shares%resolved_case, trim(command%shards(1))//' (resolved case)', &
                                                     no_overrides, session%the_case, error)
     call session%stop_if(error)
@@ -54,6 +58,21 @@ contains
       call session%stop_if(error)
     end select
   end subroutine run_merge
+
+  !> Code 64 if the output or its working file would replace a share.
+  subroutine check_names(command, error)
+    type(command_t), intent(in) :: command
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: share
+    integer :: i
+    do i = 1, size(command%shards)
+      share = trim(command%shards(i))
+      if (.not. (is_same_file(command%path, share) .or. is_same_file(working_path(command%path), share))) cycle
+      call fail(error, exit_usage, "the output '"//command%path//"' would replace the share '"//share// &
+                "': the first name after 'merge' is that of the new file")
+      return
+    end do
+  end subroutine check_names
 
   subroutine merge_map(session, shares)
     type(session_t), intent(inout) :: session

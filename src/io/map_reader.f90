@@ -18,7 +18,7 @@ module map_reader
   use slabs, only: slab, slab_count
   use status, only: exit_bad_case, exit_io, exit_no_input
   use superblock, only: is_hdf5
-  use files, only: file_exists, is_empty, is_text
+  use files, only: file_exists, is_empty, is_special, is_text
   use output_check, only: is_folder
   use text, only: to_text
   use tile_record, only: head_bytes, is_done, tile_records
@@ -98,8 +98,8 @@ contains
               ', this program reads '//to_text(oldest_version)//' to '//to_text(format_version)//doubt)
   end subroutine check_version
 
-  !> Opens any HDF5 file for reading. Code 66 if there is none, 65 if it is a text where `allowed` is asked for, 74 if it is
-  !> not HDF5.
+  !> Opens any HDF5 file for reading. Code 66 if there is no regular file, 65 if it is a text where `allowed` is asked
+  !> for, 74 if it is not HDF5.
   subroutine open_reader(path, allowed, reader, error)
     character(len=*), intent(in) :: path, allowed
     type(reader_t), intent(out) :: reader
@@ -109,6 +109,8 @@ contains
       call fail(error, exit_no_input, 'there is no file '''//path//'''')
     else if (is_folder(path)) then
       call fail(error, exit_no_input, ''''//path//''' is a folder')
+    else if (is_special(path)) then
+      call fail(error, exit_no_input, ''''//path//''' is not a regular file')
     else if (is_text(path)) then
       call fail(error, exit_bad_case, ''''//path//''' is a text, allowed '//allowed)
     else if (is_empty(path)) then

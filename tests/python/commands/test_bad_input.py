@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bad input: the right exit code, a message that names what and where, and nothing written."""
 
+import os
 import re
 import time
 
@@ -415,6 +416,7 @@ STRANGE = {
     "text": (b"hello\n", "is a text", 65),
     "hdf5": (None, "is not a file of Separatrix", 74),
     "folder": (None, "is a folder", 66),
+    "pipe": (None, "is not a regular file", 66),
     "missing": (None, "there is no file", 66),
 }
 
@@ -426,6 +428,8 @@ def test_what_is_no_result_is_called_what_it_is(separatrix, tmp_path, content):
     path = tmp_path / "strange.h5"
     if content == "folder":
         path.mkdir()
+    elif content == "pipe":
+        os.mkfifo(path)
     elif content == "hdf5":
         with h5py.File(path, "w") as file:
             file["values"] = [1.0, 2.0]

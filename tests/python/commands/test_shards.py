@@ -296,6 +296,19 @@ def test_an_existing_output_is_only_replaced_with_force(separatrix, folder):
     assert differences(folder / "whole.h5", folder / "map.h5") == []
 
 
+@pytest.mark.parametrize(
+    "output", [part(2, 3), f"./{part(2, 3)}", part(2, 3).removesuffix(".part"), "link.h5"]
+)
+def test_no_output_replaces_a_share(separatrix, folder, output):
+    """Neither the new file nor its working file replaces a share, not even with --force."""
+    (folder / "link.h5.part").symlink_to(part(2, 3))
+    before = listing(folder)
+    outcome = run(separatrix, "merge", output, *(part(i, 3) for i in (1, 2, 3)), "--force", folder=folder)
+    assert (outcome.code, outcome.out) == (64, "")
+    assert f"would replace the share '{part(2, 3)}'" in outcome.err
+    assert listing(folder) == before
+
+
 @pytest.mark.parametrize("value", ["0/3", "4/3", "1", "1/", "/3", "1/0", "-1/3", "1/3/5", "one/3", "1.0/3"])
 def test_bad_shares(separatrix, tmp_path, value):
     write_case(tmp_path)

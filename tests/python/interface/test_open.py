@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Opening result files: names, units, tables, codes, refusals."""
 
+import os
 from pathlib import Path
 
 import h5py
@@ -168,6 +169,9 @@ def test_missing_file_and_no_hdf5(tmp_path: Path) -> None:
     with pytest.raises(SeparatrixError, match="a folder, expected a file") as caught:
         open_result(tmp_path)
     assert caught.value.code == 66
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(SeparatrixError, match="not a regular file"):
+        open_result(tmp_path / "pipe.h5")
     text = tmp_path / "text.h5"
     text.write_text("not HDF5")
     with pytest.raises(SeparatrixError, match="cannot be read as HDF5") as caught:
