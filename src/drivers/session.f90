@@ -187,7 +187,7 @@ contains
     if (tiled .and. command%resume) then
       call check_resume(path, error)
     else if (tiled) then
-      call check_create(path, command%force, error)
+      call check_create(path, command%force, error, resumable=command%name /= 'merge')
     else
       call check_result(path, command%force, error)
     end if

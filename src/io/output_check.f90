@@ -66,16 +66,23 @@ contains
   end subroutine check_table
 
   !> Code 73 unless the working file of `path` and then `path` can be created; without `force` neither may exist.
-  subroutine check_create(path, force, error)
+  !> `resumable`: the command has --resume, which is the default.
+  subroutine check_create(path, force, error, resumable)
     character(len=*), intent(in) :: path
     logical, intent(in) :: force
     type(error_t), allocatable, intent(out) :: error
+    logical, intent(in), optional :: resumable
+    character(len=:), allocatable :: advice
+    advice = '--resume continues it, --force begins again'
+    if (present(resumable)) then
+      if (.not. resumable) advice = '--force begins again'
+    end if
     call check_result(path, force, error)
     if (allocated(error)) return
     call check_regular(working_path(path), error)
     if (allocated(error) .or. force) return
     if (file_exists(working_path(path))) call fail(error, exit_cannot_create, ''''//working_path(path)// &
-      ''' of an interrupted run exists; --resume continues it, --force begins again')
+      ''' of an interrupted run exists; '//advice)
   end subroutine check_create
 
   !> Code 73 unless the working file of `path` can be written, and then `path`. Without a working file to go on with a run

@@ -309,6 +309,17 @@ def test_no_output_replaces_a_share(separatrix, folder, output):
     assert listing(folder) == before
 
 
+def test_a_merge_that_was_killed_begins_again(separatrix, folder):
+    """The message names no option that merge does not have."""
+    (folder / "map.h5.part").write_text("a part")
+    command = ["merge", "map.h5", *(part(i, 3) for i in (1, 2, 3))]
+    outcome = run(separatrix, *command, folder=folder)
+    assert outcome.code == 73
+    assert "--force begins again" in outcome.err and "--resume" not in outcome.err
+    succeed(separatrix, *command, "--force", folder=folder)
+    assert differences(folder / "whole.h5", folder / "map.h5") == []
+
+
 @pytest.mark.parametrize("value", ["0/3", "4/3", "1", "1/", "/3", "1/0", "-1/3", "1/3/5", "one/3", "1.0/3"])
 def test_bad_shares(separatrix, tmp_path, value):
     write_case(tmp_path)
