@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the batch scripts do without a batch system: stripes of the output folder, with a stub of `lfs`."""
+"""What the batch scripts do without a batch system, with stubs of the commands that they call."""
 
 import os
 import subprocess
@@ -40,3 +40,24 @@ def test_a_file_system_without_stripes_ends_the_job_with_the_reason(tmp_path):
     ended, _ = set_stripes(tmp_path, 1, SEPARATRIX_STRIPES="8")
     assert ended.returncode == 73 and ended.stdout == ""
     assert "unset SEPARATRIX_STRIPES where it is not on Lustre" in ended.stderr
+
+
+def test_one_share_of_an_array_again(tmp_path):
+    """Submitted alone, an element needs the number of shares; SLURM counts those of this array only."""
+    for name, text in {"srun": 'echo "$@"', "scontrol": "exit 1", "sleep": ""}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    (tmp_path / "map.h5.shard-1-of-8.part").touch()
+    variables = {
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        "SEPARATRIX_ROOT": str(ROOT),
+        "SLURM_JOB_ID": "1",
+    }
+    variables |= {"SLURM_ARRAY_JOB_ID": "1", "SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_COUNT": "1"}
+    command = ["bash", ROOT / "scripts/slurm/array.sh", "case.toml", "map.h5"]
+    alone = subprocess.run(command, cwd=tmp_path, env=os.environ | variables, capture_output=True, text=True)
+    assert alone.returncode == 66 and "SEPARATRIX_SHARES" in alone.stderr
+    variables["SEPARATRIX_SHARES"] = "8"
+    known = subprocess.run(command, cwd=tmp_path, env=os.environ | variables, capture_output=True, text=True)
+    assert known.returncode == 0, known
+    assert "--shard 3/8" in known.stdout and "--catalogue map.h5.shard-1-of-8.part" in known.stdout
