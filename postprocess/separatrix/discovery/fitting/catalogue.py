@@ -62,8 +62,10 @@ STARTS: dict[str, Starts] = {
         "excess": [0.05 * s.force],
         "velocity": [0.15 * s.speed, 0.04 * s.speed, 0.5 * s.speed],
     },
-    # a small one has no effect on a body that does not stick without it
-    "static_excess": lambda s: {"force": [share * s.force for share in (0.1, 0.03, 0.3)]},
+    # a small one has no effect on a body that does not stick without it; a slow one yields to friction alone
+    "static_excess": lambda s: {
+        "force": [share * max(s.force, 10 * s.friction) for share in (0.1, 0.03, 0.3)]
+    },
     "dahl": lambda s: {"stiffness": [s.friction / (share * s.length) for share in (0.02, 0.005, 0.1)]},
     "asymmetric_friction": _asymmetry,
     "position_dependent_friction": lambda s: {"slope": [0.1 / s.length]},

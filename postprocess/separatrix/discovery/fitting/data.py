@@ -17,7 +17,7 @@ from separatrix.discovery.fitting.rescue import rescued, suspicious
 from separatrix.discovery.measured.condense import condense, stride
 from separatrix.discovery.measured.preflight import Prepared
 from separatrix.discovery.measured.segments import Segments, cut
-from separatrix.discovery.measured.signals import jumps, white_noise
+from separatrix.discovery.measured.signals import jumps, usual_size, white_noise
 from separatrix.discovery.measured.smoother import (
     Smoothed,
     impact_table,
@@ -355,12 +355,14 @@ def scales_of(data: Data, model) -> Scales:
     v = np.concatenate([one.v for one in data.smoothed])
     acceleration = np.concatenate([one.state[:, 2] for one in data.smoothed])
     length, speed = float(np.std(x)), float(np.sqrt(np.mean(v**2)))
-    force = mass * float(np.median(np.abs(acceleration)) / 0.6745)
+    force = mass * usual_size(acceleration)
     speeds = np.concatenate([np.abs(one.v[one.impacts]) for one in data.smoothed])
     friction = 0.05 * force
     if "friction.kinetic_coefficient" in parameters:
         gravity = parameters["body.gravity"].value
         friction = max(friction, parameters["friction.kinetic_coefficient"].value * mass * gravity)
+    # a body that mostly rests has hardly any usual acceleration
+    force = max(force, friction)
     return Scales(
         mass,
         length,

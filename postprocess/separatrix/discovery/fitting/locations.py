@@ -9,6 +9,7 @@ import numpy as np
 from separatrix.discovery.fitting.fit import Fit
 from separatrix.discovery.fitting.likelihood import Likelihood
 from separatrix.discovery.measured.bodies import Structure, contact_paths, has_motor, structure_of
+from separatrix.discovery.measured.signals import usual_size
 from separatrix.discovery.policy import FIT
 
 
@@ -69,7 +70,7 @@ def location_scales(problem: Likelihood, fit: Fit) -> SensedScales:
             found[name] = None
             continue
         mass = 1 / float(row @ (row / structure.mass))
-        size = float(np.median(np.abs(rates @ row)) / 0.6745)
+        size = usual_size(rates @ row)
         found[name] = LocationScales(
             mass,
             length,

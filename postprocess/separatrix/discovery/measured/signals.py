@@ -19,6 +19,13 @@ def white_noise(x: np.ndarray) -> float:
     return float(1.4826 * np.median(np.abs(fourth - np.median(fourth))) / np.sqrt(_FOURTH))
 
 
+def usual_size(values: np.ndarray) -> float:
+    """Standard deviation of accelerations, robustly; a share of their largest ones where a body mostly rests."""
+    sizes = np.abs(values)
+    moving = RECORDS.moving_share * float(np.quantile(sizes, RECORDS.moving))
+    return max(float(np.median(sizes)) / 0.6745, moving)
+
+
 def clipped_noise(x: np.ndarray) -> float:
     """The same from the mean square of those within three standard deviations: half of its variance.
 
