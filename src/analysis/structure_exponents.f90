@@ -8,7 +8,7 @@ module structure_exponents
   use exponents, only: batches, decay_of, error_of, lyapunov_exponents, spectrum_t
   use exponents_in_lanes, only: gather_exponents, gathers_in_lanes
   use hybrid_machine, only: event_t
-  use turn_exponents, only: exponents_from_point, exponents_of_turns
+  use turn_exponents, only: died_away, exponents_from_point, exponents_of_turns, fades_away, goes_on, quiet_sections, still
   use multibody_section, only: multibody_point, lay_out
   use multibody_state, only: multibody_state_t
   use kinds, only: int64, wp
@@ -29,12 +29,6 @@ module structure_exponents
 
   !> Section points within this share of the natural size are one.
   real(wp), parameter :: fixed = 1e-9_wp
-  !> Rate of change in natural sizes below which nothing moves; as a share of the largest, on so many sections in a row: that of a
-  !> motion whose turns go on in the rounding.
-  real(wp), parameter :: still = 1e-5_wp, died_away = 1e-9_wp
-  integer, parameter :: quiet_sections = 8
-  !> And above which it does not come to rest on a cycle.
-  real(wp), parameter :: goes_on = 1e-3_wp
 
 contains
 
@@ -219,24 +213,6 @@ contains
     spectrum%point = coordinates_of(structure, state)
     series = [(positions(1 + modulo(i - 1, size(positions))), i=1, size(series))]
   end subroutine pass_cycle
-
-  !> Whether a motion comes to rest: the paces at its sections fall from one half of them to the other as the largest exponent
-  !> predicts, by `decay` as a logarithm, while those of a motion that comes to a cycle stay.
-  pure logical function fades_away(pace, decay)
-    real(wp), intent(in) :: pace(:), decay
-    real(wp) :: fall
-    integer :: half
-    half = size(pace)/2
-    fall = mean_log(pace(:half)) - mean_log(pace(half + 1:))
-    fades_away = fall > decay/2 .or. (fall > 1 .and. pace(size(pace)) < still)
-    ! A direction that is lost does not bound the pace.
-    fades_away = fades_away .and. decay > 0 .and. decay < sqrt(huge(1.0_wp))
-  end function fades_away
-
-  pure real(wp) function mean_log(values)
-    real(wp), intent(in) :: values(:)
-    mean_log = sum(log_of(max(tiny(values), values)))/size(values)
-  end function mean_log
 
   !> Rate of change at a point of the section, in natural sizes. Where it is next to nothing the next section may be one of
   !> rounding.

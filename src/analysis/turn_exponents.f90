@@ -9,17 +9,24 @@ module turn_exponents
   use exponents, only: batches, decay_of, error_of, spectrum_t
   use hybrid_machine, only: event_t
   use kinds, only: int64, wp
-  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, tally_t
+  use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, &
+    mode_slip_minus, tally_t
   use status, only: reason_not_smooth, reason_step_failed
   use structure_family, only: vary_section
   use variations, only: neighbourhood_t
   implicit none
   private
 
-  public :: exponents_of_turns, exponents_from_point
+  public :: exponents_of_turns, exponents_from_point, fades_away
 
   !> A direction that shrinks to less than this share of the longest in a turn is rounding.
   real(wp), parameter :: digits_of_directions = 1e-13_wp
+  !> Rate of change in natural sizes below which nothing moves; as a share of the largest, on so many sections in a row: that of a
+  !> motion whose turns go on in the rounding.
+  real(wp), parameter, public :: still = 1e-5_wp, died_away = 1e-9_wp
+  integer, parameter, public :: quiet_sections = 8
+  !> And above which it does not come to rest on a cycle.
+  real(wp), parameter, public :: goes_on = 1e-3_wp
 
 contains
 
@@ -48,16 +55,26 @@ contains
     type(spectrum_t), intent(inout) :: spectrum
     real(wp), intent(out) :: series(:)
     type(event_t), allocatable :: events(:)
-    real(wp) :: growth(size(point)), frame(size(point), size(point)), batch(batches, size(point)), duration
+    real(wp) :: growth(size(point)), frame(size(point), size(point)), batch(batches, size(point)), duration, pace(turns), largest
     type(cycle_watch_t) :: watch
-    integer :: i, left, part, directions
+    integer :: i, left, part, directions, quiet
     series = 0
+    largest = 0
+    quiet = 0
     batch = 0
     duration = 0
     directions = size(point) - merge(0, 1, machines%centre%has_clock)
     left = directions
     call begin_frame(frame)
     do i = 1 - transient, turns
+      associate (rate => pace(max(1, i)))
+        rate = pace_of(machines, point)
+        largest = max(largest, rate)
+        quiet = merge(quiet + 1, 0, rate <= died_away*largest)
+        spectrum%at_rest = quiet >= quiet_sections .or. rate < still
+      end associate
+      spectrum%passed = transient + i
+      if (quiet >= quiet_sections) return
       call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
       if (spectrum%reason == reason_not_smooth .and. i < 1) then
         ! What a transient meets does not matter: the directions begin anew.
@@ -68,7 +85,8 @@ contains
       ! Nor what it loses.
       if (i < 1) then
         left = directions
-        if (.not. (machines%centre%has_clock .or. machines%centre%crank_section)) cycle
+        ! Without a clock it may be coming to rest.
+        if (.not. pace(1) > goes_on) cycle
         call watch%look(machines, point(1), point)
         if (watch%sections == 0) cycle
         call pass_cycle(machines, watch, directions, point, spectrum, series)
@@ -90,7 +108,20 @@ contains
     spectrum%passed = transient + turns
     spectrum%mean_period = duration/turns
     call conclude(batch(:, :directions)*batches/duration, left, spectrum)
+    spectrum%at_rest = .not. (machines%centre%has_clock .or. machines%centre%crank_section)
+    if (spectrum%at_rest) spectrum%at_rest = fades_away(pace, -spectrum%exponents(1)*duration/2)
   end subroutine exponents_from_point
+
+  !> Rate of change at a point of a section by an event, in natural sizes; endless where the section keeps the motion on.
+  pure real(wp) function pace_of(machines, point) result(pace)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:)
+    pace = huge(pace)
+    if (machines%centre%has_clock .or. machines%centre%crank_section) return
+    associate (machine => machines%centre)
+      pace = norm2(machine%slope(mode_slip_minus, 0.0_wp, point)/machine%size_of)*machine%size_of_time()
+    end associate
+  end function pace_of
 
   !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
   !> distinguish the directions that are left from those that are lost; the watch goes on then.
@@ -202,6 +233,24 @@ contains
       point = image
     end associate
   end subroutine advance_frame
+
+  !> Whether a motion comes to rest: the paces at its sections fall from one half of them to the other as the largest exponent
+  !> predicts, by `decay` as a logarithm, while those of a motion that comes to a cycle stay.
+  pure logical function fades_away(pace, decay)
+    real(wp), intent(in) :: pace(:), decay
+    real(wp) :: fall
+    integer :: half
+    half = size(pace)/2
+    fall = mean_log(pace(:half)) - mean_log(pace(half + 1:))
+    fades_away = fall > decay/2 .or. (fall > 1 .and. pace(size(pace)) < still)
+    ! A direction that is lost does not bound the pace.
+    fades_away = fades_away .and. decay > 0 .and. decay < sqrt(huge(1.0_wp))
+  end function fades_away
+
+  pure real(wp) function mean_log(values)
+    real(wp), intent(in) :: values(:)
+    mean_log = sum(log_of(max(tiny(values), values)))/size(values)
+  end function mean_log
 
   !> Means and standard errors of the batches (one column per exponent); directions beyond those `left` are lost.
   pure subroutine conclude(batch, left, spectrum)

@@ -2,18 +2,21 @@
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
 !> A body by expressions as a hybrid machine. Its state is x [m], v [m/s] and the states of the case; the section is that of the
-!> drive.
+!> drive, and without one where x is largest or an angle comes to half a turn, as the last event of every return.
 module own_body
+  use guards, only: turns_round
   use hybrid_machine, only: event_t
   use constants, only: two_pi
   use kinds, only: wp
   use machine_type, only: section_state_t
   use motion_state, only: log_t, mode_slip_minus, tally_t
+  use motor_motion, only: advance_motor
   use motor_rest, only: slips
   use motor_system, only: body_held, both_move, guard_body_down, guard_body_up, phi_at, v_at, w_at, x_at
   use hybrid_flow, only: add_slope_nodes, fly, hybrid_flow_t, new_flow, rates_in, values_in
   use own_machine, only: own_machine_t
-  use hybrid_body, only: rests_on_barrier, hybrid_body_t
+  use hybrid_body, only: event_of_section, guard_of_body, hybrid_body_t, jump_of_body, no_jump, rests_on_barrier
+  use turn_section, only: longest_return
   implicit none
   private
 
@@ -22,6 +25,8 @@ module own_body
   integer, parameter, public :: x_of = 1, v_of = 2
   !> A speed at an event that is none, in sizes.
   real(wp), parameter :: no_speed = 1e-9_wp
+  !> A point this near to the section by an event, in sizes, is on it: it would be met again at once.
+  real(wp), parameter :: near_section = 1e-9_wp
 
   type, extends(hybrid_body_t), public :: own_body_t
     type(own_machine_t) :: machine
@@ -34,6 +39,9 @@ module own_body
   contains
     procedure :: fly => fly_body
     procedure :: slope => slope_of_body
+    procedure :: guard => guard_of_own
+    procedure :: jump => jump_of_own
+    procedure :: section_event => section_of_own
     procedure :: start => start_of_own
     procedure :: state_at => state_of_own
     procedure :: point_of => point_of_own
@@ -51,8 +59,8 @@ contains
     type(own_machine_t), intent(in) :: machine
     character(len=:), allocatable :: why
     why = ''
-    if (.not. machine%motor%system%period > 0) then
-      why = 'drive.period: missing, needed here: a body by expressions has its section once a period'
+    if (machine%motor%system%aperiodic) then
+      why = 'drive.period: missing, needed here: '//machine%section_obstacle()
     end if
   end function why_not_varied
 
@@ -62,19 +70,22 @@ contains
     real(wp), intent(in) :: sizes(2)
     logical, intent(in) :: smooth_turns
     type(own_body_t), intent(inout) :: body
-    real(wp) :: scales(body%machine%coordinates())
+    real(wp) :: scales(body%machine%motor%system%variables - x_at + 1)
     integer :: k
     associate (machine => body%machine, system => body%machine%motor%system)
       body%n = system%variables - x_at + 1
       body%positions = 1
       body%period = machine%period
       body%turn = machine%turn
+      body%has_clock = machine%has_clock
+      machine%by_event = .not. machine%has_clock
       body%lower = machine%lower
       body%upper = machine%upper
       body%barriers = [body%lower, body%upper]
       body%force_size = system%mass*sizes(2)*machine%drive_frequency
       body%smooth_turns = smooth_turns
       body%size_of = machine%scales(sizes(1))
+      if (machine%by_event) body%size_of = [body%size_of(1), sizes(2), body%size_of(2:)]
       body%size_of = body%size_of(:body%n)
       body%size_of(v_of) = sizes(2)
       scales = body%size_of
@@ -235,7 +246,18 @@ contains
   pure type(section_state_t) function state_of_own(self, point) result(section)
     class(own_body_t), intent(in) :: self
     real(wp), intent(in) :: point(:)
-    section = self%machine%state_at(point)
+    real(wp) :: on(2)
+    if (self%has_clock) then
+      section = self%machine%state_at(point)
+    else
+      on = point(:v_of)
+      if (self%turn > 0 .and. abs(abs(on(1)) - self%turn/2) <= near_section*self%turn .and. abs(on(2)) > 0) then
+        on(1) = -sign(self%turn/2, on(2))
+      else if (abs(on(2)) <= near_section*self%size_of(v_of)) then
+        on(2) = 0
+      end if
+      section = self%machine%start([on, 0.0_wp, point(v_of + 1:)])
+    end if
   end function state_of_own
 
   pure function point_of_own(self, section) result(point)
@@ -252,9 +274,62 @@ contains
     logical, intent(out) :: ok
     type(log_t), intent(inout), optional :: log
     integer :: reason
-    call self%machine%advance_to_section(section, tally, reason, log)
-    ok = reason == 0
+    logical :: passed
+    if (self%has_clock) then
+      call self%machine%advance_to_section(section, tally, reason, log)
+      ok = reason == 0
+      return
+    end if
+    passed = .true.
+    call advance_motor(self%machine%motor, section%state, section%motor, section%state%time + longest_return*self%period, passed, &
+                       tally, reason, log)
+    ok = reason == 0 .and. passed
   end subroutine advance_own
+
+  !> The section of a machine without a clock: the velocity is zero, or the angle, upwards or downwards, half a turn.
+  pure subroutine guard_of_own(self, event, t, y, value, by_state, by_time)
+    class(own_body_t), intent(in) :: self
+    type(event_t), intent(in) :: event
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(out) :: value, by_state(:), by_time
+    if (event%guard /= turns_round) then
+      call guard_of_body(self, event, t, y, value, by_state, by_time)
+      return
+    end if
+    by_state = 0
+    by_time = 0
+    if (event%side == 0) then
+      value = y(v_of)
+      by_state(v_of) = 1
+    else
+      value = y(x_of) - event%side*self%turn/2
+      by_state(x_of) = 1
+    end if
+  end subroutine guard_of_own
+
+  pure subroutine jump_of_own(self, event, t, y, after, by_state, by_time)
+    class(own_body_t), intent(in) :: self
+    type(event_t), intent(in) :: event
+    real(wp), intent(in) :: t, y(:)
+    real(wp), intent(out) :: after(:), by_state(:, :), by_time(:)
+    if (event%guard == turns_round) then
+      call no_jump(y, after, by_state, by_time)
+      after(x_of) = y(x_of) - event%side*self%turn
+    else
+      call jump_of_body(self, event, t, y, after, by_state, by_time)
+    end if
+  end subroutine jump_of_own
+
+  pure type(event_t) function section_of_own(self, section) result(event)
+    class(own_body_t), intent(in) :: self
+    type(section_state_t), intent(in) :: section
+    event = event_of_section(self, section)
+    event%guard = turns_round
+    if (self%turn > 0 .and. abs(section%state%x) >= self%turn/2 .and. abs(section%state%v) > 0) then
+      event%side = merge(1, -1, section%state%v > 0)
+      event%arrival(x_of) = section%state%x + event%side*self%turn
+    end if
+  end function section_of_own
 
   pure subroutine arrival_of_own(self, log, i, sections, start, last, event)
     class(own_body_t), intent(in) :: self
@@ -277,7 +352,7 @@ contains
     real(wp) :: share
     integer :: i, k
     points(x_of, :) = watched(1, :)
-    points(v_of, :) = watched(2, :)
+    points(v_of, :) = merge(watched(2, :), 0.0_wp, self%has_clock)
     share = 2
     do i = 1, 60
       share = (1 + share)**(1/real(self%n - 1, wp))

@@ -146,12 +146,9 @@ def test_a_law_of_the_catalogue_has_the_same_fold_by_expressions(separatrix, sou
 )
 def test_without_a_period_there_is_no_section(separatrix, tmp_path, command: tuple[str, ...]) -> None:
     (tmp_path / "case.toml").write_text(
-        '[body]\nmass = 1\n[force.f]\nforce = "-k*x - v"\nk = 1\n[start]\nx0 = 1\n'
+        '[body]\nmass = 1\n[force.f]\nforce = "-k*x - v + sin(t)"\nk = 1\n[start]\nx0 = 1\n'
     )
     name, *options = command
     refused = run(separatrix, name, "case.toml", *options, folder=tmp_path)
     assert refused.code == 65
-    assert (
-        "drive.period: missing, needed here: a body by expressions has its section once a period"
-        in refused.err
-    )
+    assert "drive.period: missing, needed here: forces depend on the time t" in refused.err
