@@ -67,12 +67,10 @@ contains
     left = directions
     call begin_frame(frame)
     do i = 1 - transient, turns
-      associate (rate => pace(max(1, i)))
-        rate = pace_of(machines, point)
-        largest = max(largest, rate)
-        quiet = merge(quiet + 1, 0, rate <= died_away*largest)
-        spectrum%at_rest = quiet >= quiet_sections .or. rate < still
-      end associate
+      pace(max(1, i)) = pace_of(machines, point)
+      largest = max(largest, pace(max(1, i)))
+      quiet = merge(quiet + 1, 0, pace(max(1, i)) <= died_away*largest)
+      spectrum%at_rest = quiet >= quiet_sections .or. pace(max(1, i)) < still
       spectrum%passed = transient + i
       if (quiet >= quiet_sections) return
       call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
@@ -90,10 +88,7 @@ contains
         call watch%look(machines, point(1), point)
         if (watch%sections == 0) cycle
         call pass_cycle(machines, watch, directions, point, spectrum, series)
-        if (spectrum%known .or. spectrum%reason /= 0) then
-          spectrum%passed = transient + i
-          return
-        end if
+        if (spectrum%known .or. spectrum%reason /= 0) return
         cycle
       end if
       duration = duration + duration_of(machines, events)

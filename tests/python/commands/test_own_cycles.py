@@ -136,7 +136,8 @@ def test_a_rotation_has_the_multiplier_of_its_losses(separatrix, tmp_path):
     """exp(-c T/J), as no other torque changes with the speed."""
     (tmp_path / "case.toml").write_text(
         '[body]\nmass = "1 kg m^2"\n[restoring]\nlaw = "pendulum"\nmoment = "1 N m"\n[force.motor]\n'
-        'force = "m - c*v"\nm = "1.3 N m"\nc = "0.3 N m s/rad"\n[start]\nx0 = "0.1 rad"\n[run]\nduration = 100\n'
+        'force = "m - c*v"\nm = "1.3 N m"\nc = "0.3 N m s/rad"\n[start]\nx0 = "0.1 rad"\n'
+        "[run]\nduration = 100\n"
     )
     found, _ = exponents(separatrix, tmp_path)
     assert found == pytest.approx([-0.3], rel=1e-6)
