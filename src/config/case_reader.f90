@@ -21,6 +21,7 @@ module case_reader
   use law_table, only: largest_angle
   use restoring_law, only: position_is_angle
   use sample_reader, only: read_samples
+  use slip_reader, only: write_out_slip
   use structure_data, only: structure_file_reader
   use refinement, only: largest_block, largest_step, most_probes
   use toml_bindings, only: read_text_file
@@ -65,6 +66,7 @@ contains
     if (allocated(error)) return
     if (present(structure_file)) source%structure_file => structure_file
     call take_text(source, 'title', the_case%title)
+    call write_out_slip(source)
     call read_laws(source, the_case%laws)
     call read_start(source, the_case)
     call read_run(source, the_case)

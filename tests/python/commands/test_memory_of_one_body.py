@@ -133,7 +133,6 @@ def test_maps_over_the_friction_and_the_deflection(separatrix, tmp_path):
             '[force.friction]\nforce = "v"\n',
             "key 'force.friction': found the name that friction with memory has",
         ),
-        ('[friction]\nlaw = "elastic_coulomb"\n', "; elastic_coulomb in [friction.NAME] beside [body.NAME]"),
         (
             LUGRE.replace("1.5", "0.5"),
             "key 'friction.static_force': found 0.5 N, allowed at least the force 1.0",
