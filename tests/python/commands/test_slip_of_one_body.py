@@ -141,7 +141,7 @@ def test_sweeps_and_maps_take_the_keys_of_one_body(separatrix, tmp_path):
     text = ONE.format(drive="force", more=DRIVES["force"])
     text += FRICTION.format(law="maxwell_slip", stiffness=[400, 150], force=[1, 1.2])
     text += '[sweep]\nparameter = "drive.amplitude"\nfrom = 7\nto = 9\ncount = 2\n'
-    text += 'starts = [1, 1]\nx0 = [0, 0]\nv0 = [0, 0]\n'
+    text += "starts = [1, 1]\nx0 = [0, 0]\nv0 = [0, 0]\n"
     text += '[[axis]]\nname = "friction.velocity"\nfrom = 0\nto = 0.1\ncount = 2\n'
     text += '[[axis]]\nname = "x0"\nfrom = -0.1\nto = 0.1\ncount = 2\n'
     (tmp_path / "case.toml").write_text(text)
