@@ -142,6 +142,8 @@ def summary(verdict: dict) -> list[str]:
             added(verdict),
         ],
     }[verdict["outcome"]]
+    if memory := verdict.get("memory"):
+        lines.append(f"  {memory['text']}")
     if verdict["in_families"]:
         lines.append(
             f"  in any case {' and '.join(verdict['in_families'])}: the form is in doubt, not the family"

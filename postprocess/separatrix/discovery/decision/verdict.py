@@ -8,6 +8,7 @@ import numpy as np
 
 from separatrix.discovery.decision.experiments import experiments
 from separatrix.discovery.decision.limits import advice, detectable, equivalents
+from separatrix.discovery.decision.memory import memory_of
 from separatrix.discovery.decision.misfit import doubted_noise, too_quiet, unused
 from separatrix.discovery.decision.negative_controls import negative_controls
 from separatrix.discovery.decision.other_machine import other_drive, other_machine, other_phase, other_units
@@ -68,6 +69,7 @@ def verdict_of(findings: Findings) -> dict:
         "effects": named,
         "added": list(final.names) if decision.added else [],
         "not_added": decision.not_added,
+        "memory": None if decision.accepted or decision.outcome == "none" else memory_of(findings),
         "alternatives": ["+".join(names) for names in decision.alternatives],
         "equivalent": decision.equivalent,
         "in_families": decision.in_families,

@@ -53,13 +53,7 @@ def _accelerations(model, values: dict[str, float], motion: Driven, measured: np
 
 def _unslipped(model, values: dict[str, float], motion: Driven, pieces: list[tuple[int, int]]) -> np.ndarray:
     """State of Dahl's friction less that after a long slip in the direction of the motion [N]."""
-    stiffness = _value(model, values, _DAHL)
-    dry = _value(model, values, "effect.coulomb.force")
-    dry += (
-        _value(model, values, "friction.kinetic_coefficient")
-        * _value(model, values, "body.mass")
-        * _value(model, values, "body.gravity")
-    )
+    stiffness, dry = _value(model, values, _DAHL), dry_friction(model, values)
     more = _value(model, values, "effect.asymmetric_friction.coulomb")
     found = np.zeros(motion.x.size)
     for first, last in pieces:
@@ -73,6 +67,13 @@ def _unslipped(model, values: dict[str, float], motion: Driven, pieces: list[tup
             way = np.abs(motion.x[a:b] - begun)
             found[a:b] = behind * np.exp(-stiffness * way / max(abs(level), 1e-300))
     return found
+
+
+def dry_friction(model, values: dict[str, float]) -> float:
+    """Constant dry friction of a machine with these values [N]."""
+    weight = _value(model, values, "body.mass") * _value(model, values, "body.gravity")
+    constant = _value(model, values, "effect.coulomb.force")
+    return constant + _value(model, values, "friction.kinetic_coefficient") * weight
 
 
 def _slipping(sign: int, dry: float, more: float) -> float:

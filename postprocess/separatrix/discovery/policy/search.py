@@ -169,6 +169,11 @@ class Search:
         "what imperfections must explain to hide an effect")
     hiding_share: float = row(0.3, "1", "campaign", "the same over the gap")
     imperfect_rounds: int = row(2, "1", "effort", "iterations of the motion along which imperfections act")
+    # decision/memory.py
+    memory_gap: float = row(2.0, "1", "test", "chi^2 of a sample above which memory is looked for")
+    memory_closed: float = row(0.5, "1", "test", "share of a gap that a law with memory must close")
+    memory_odds: float = row(3.0, "1", "test", "difference of two laws, stroke by stroke, over its error")
+    memory_alike: float = row(1.1, "1", "test", "ratio of what two laws leave that does not distinguish them")
     # decision/stages/several_effects.py
     closes_held_out: float = row(0.5, "1", "campaign",
         "share of a held-out gap that another effect must close")

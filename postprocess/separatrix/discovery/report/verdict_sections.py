@@ -51,6 +51,7 @@ def sections(verdict: dict) -> list[Section]:
         _summary(verdict),
         _compared(verdict),
         _gap(verdict),
+        *_memory(verdict),
         _where(verdict),
         _missing(verdict),
         Section("confusable", "What can be mistaken for what", [_confusable(verdict)]),
@@ -78,6 +79,20 @@ def cause(verdict: dict) -> str:
     """What makes a gap without a name, as words."""
     found = depends_on(verdict)
     return f"a {found}" if found == LOW_PASS else f"a force that depends on {found}"
+
+
+def _memory(verdict: dict) -> list[Section]:
+    """What laws of friction with memory leave of a force, beside forces without memory."""
+    found = verdict.get("memory")
+    if not found:
+        return []
+    uses = [use for use in ("training", "held_out") if use in found["laws"][0]]
+    rows = []
+    for law in found["laws"]:
+        left = [f"{100 * law[use]['share']:.3g} %, {law[use]['left']:.3g} N" for use in uses]
+        rows.append([words(law["name"]), *left])
+    head = ["law", *(f"of the force left, {use.replace('_', ' ')}" for use in uses)]
+    return [Section("memory", "Friction with memory", [f"{found['text']}.", Table(head, rows)])]
 
 
 def _summary(verdict: dict) -> Section:
@@ -109,6 +124,8 @@ def _summary(verdict: dict) -> Section:
         )
     elif verdict["not_added"]:
         lines.append(f"{verdict['not_added'][0].upper()}{verdict['not_added'][1:]}.")
+    if memory := verdict.get("memory"):
+        lines.append(f"{memory['text'][0].upper()}{memory['text'][1:]}.")
     if verdict["in_families"]:
         lines.append(
             f"In any case it is {' and '.join(verdict['in_families'])}: the form is in doubt, not the family."
