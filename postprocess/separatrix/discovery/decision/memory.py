@@ -192,7 +192,8 @@ def _of_one_length(name: str, runs: dict, lengths: np.ndarray, law, chosen: dict
 def _slips(runs: dict, lengths: np.ndarray) -> Law:
     """Springs that slip, in parallel."""
     fitted, sizes = _fit(
-        "maxwell_slip", runs, lambda run: np.column_stack([run.beside, slip(run.motion, run.pieces, lengths)]),
+        "maxwell_slip", runs,
+        lambda run: np.column_stack([run.beside, slip(run.motion, run.pieces, lengths)]),
         lengths.size,
     )  # fmt: skip
     sizes = sizes[-lengths.size :]
@@ -226,7 +227,8 @@ def _fit(name: str, runs: dict, columns, positive: int) -> tuple[Law, np.ndarray
         low[count - positive :] = 0.0
     whole = np.vstack([matrix / scale, _RIDGE * np.linalg.norm(right) * np.eye(count)])
     found = lsq_linear(
-        whole, np.append(right, np.zeros(count)), (np.minimum(low * scale, -1e-12), np.maximum(high * scale, 1e-12)),
+        whole, np.append(right, np.zeros(count)),
+        (np.minimum(low * scale, -1e-12), np.maximum(high * scale, 1e-12)),
         method="bvls",
     ).x / scale  # fmt: skip
     chi2 = float(np.sum((matrix @ found - right) ** 2))
@@ -286,7 +288,9 @@ def _reported(runs: dict, laws: list[Law]) -> dict:
         names = [best.name]
         for law in memories:
             near = sizes[law.name][use]["left"] < SEARCH.memory_alike * sizes[best.name][use]["left"]
-            if law is not best and (near or not _beats(runs[use], best.left[use], law.left[use])):
+            # what leaves only noise is as good as the best
+            noise = all(one["chi2"] < SEARCH.memory_gap for one in sizes[law.name].values())
+            if law is not best and (near or noise or not _beats(runs[use], best.left[use], law.left[use])):
                 names.append(law.name)
     listed = [
         {"name": law.name, "parameters": law.parameters, **sizes[law.name]}
