@@ -5,6 +5,7 @@
 from separatrix.discovery.decision.stages.in_part import NEAREST
 from separatrix.discovery.fitting.low_pass import LOW_PASS
 from separatrix.discovery.options import Options
+from separatrix.discovery.report.memory_section import memory_section
 from separatrix.discovery.report.next_experiment import next_experiment
 from separatrix.discovery.report.pages import Section, Table
 from separatrix.discovery.report.phrases import explained
@@ -51,7 +52,7 @@ def sections(verdict: dict) -> list[Section]:
         _summary(verdict),
         _compared(verdict),
         _gap(verdict),
-        *_memory(verdict),
+        *memory_section(verdict),
         _where(verdict),
         _missing(verdict),
         Section("confusable", "What can be mistaken for what", [_confusable(verdict)]),
@@ -79,20 +80,6 @@ def cause(verdict: dict) -> str:
     """What makes a gap without a name, as words."""
     found = depends_on(verdict)
     return f"a {found}" if found == LOW_PASS else f"a force that depends on {found}"
-
-
-def _memory(verdict: dict) -> list[Section]:
-    """What laws of friction with memory leave of a force, beside forces without memory."""
-    found = verdict.get("memory")
-    if not found:
-        return []
-    uses = [use for use in ("training", "held_out") if use in found["laws"][0]]
-    rows = []
-    for law in found["laws"]:
-        left = [f"{100 * law[use]['share']:.3g} %, {law[use]['left']:.3g} N" for use in uses]
-        rows.append([words(law["name"]), *left])
-    head = ["law", *(f"of the force left, {use.replace('_', ' ')}" for use in uses)]
-    return [Section("memory", "Friction with memory", [f"{found['text']}.", Table(head, rows)])]
 
 
 def _summary(verdict: dict) -> Section:
