@@ -61,6 +61,18 @@ def test_the_right_machine_leaves_noise_of_rests_that_cost_few_rows(slow_case):
         )
 
 
+def test_sizes_of_a_body_that_mostly_rests_are_those_of_its_motion(slow_case):
+    folder = slow_case("static_excess", 23, small=True)
+    base = Model.read(folder / "base.toml")
+    data = gather([prepare(read_record(folder / name), base) for name in FILES[:2]], 1.0, None)
+    scales = scales_of(data, base)
+    assert scales.force >= scales.friction
+    found = candidate(base, data.unknowns(base), (), "static_excess", scales)
+    (one,) = (found.free[i] for i in found.added)
+    assert one.lower < np.log(1.4715) < one.upper
+    assert any(abs(start[0] - np.log(1.4715)) < np.log(2) for start in found.starts)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("hidden", "name", "small"),
@@ -69,6 +81,7 @@ def test_the_right_machine_leaves_noise_of_rests_that_cost_few_rows(slow_case):
         ("stribeck", "stribeck", True),
         ("position_dependent_friction", "friction_position_curve", False),
         ("static_excess", "static_excess", False),
+        ("static_excess", "static_excess", True),
         ("dahl", "dahl", False),
     ],
 )

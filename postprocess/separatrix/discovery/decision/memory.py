@@ -57,12 +57,15 @@ class Law:
 
 
 def memory_of(findings) -> dict | None:
-    """What laws of memory close in force records, as an entry of the verdict; None for other records."""
-    base, predicted = findings.base, findings.decision.predicted
-    if (
-        findings.context.options.compare != "force"
-        or "effect.dahl.stiffness" in base.problem.model.parameters
-    ):
+    """What laws of memory close in force records, as an entry of the verdict.
+
+    None for other records, and where nothing is missing or an effect is named.
+    """
+    base, decision = findings.base, findings.decision
+    predicted = decision.predicted
+    if decision.accepted or decision.outcome == "none" or findings.context.options.compare != "force":
+        return None
+    if "effect.dahl.stiffness" in base.problem.model.parameters:
         return None
     if any(getattr(one, "driven", None) is None for one in base.problem.prepared):
         return None

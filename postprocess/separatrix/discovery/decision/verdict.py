@@ -69,7 +69,7 @@ def verdict_of(findings: Findings) -> dict:
         "effects": named,
         "added": list(final.names) if decision.added else [],
         "not_added": decision.not_added,
-        "memory": None if decision.accepted or decision.outcome == "none" else memory_of(findings),
+        "memory": memory_of(findings),
         "alternatives": ["+".join(names) for names in decision.alternatives],
         "equivalent": decision.equivalent,
         "in_families": decision.in_families,
@@ -114,9 +114,7 @@ def verdict_of(findings: Findings) -> dict:
 
 def _next(findings: Findings, final: Fitted, rivals: list[Fitted]) -> dict:
     """What to measure next where the name is in doubt: known advice, experiments by their d'."""
-    if findings.decision.outcome != "ambiguous":
-        return {"separating_experiment": "", "experiments": []}
-    if not final.problem.experiment:
+    if findings.decision.outcome != "ambiguous" or not final.problem.experiment:
         return {"separating_experiment": "", "experiments": []}
     others = rivals[: SEARCH.experiment_rivals] or [findings.base]
     name, *names = (" with ".join(one.names) or "the machine without it" for one in (final, *others))

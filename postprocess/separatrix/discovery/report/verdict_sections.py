@@ -98,21 +98,16 @@ def _summary(verdict: dict) -> Section:
     }[verdict["outcome"]]
     lines = [f"Verdict: {verdict['outcome']}. {text}"]
     if verdict["p_value"] is not None:
-        lines.append(
-            "Chance alone would make the best of all effects gain so much with a probability "
-            f"{_chance(verdict)}."
-        )
+        chance = "Chance alone would make the best of all effects gain so much with a probability"
+        lines.append(f"{chance} {_chance(verdict)}.")
     for index, one in enumerate(verdict["character"]):
         lines.append(f"{'Or ' if index else 'Most likely '}{one['text']}.")
     if verdict["added"]:
-        lines.append(
-            f"It is added to the case as a table, effect.{verdict['added'][-1]}: no name, but the function "
-            "that closes the gap."
-        )
-    elif verdict["not_added"]:
-        lines.append(f"{verdict['not_added'][0].upper()}{verdict['not_added'][1:]}.")
-    if memory := verdict.get("memory"):
-        lines.append(f"{memory['text'][0].upper()}{memory['text'][1:]}.")
+        table = f"effect.{verdict['added'][-1]}"
+        closing = "no name, but the function that closes the gap"
+        lines.append(f"It is added to the case as a table, {table}: {closing}.")
+    memory = (verdict.get("memory") or {}).get("text")
+    lines += [f"{one[0].upper()}{one[1:]}." for one in (verdict["not_added"], memory) if one]
     if verdict["in_families"]:
         lines.append(
             f"In any case it is {' and '.join(verdict['in_families'])}: the form is in doubt, not the family."
