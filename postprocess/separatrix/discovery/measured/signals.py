@@ -22,7 +22,7 @@ def white_noise(x: np.ndarray) -> float:
 def usual_size(values: np.ndarray) -> float:
     """Standard deviation of accelerations, robustly; a share of the largest where a body mostly rests."""
     sizes = np.abs(values)
-    moving = RECORDS.moving_share * float(np.quantile(sizes, RECORDS.moving))
+    moving = RECORDS.moving_share * float(np.quantile(sizes, RECORDS.in_motion))
     return max(float(np.median(sizes)) / 0.6745, moving)
 
 

@@ -95,7 +95,7 @@ class Records:
     # measured/cranks.py
     steady_voltage: float = row(0.01, "1", "rig", "slow change of a voltage over its mean in one record")
     # measured/signals.py
-    moving: float = row(0.9, "1", "campaign", "quantile of accelerations that motion reaches")
+    in_motion: float = row(0.9, "1", "campaign", "quantile of accelerations that motion reaches")
     moving_share: float = row(0.3, "1", "campaign",
         "share of this quantile that is their usual size where a body mostly rests")
     quiet: float = row(1e-6, "1", "rounding", "noise that is assumed where none is found, over the scatter")
