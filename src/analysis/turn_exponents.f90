@@ -237,7 +237,8 @@ contains
     integer :: half
     half = size(pace)/2
     fall = mean_log(pace(:half)) - mean_log(pace(half + 1:))
-    fades_away = fall > decay/2 .or. (fall > 1 .and. pace(size(pace)) < still)
+    ! The pace of a motion that dies away by a power of time falls by a share of that: a third under a cubic drag.
+    fades_away = fall > decay/8 .or. (fall > 1 .and. pace(size(pace)) < still)
     ! A direction that is lost does not bound the pace.
     fades_away = fades_away .and. decay > 0 .and. decay < sqrt(huge(1.0_wp))
   end function fades_away

@@ -148,3 +148,11 @@ def test_a_motion_that_dies_away_is_no_cycle(separatrix, tmp_path):
     ended = run(separatrix, "stability", "case.toml", "--periods", "400", folder=tmp_path)
     assert "not known: the motion comes to rest" in ended.out
     assert "periodic" not in ended.out
+
+
+@pytest.mark.parametrize("drag", ["0.1*v*abs(v)", "0.1*v^3"])
+def test_a_motion_that_dies_away_by_a_power_of_time_is_no_cycle(separatrix, tmp_path, drag):
+    write(tmp_path, f'[force.spring]\nforce = "-x - {drag}"\n')
+    ended = run(separatrix, "stability", "case.toml", "--periods", "1000", folder=tmp_path)
+    assert "comes to rest" in ended.out
+    assert "periodic" not in ended.out
