@@ -22,6 +22,8 @@ module cycle_reached
   !> come to it; and Newton's method has converged where its steps are no longer.
   real(wp), parameter :: same = 1e-7_wp, on_cycle = 1e-6_wp, beside_cycle = 1, converged = 1e-11_wp
   integer, parameter :: most_newton = 12
+  !> In natural sizes: a coordinate that differs by more when the watched position has come back drifts.
+  real(wp), parameter :: no_drift = 1e-4_wp
   !> Of a motion that has not come back yet: the longest cycle that it may come to, in how many sections the distance must shrink,
   !> taken as the largest of so many, and by how much, as a logarithm, the multiplier lets it at least.
   integer, parameter :: longest = 32, watched_sections = 20000, block = 256
@@ -99,6 +101,8 @@ contains
     period = period_of_section(series, same)
     spectrum%returns = period > 0
     if (.not. allocated(spectrum%point)) return
+    if (spectrum%returns) spectrum%drifts = .not. comes_back(machines%centre, spectrum%point, period, no_drift)
+    if (spectrum%drifts) spectrum%returns = .false.
     if (.not. spectrum%returns) period = nearest_period(series)
     call find_cycle(machines, period, spectrum%point, point, sections, values)
     if (sections == 0) return
@@ -126,7 +130,7 @@ contains
     if (.not. ok) return
     do k = 1, period
       if (modulo(period, k) /= 0) cycle
-      if (comes_back(machines, point, k)) exit
+      if (comes_back(machines%centre, point, k, same)) exit
     end do
     ! Newton's method came to an orbit too unstable to come back to the digits it is known to.
     if (k > period) return
@@ -204,15 +208,17 @@ contains
     end associate
   end subroutine refine
 
-  !> Whether a point of the section comes back after `sections`.
-  logical function comes_back(machines, point, sections) result(back)
-    type(neighbourhood_t), intent(in) :: machines
-    real(wp), intent(in) :: point(:)
+  !> Whether a point of the section comes back after `sections` to within `room` in natural sizes.
+  logical function comes_back(machine, point, sections, room) result(back)
+    class(hybrid_t), intent(in) :: machine
+    real(wp), intent(in) :: point(:), room
     integer, intent(in) :: sections
+    type(event_t), allocatable :: events(:)
     type(tally_t) :: tally
-    real(wp) :: image(size(point)), matrix(size(point), size(point))
-    call machines%centre%map(machines, point, sections, image, matrix, tally, back)
-    if (back) back = distance(machines%centre, image, point) <= same
+    real(wp) :: image(size(point))
+    integer :: mode
+    call machine%fly_sections(point, sections, .false., image, events, mode, tally, back)
+    if (back) back = distance(machine, image, point) <= room
   end function comes_back
 
   !> In natural sizes.

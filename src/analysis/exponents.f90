@@ -53,6 +53,8 @@ module exponents
     logical :: has_sum = .false.
     !> The motion comes back to its section points, over and over.
     logical :: returns = .false.
+    !> Its watched position does, and another coordinate does not.
+    logical :: drifts = .false.
     !> The last section point that was kept, the number of sections of the cycle that it is on (0: none is known), and the largest
     !> modulus of the multipliers of that.
     real(wp), allocatable :: point(:)
@@ -330,7 +332,7 @@ contains
     !> Of a logarithm over a section.
     real(wp), parameter :: rounding = 10*epsilon(1.0_wp)
     motion = motion_not_known
-    if (.not. spectrum%known .or. spectrum%at_rest) return
+    if (.not. spectrum%known .or. spectrum%at_rest .or. spectrum%drifts) return
     associate (largest => spectrum%exponents(1), error => spectrum%errors(1), room => 3*spectrum%errors(1) + spectrum%memory)
       if (spectrum%cycle > 0 .and. spectrum%multiplier < 1 - on_circle) then
         if (k < regular_to) motion = motion_contracting

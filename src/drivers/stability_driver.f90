@@ -122,6 +122,7 @@ contains
     name = trim(motion_names(type_of_motion(spectrum, k)))
     what = 'is '//replace_all(replace_all(name, 'not_known', 'not known'), '_', '-')
     if (spectrum%at_rest) what = 'comes to rest'
+    if (spectrum%drifts) what = 'is not known: its position comes back, and a state drifts'
     call session%journal%line('motion', 'the motion '//what//', '//seen_text(spectrum, has_clock)//needed_text(spectrum, k), &
       '"type": '//json_text(name)//', "periods": '//to_text(spectrum%periods)//', "impacts": '//to_text(spectrum%impacts)//more)
   end subroutine report

@@ -156,3 +156,11 @@ def test_a_motion_that_dies_away_by_a_power_of_time_is_no_cycle(separatrix, tmp_
     ended = run(separatrix, "stability", "case.toml", "--periods", "1000", folder=tmp_path)
     assert "comes to rest" in ended.out
     assert "periodic" not in ended.out
+
+
+@pytest.mark.parametrize("rate", ["1", "x^2"])
+def test_a_state_that_drifts_is_on_no_cycle(separatrix, tmp_path, rate):
+    write(tmp_path, PUMP.format(mu=1) + f'[state.d]\nrate = "{rate}"\n')
+    ended = run(separatrix, "stability", "case.toml", "--periods", "1000", folder=tmp_path)
+    assert "periodic" not in ended.out
+    assert "not known" in ended.out
