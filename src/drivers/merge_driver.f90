@@ -64,10 +64,12 @@ contains
     type(command_t), intent(in) :: command
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: share
+    logical :: replaces(2)
     integer :: i
     do i = 1, size(command%shards)
       share = trim(command%shards(i))
-      if (.not. (is_same_file(command%path, share) .or. is_same_file(working_path(command%path), share))) cycle
+      replaces = [is_same_file(command%path, share), is_same_file(working_path(command%path), share)]
+      if (.not. any(replaces)) cycle
       call fail(error, exit_usage, "the output '"//command%path//"' would replace the share '"//share// &
                 "': the first name after 'merge' is that of the new file")
       return
