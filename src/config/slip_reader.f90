@@ -60,7 +60,9 @@ contains
     is_admitted = goes('restoring', [character(len=8) :: 'none', 'linear', 'pendulum']) .and. &
                   goes('contact', [character(len=8) :: 'none']) .and. &
                   goes('drive', [character(len=8) :: 'none', 'force', 'harmonic', 'fourier', 'base'])
-    if (is_table(source, 'effect') .or. is_table(source, 'motor')) is_admitted = .false.
+    is_admitted = is_admitted .and. is_table(source, 'body') .and. .not. (is_table(source, 'effect') .or. is_table(source, 'motor'))
+    ! Beside 'none' other keys are errors, which the short form reports.
+    is_admitted = is_admitted .and. .not. (is_idle('restoring') .or. is_idle('drive'))
     if (text_of(source, 'drive.law') == 'harmonic' .or. text_of(source, 'drive.law') == 'fourier') then
       is_admitted = is_admitted .and. text_of(source, 'restoring.law') == 'linear' .and. find(source, 'drive.ratio') == 0
     end if
@@ -72,6 +74,13 @@ contains
       character(len=8), intent(in) :: allowed(:)
       goes = .not. is_table(source, table) .or. any(allowed == text_of(source, table//'.law'))
     end function goes
+
+    pure logical function is_idle(table)
+      character(len=*), intent(in) :: table
+      integer :: k
+      is_idle = text_of(source, table//'.law') == 'none' .and. &
+                count([(starts_with(source%entries(k)%entry%path, table//'.'), k=1, size(source%entries))]) > 1
+    end function is_idle
 
   end function is_admitted
 

@@ -167,3 +167,13 @@ def test_what_needs_parts_is_refused(separatrix, tmp_path, more):
     found = run(separatrix, "trajectory", "case.toml", "-o", "out.h5", folder=tmp_path)
     assert found.code == 65
     assert "maxwell_slip in [friction.NAME] beside [body.NAME]" in found.err
+
+
+@pytest.mark.parametrize("table", ["drive", "restoring"])
+def test_a_key_beside_no_law_is_refused(separatrix, tmp_path, table):
+    """It would have no effect."""
+    text = ONE.format(drive="force", more=DRIVES["force"])
+    text += FRICTION.format(law="maxwell_slip", stiffness=[400, 150], force=[1, 1.2])
+    (tmp_path / "case.toml").write_text(text)
+    more = ("--set", f'{table}.law="none"')
+    assert run(separatrix, "trajectory", "case.toml", "-o", "out.h5", *more, folder=tmp_path).code == 65
