@@ -5,7 +5,8 @@
 !> and both parameters. Where a second condition vanishes on the way the point is located: of codimension two.
 module bifurcation_curve
   use body_family, only: family_t
-  use branch_point, only: label_gr, label_gr_fold, label_pd, label_sn, label_stick, no_label, point_t
+  use branch_point, only: label_gr, label_gr_fold, label_not_known, label_pd, label_range, label_sn, label_stick, no_label, point_t
+  use continuation, only: continuation_t
   use curve_equations, only: at_zero, beside_like, correct, curve_plan_t, curve_point_t, looked_at, move, curve_position_t, &
     set_position, &
     set_tangent, unknowns
@@ -19,8 +20,8 @@ module bifurcation_curve
   public :: trace_curve, can_be_followed, curve_label, passes
 
   integer, parameter :: most_points = 200, most_secants = 50
-  !> Steps of the curve in natural sizes; turn of the tangent in one [cosine].
-  real(wp), parameter :: first_step = 1e-3_wp, largest_step = 0.03_wp, smallest_step = 1e-8_wp, least_cosine = 0.95_wp
+  !> Steps of the curve in natural sizes.
+  real(wp), parameter :: first_step = 1e-3_wp, largest_step = 0.03_wp, smallest_step = 1e-8_wp
   !> Two labelled points are one when the parameter agrees to this share of its range, and the orbits to this in natural sizes.
   real(wp), parameter :: same_point = 1e-8_wp, same_orbit = 1e-5_wp
   !> A point of codimension two is interpolated between so many, with values of about this.
@@ -32,6 +33,17 @@ module bifurcation_curve
     integer :: label = no_label
     type(curve_point_t), allocatable :: points(:)
   end type curve_t
+
+  !> One way along a curve: where it is, what was looked at beside it there, and the neighbour that was tried.
+  type, extends(continuation_t) :: curve_way_t
+    type(family_t) :: family
+    type(curve_plan_t) :: plan
+    type(curve_position_t) :: position, next
+    type(margin_t) :: beside(2)
+    type(curve_point_t), allocatable :: points(:)
+  contains
+    procedure :: points_found, try_step, take_step, give_up
+  end type curve_way_t
 
 contains
 
@@ -134,45 +146,65 @@ contains
     type(curve_plan_t), intent(in) :: plan
     type(curve_position_t), intent(in) :: start
     type(curve_point_t), allocatable, intent(out) :: points(:)
-    type(curve_position_t) :: position, next
-    type(margin_t) :: before(2), after(2)
-    real(wp) :: step
+    type(curve_way_t) :: way
+    way%family = family
+    way%plan = plan
+    way%position = start
+    way%points = [start%now]
+    way%beside = looked_at(family, plan, start)
+    call way%follow(first_step, smallest_step, most_points)
+    call move_alloc(way%points, points)
+  end subroutine trace_one_way
+
+  pure integer function points_found(self)
+    class(curve_way_t), intent(in) :: self
+    points_found = size(self%points)
+  end function points_found
+
+  subroutine try_step(self, cosine, ok)
+    class(curve_way_t), intent(inout) :: self
+    real(wp), intent(out) :: cosine
+    logical, intent(out) :: ok
+    cosine = -1
+    call step_on(self%family, self%plan, self%position, self%step, self%next, ok)
+    if (ok) cosine = sum(self%next%tangent*self%position%tangent)
+  end subroutine try_step
+
+  subroutine give_up(self)
+    class(curve_way_t), intent(inout) :: self
+    self%ending = label_not_known
+  end subroutine give_up
+
+  subroutine take_step(self)
+    class(curve_way_t), intent(inout) :: self
+    type(margin_t) :: after(2)
     logical :: ok
-    position = start
-    points = [position%now]
-    step = first_step
-    before = looked_at(family, plan, position)
-    do while (size(points) < most_points)
-      call step_on(family, plan, position, step, next, ok)
-      if (ok) ok = sum(next%tangent*position%tangent) > least_cosine
-      if (.not. ok) then
-        step = step/2
-        if (step < smallest_step) return
-        cycle
-      end if
+    associate (family => self%family, plan => self%plan, position => self%position, next => self%next, before => self%beside)
       if (.not. is_within(plan, next%now)) then
-        call end_at_range(family, plan, position, step, points)
+        call end_at_range(family, plan, position, self%step, self%points)
+        self%ending = label_range
         return
       end if
       after = looked_at(family, plan, next)
-      if (after(1)%value < 0 .and. before(1)%value > at_zero) then
-        call locate(family, plan, position, step, 1, after(1), next, ok)
-        if (ok) points = [points, next%now]
-        return
-      end if
       ! Beyond a margin that was at zero before, or was not there: no motion of the machine.
-      if (after(1)%value < -at_zero) return
-      if (max(abs(before(2)%value), abs(after(2)%value)) < huge(1.0_wp) .and. before(2)%value*after(2)%value < 0) then
-        call locate(family, plan, position, step, 2, after(2), next, ok)
-        if (ok) points = [points, next%now]
-        call step_on(family, plan, position, step, next, ok)
+      if (after(1)%value < -at_zero) self%ending = label_not_known
+      if (after(1)%value < 0 .and. before(1)%value > at_zero) then
+        call locate(family, plan, position, self%step, 1, after(1), next, ok)
+        if (ok) self%points = [self%points, next%now]
+        self%ending = label_not_known
       end if
-      points = [points, next%now]
+      if (self%ending /= no_label) return
+      if (max(abs(before(2)%value), abs(after(2)%value)) < huge(1.0_wp) .and. before(2)%value*after(2)%value < 0) then
+        call locate(family, plan, position, self%step, 2, after(2), next, ok)
+        if (ok) self%points = [self%points, next%now]
+        call step_on(family, plan, position, self%step, next, ok)
+      end if
+      self%points = [self%points, next%now]
       position = next
       before = after
-      step = min(largest_step, 1.4_wp*step)
-    end do
-  end subroutine trace_one_way
+      self%step = min(largest_step, 1.4_wp*self%step)
+    end associate
+  end subroutine take_step
 
   pure logical function is_within(plan, now)
     type(curve_plan_t), intent(in) :: plan

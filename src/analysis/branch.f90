@@ -6,21 +6,23 @@
 !> a name.
 module branch
   use body_family, only: family_t
-  use branch_passage, only: first_passed, most_secants, no_passage, note_bifurcations
-  use branch_point, only: branch_t, label_chatter, label_closed, label_gr, label_long, label_not_known, label_pd, label_range, &
+  use branch_parent, only: end_at_parent, swaps_halves
+  use branch_passage, only: first_passed, no_passage, note_bifurcations
+  use branch_point, only: branch_t, label_chatter, label_closed, label_not_known, label_range, &
     label_release, label_run, move_trace, no_label, plan_t, point_t, set_point, step_to, trace_t
   use branch_return, only: close_up
   use branch_vanishing, only: end_at_rest, has_vanished
+  use continuation, only: continuation_t
   use errors, only: error_t
-  use graze_passage, only: at_graze, leave_by_graze
+  use graze_passage, only: leave_by_graze
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
   use margin_passage, only: begins_chatter, pass_margin
   use motion_state, only: event_chatter_lower, event_chatter_upper
-  use orbit_margins, only: margin_t, of_impact
-  use orbit_sections, only: rotate_to_section, section_points
+  use orbit_margins, only: margin_t
+  use orbit_sections, only: rotate_to_section
   use orbit_motion, only: is_admissible, orbit_of_motion
-  use periodic_orbit, only: closing_time, correct_orbit, move_along, orbit_t, scales_of_orbit
+  use periodic_orbit, only: correct_orbit, move_along, orbit_t, scales_of_orbit
   use orbit_directions, only: direct
   use search_watch, only: search_watch_t
   implicit none
@@ -37,13 +39,18 @@ module branch
   integer, parameter :: few_tries = 3
   !> The parameter has not turned back by less than this share of its size.
   real(wp), parameter :: no_turn = 1e-11_wp
-  !> Nearness of a multiplier to that of a doubling at the end of a branch.
-  real(wp), parameter :: at_doubling = 1e-2_wp
-  !> The halves of an orbit may be the same where they differ by less than the first, a share of what they did a step before; they
-  !> are where they differ by less than the second, in natural sizes.
-  real(wp), parameter :: same_halves = 1e-2_wp, no_difference = 1e-6_wp
-  !> What is left of that difference where it is none.
-  real(wp), parameter :: rounding_of_halves = 1e-6_wp
+
+  !> One way along a branch: where it is, the neighbour that was tried and the Newton steps to it, and where it began.
+  type, extends(continuation_t) :: orbits_t
+    type(family_t) :: family
+    type(plan_t) :: plan
+    type(trace_t) :: trace, next, first
+    integer :: newton_steps = 0
+    type(point_t), allocatable :: points(:)
+    class(search_watch_t), pointer :: watch => null()
+  contains
+    procedure :: points_found, try_step, take_step, give_up
+  end type orbits_t
 
 contains
 
@@ -103,60 +110,94 @@ contains
     integer, intent(in) :: way
     type(point_t), allocatable, intent(out) :: points(:)
     integer, intent(out) :: ending
-    class(search_watch_t), intent(inout), optional :: watch
-    type(trace_t) :: first, trace, before
+    class(search_watch_t), intent(inout), optional, target :: watch
+    type(orbits_t) :: orbits
     type(error_t), allocatable :: error
     logical :: ok
-    integer :: labels, known
     allocate (points(0))
     ending = label_not_known
-    trace%now%orbit = seed
-    call machine_neighbourhood(family, seed%parameter, trace%machines, error)
+    orbits%trace%now%orbit = seed
+    call machine_neighbourhood(family, seed%parameter, orbits%trace%machines, error)
     if (allocated(error)) return
-    call set_point(family, trace, direct(seed, way), ok)
-    points = [trace%now]
+    call set_point(family, orbits%trace, direct(seed, way), ok)
+    points = [orbits%trace%now]
     if (.not. ok) return
-    trace%step = 0.1_wp*plan%largest_step
-    first = trace
-    ending = no_label
-    do while (ending == no_label .and. size(points) < plan%most_points)
-      before = trace
-      known = size(points)
-      call go_on(family, plan, trace, points, ending)
-      if (ending /= no_label) exit
-      if (present(watch)) call watch%report_point(size(points), trace%now%orbit%parameter)
-      if (known > 3) call close_up(family, first, before, trace, known, points, ending)
-    end do
-    if (ending == no_label) ending = label_long
-    if (ending == label_not_known .and. points(size(points))%label == no_label .and. begins_chatter(trace)) ending = label_run
-    labels = size(points)
-    if (points(labels)%label == no_label) points(labels)%label = ending
+    orbits%family = family
+    orbits%plan = plan
+    orbits%least_cosine = least_cosine
+    orbits%first = orbits%trace
+    if (present(watch)) orbits%watch => watch
+    call move_alloc(points, orbits%points)
+    call orbits%follow(0.1_wp*plan%largest_step, smallest_step*plan%largest_step, plan%most_points)
+    call move_alloc(orbits%points, points)
+    ending = orbits%ending
+    associate (last => points(size(points)))
+      if (ending == label_not_known .and. last%label == no_label .and. begins_chatter(orbits%trace)) ending = label_run
+      if (last%label == no_label) last%label = ending
+    end associate
   end subroutine trace_one_way
 
-  !> One step of the branch: to the next point, and to what is passed on the way.
-  subroutine go_on(family, plan, trace, points, ending)
+  pure integer function points_found(self)
+    class(orbits_t), intent(in) :: self
+    points_found = size(self%points)
+  end function points_found
+
+  subroutine try_step(self, cosine, ok)
+    class(orbits_t), intent(inout) :: self
+    real(wp), intent(out) :: cosine
+    logical, intent(out) :: ok
+    cosine = -1
+    self%trace%step = self%step
+    call step_to(self%family, self%trace, self%step, self%next, ok, self%newton_steps, roughly=self%tries > few_tries)
+    if (ok) cosine = sum(self%next%now%tangent*self%trace%now%tangent)
+  end subroutine try_step
+
+  !> No step leads on: an impact may be about to vanish.
+  subroutine give_up(self)
+    class(orbits_t), intent(inout) :: self
+    type(trace_t) :: before
+    integer :: known
+    before = self%trace
+    known = size(self%points)
+    call leave_by_graze(self%family, self%plan, self%trace, self%points, self%ending)
+    call look_back(self, before, known)
+  end subroutine give_up
+
+  subroutine take_step(self)
+    class(orbits_t), intent(inout) :: self
+    type(trace_t) :: before
+    integer :: known
+    before = self%trace
+    known = size(self%points)
+    call go_on(self%family, self%plan, self%newton_steps, self%trace, self%next, self%points, self%ending)
+    call look_back(self, before, known)
+  end subroutine take_step
+
+  !> After a step from `before`, when so many points were known: reports it, and looks whether the branch is where it began.
+  subroutine look_back(self, before, known)
+    class(orbits_t), intent(inout) :: self
+    type(trace_t), intent(in) :: before
+    integer, intent(in) :: known
+    self%step = self%trace%step
+    if (self%ending /= no_label) return
+    if (associated(self%watch)) call self%watch%report_point(size(self%points), self%trace%now%orbit%parameter)
+    if (known > 3) call close_up(self%family, self%first, before, self%trace, known, self%points, self%ending)
+  end subroutine look_back
+
+  !> From a point to the next, which has been found by so many Newton steps, and to what is passed on the way.
+  subroutine go_on(family, plan, newton_steps, trace, next, points, ending)
     type(family_t), intent(in) :: family
     type(plan_t), intent(in) :: plan
-    type(trace_t), intent(inout) :: trace
+    integer, intent(in) :: newton_steps
+    type(trace_t), intent(inout) :: trace, next
     type(point_t), allocatable, intent(inout) :: points(:)
     integer, intent(out) :: ending
-    type(trace_t) :: next
     type(margin_t) :: passed
     real(wp) :: length
     logical :: ok, turned
-    integer :: tries, steps, known
+    integer :: known
     ending = no_label
-    do tries = 1, 60
-      length = trace%step
-      call step_to(family, trace, length, next, ok, steps, roughly=tries > few_tries)
-      if (ok) ok = sum(next%now%tangent*trace%now%tangent) > least_cosine
-      if (ok) exit
-      trace%step = trace%step/2
-      if (trace%step < smallest_step*plan%largest_step) then
-        call leave_by_graze(family, plan, trace, points, ending)
-        return
-      end if
-    end do
+    length = trace%step
     if (swaps_halves(trace, next)) then
       call end_at_parent(family, trace, length, points, ending)
       if (ending /= no_label) return
@@ -185,7 +226,7 @@ contains
       if (trace%step < smallest_step*plan%largest_step) call leave_unforeseen(family, plan, next, trace, points, ending)
       return
     end if
-    next%step = min(plan%largest_step, length*merge(0.7_wp, 1.4_wp, steps > many_steps))
+    next%step = min(plan%largest_step, length*merge(0.7_wp, 1.4_wp, newton_steps > many_steps))
     next%came = length
     if (turned) call set_point(family, next, direct(next%now%orbit, &
                                                     nint(sign(1.0_wp, next%now%tangent(size(next%now%tangent))))), ok)
@@ -206,95 +247,6 @@ contains
     call leave_by_graze(family, plan, trace, points, ending)
     if (ending == label_not_known) ending = unforeseen(trace, next)
   end subroutine leave_unforeseen
-
-  !> What the second half of an orbit of even period differs by from the first, in natural sizes: in the instants and states of the
-  !> events, and without any in the section points, which jump where an impact passes the section. Nothing where the halves have
-  !> other events.
-  pure function halves_differ(trace) result(difference)
-    type(trace_t), intent(in) :: trace
-    real(wp), allocatable :: difference(:)
-    real(wp) :: points(size(trace%now%orbit%y), trace%now%orbit%periods)
-    integer :: k
-    associate (orbit => trace%now%orbit, machine => trace%machines%centre, m => size(trace%now%orbit%events), &
-               half => size(trace%now%orbit%events)/2, n => size(trace%now%orbit%y))
-      allocate (difference(0))
-      if (m == 0) then
-        points = section_points(trace%machines, orbit)
-        difference = (points(:, 1 + orbit%periods/2) - points(:, 1))/machine%size_of
-        return
-      end if
-      if (modulo(m, 2) > 0) return
-      do k = 1, half
-        associate (one => orbit%events(k), other => orbit%events(half + k))
-          if (one%kind /= other%kind .or. one%side /= other%side .or. one%joint /= other%joint) then
-            difference = [real(wp) ::]
-            return
-          end if
-          difference = [difference, (other%time - one%time - closing_time(machine, orbit)/2)/machine%size_of_time(), &
-                        (machine%nearest_copy(other%arrival(:n), one%arrival(:n)) - one%arrival(:n))/machine%size_of]
-        end associate
-      end do
-    end associate
-  end function halves_differ
-
-  !> Whether the halves of an orbit may have been exchanged: in between it was one of half the period.
-  pure logical function swaps_halves(trace, next)
-    type(trace_t), intent(in) :: trace, next
-    swaps_halves = modulo(trace%now%orbit%periods, 2) == 0
-    if (swaps_halves) swaps_halves = .not. still_differ(trace, next)
-  end function swaps_halves
-
-  !> Whether the halves of the orbit `next` differ as those of `trace` do: not the other way round, and not by rounding alone, as
-  !> where a step has ended on the branch of half the period.
-  pure logical function still_differ(trace, next)
-    type(trace_t), intent(in) :: trace, next
-    real(wp), allocatable :: before(:)
-    before = halves_differ(trace)
-    still_differ = sum(before*halves_differ(next)) >= rounding_of_halves*sum(before**2)
-  end function still_differ
-
-  !> The end of a branch in the orbit of half its period, from which it came by a doubling or in a graze; none if the halves are not
-  !> the same anywhere on the step.
-  subroutine end_at_parent(family, trace, length, points, ending)
-    type(family_t), intent(in) :: family
-    type(trace_t), intent(in) :: trace
-    real(wp), intent(in) :: length
-    type(point_t), allocatable, intent(inout) :: points(:)
-    integer, intent(out) :: ending
-    type(trace_t) :: there, tried
-    real(wp) :: low, high, middle, left
-    logical :: ok, all_ok
-    integer :: i, steps
-    there = trace
-    all_ok = .true.
-    low = 0
-    high = length
-    do i = 1, most_secants
-      middle = (low + high)/2
-      call step_to(family, trace, middle, tried, ok, steps)
-      ! At the end itself the equations are singular: it is approached from this side.
-      if (ok) there = tried
-      all_ok = all_ok .and. ok
-      if (.not. ok .or. .not. still_differ(trace, there)) then
-        high = middle
-      else
-        low = middle
-      end if
-      if (high - low <= 4*spacing(high)) exit
-    end do
-    left = norm2(halves_differ(there))
-    ending = no_label
-    if (all_ok .and. left > same_halves*norm2(halves_differ(trace))) return
-    ending = label_not_known
-    ! It began in a graze, or in a doubling, where the orbit of twice the period has a multiplier +1.
-    if (any(there%margins%list%kind == of_impact .and. abs(there%margins%list%value) < at_graze)) then
-      ending = label_gr
-    else if (left < no_difference .or. minval(abs(there%now%orbit%multipliers - 1)) < at_doubling) then
-      ending = label_pd
-    end if
-    there%now%label = ending
-    points = [points, there%now]
-  end subroutine end_at_parent
 
   pure logical function leaves_range(plan, parameter)
     type(plan_t), intent(in) :: plan

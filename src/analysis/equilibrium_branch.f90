@@ -5,7 +5,8 @@
 !> touched or let go.
 module equilibrium_branch
   use body_family, only: family_t
-  use branch_point, only: label_be, label_bp, label_hb, label_long, label_not_known, label_range, label_sn, no_label, plan_t
+  use branch_point, only: label_be, label_bp, label_hb, label_not_known, label_range, label_sn, no_label, plan_t
+  use continuation, only: continuation_t
   use equilibrium, only: correct_equilibrium, count_unstable, equilibrium_t, is_isolated, lasts, tangent_of_equilibrium
   use errors, only: error_t
   use kinds, only: wp
@@ -35,6 +36,17 @@ module equilibrium_branch
     type(equilibrium_t), allocatable :: points(:)
     integer :: ending(2) = no_label
   end type equilibria_t
+
+  !> One way along a branch: where it is with its machines, and the neighbour that was tried.
+  type, extends(continuation_t) :: equilibrium_way_t
+    type(family_t) :: family
+    type(plan_t) :: plan
+    type(neighbourhood_t) :: machines
+    type(equilibrium_t) :: now, next
+    type(equilibrium_t), allocatable :: points(:)
+  contains
+    procedure :: points_found, try_step, take_step, give_up
+  end type equilibrium_way_t
 
 contains
 
@@ -187,59 +199,85 @@ contains
     integer, intent(in) :: way
     type(equilibrium_t), allocatable, intent(out) :: points(:)
     integer, intent(out) :: ending
-    type(neighbourhood_t) :: machines
+    type(equilibrium_way_t) :: line
     type(error_t), allocatable :: error
-    type(equilibrium_t) :: now, next
-    real(wp) :: step, room, bound
     logical :: ok
-    integer :: labelled
-    now = seed
     allocate (points(0))
     ending = label_not_known
-    call machine_neighbourhood(family, seed%parameter, machines, error)
+    line%now = seed
+    call machine_neighbourhood(family, seed%parameter, line%machines, error)
     if (allocated(error)) return
-    call tangent_of_equilibrium(machines, now, family%parameter_size, along_parameter(seed, way), ok)
-    points = [now]
+    call tangent_of_equilibrium(line%machines, line%now, family%parameter_size, along_parameter(seed, way), ok)
+    points = [line%now]
     if (.not. ok) return
-    step = 0.1_wp*plan%largest_step
-    do while (size(points) < plan%most_points)
-      associate (rise => now%tangent(size(now%tangent)))
-        bound = merge(plan%highest, plan%lowest, rise > 0)
-        room = huge(room)
-        if (abs(rise) > 0) room = (bound - now%parameter)/(rise*family%parameter_size)
-      end associate
-      call take_step(family, machines, now, step, next, ok)
-      if (ok) ok = sum(next%tangent*now%tangent) > 0.95_wp
-      if (.not. ok) then
-        step = step/2
-        if (step < smallest_step*plan%largest_step) exit
-        cycle
-      end if
-      if (next%parameter < plan%lowest .or. next%parameter > plan%highest) then
-        call end_at_range(family, now, merge(plan%lowest, plan%highest, next%parameter < plan%lowest), next, ok)
-        if (ok) ending = label_range
-        if (.not. ok) exit
-      end if
-      call note_passages(family, machines, now, next, merge(room, step, ending == label_range), points)
-      labelled = points(size(points))%label
-      if (labelled == label_be) then
-        ending = label_be
-        exit
-      end if
-      points = [points, next]
-      if (ending == label_range) exit
-      now = next
-      step = min(plan%largest_step/max(abs(now%tangent(size(now%tangent))), along_the_state), 1.4_wp*step)
-      call machine_neighbourhood(family, now%parameter, machines, error)
-    end do
-    if (size(points) >= plan%most_points) ending = label_long
+    line%family = family
+    line%plan = plan
+    call move_alloc(points, line%points)
+    call line%follow(0.1_wp*plan%largest_step, smallest_step*plan%largest_step, plan%most_points)
+    call move_alloc(line%points, points)
+    ending = line%ending
     associate (last => points(size(points)))
       if (last%label == no_label) last%label = ending
     end associate
   end subroutine trace_one_way
 
+  pure integer function points_found(self)
+    class(equilibrium_way_t), intent(in) :: self
+    points_found = size(self%points)
+  end function points_found
+
+  subroutine try_step(self, cosine, ok)
+    class(equilibrium_way_t), intent(inout) :: self
+    real(wp), intent(out) :: cosine
+    logical, intent(out) :: ok
+    cosine = -1
+    call step_to(self%family, self%machines, self%now, self%step, self%next, ok)
+    if (ok) cosine = sum(self%next%tangent*self%now%tangent)
+  end subroutine try_step
+
+  subroutine give_up(self)
+    class(equilibrium_way_t), intent(inout) :: self
+    self%ending = label_not_known
+  end subroutine give_up
+
+  subroutine take_step(self)
+    class(equilibrium_way_t), intent(inout) :: self
+    type(error_t), allocatable :: error
+    real(wp) :: length
+    logical :: ok
+    length = self%step
+    associate (plan => self%plan, now => self%now, next => self%next)
+      if (next%parameter < plan%lowest .or. next%parameter > plan%highest) then
+        length = room(self)
+        call end_at_range(self%family, now, merge(plan%lowest, plan%highest, next%parameter < plan%lowest), next, ok)
+        self%ending = merge(label_range, label_not_known, ok)
+        if (.not. ok) return
+      end if
+      call note_passages(self%family, self%machines, now, next, length, self%points)
+      if (self%points(size(self%points))%label == label_be) then
+        self%ending = label_be
+        return
+      end if
+      self%points = [self%points, next]
+      if (self%ending == label_range) return
+      now = next
+      self%step = min(plan%largest_step/max(abs(now%tangent(size(now%tangent))), along_the_state), 1.4_wp*self%step)
+      call machine_neighbourhood(self%family, now%parameter, self%machines, error)
+    end associate
+  end subroutine take_step
+
+  !> How far the end of the range is along the tangent.
+  pure real(wp) function room(self)
+    class(equilibrium_way_t), intent(in) :: self
+    associate (rise => self%now%tangent(size(self%now%tangent)))
+      room = huge(room)
+      if (abs(rise) > 0) room = (merge(self%plan%highest, self%plan%lowest, rise > 0) - self%now%parameter)/ &
+        (rise*self%family%parameter_size)
+    end associate
+  end function room
+
   !> The point `length` further along.
-  subroutine take_step(family, machines, now, length, next, ok)
+  subroutine step_to(family, machines, now, length, next, ok)
     type(family_t), intent(in) :: family
     type(neighbourhood_t), intent(in) :: machines
     type(equilibrium_t), intent(in) :: now
@@ -258,7 +296,7 @@ contains
     ok = .not. allocated(error)
     if (ok) call correct_equilibrium(family, there, next, now%tangent, ok)
     if (ok) call tangent_of_equilibrium(there, next, family%parameter_size, now%tangent, ok)
-  end subroutine take_step
+  end subroutine step_to
 
   !> The last point within the range.
   subroutine end_at_range(family, now, bound, next, ok)
@@ -324,7 +362,7 @@ contains
     high = length
     do i = 1, halvings
       middle = (low + high)/2
-      call take_step(family, machines, now, middle, tried, ok)
+      call step_to(family, machines, now, middle, tried, ok)
       if (.not. ok) return
       passed = count_unstable(tried) /= count_unstable(now)
       if (of_mode) passed = .not. lasts(tried)
