@@ -25,9 +25,6 @@ contains
     type(attractor_t), intent(in) :: catalogue(:)
     class(section_state_t), intent(in) :: section
     logical, intent(in) :: slipped
-    type(section_state_t) :: later
-    type(tally_t) :: unused
-    integer :: reason
     logical :: rests
     found = 0
     if (size(catalogue) == 0) return
@@ -38,11 +35,22 @@ contains
     rests = moving%rest_lasts .and. .not. slipped
     if (rests .and. .not. moving%timed) rests = goes_on_turning(moving, section)
     found = attractor_reached_at(moving, catalogue, moving%point_of(section), .not. rests)
-    if (found > 0 .or. .not. any(catalogue%by_event)) return
+    if (found == 0 .and. any(catalogue%by_event)) found = attractor_at_turn(moving, catalogue, section)
+  end function attractor_reached
+
+  !> The attractor without a clock that the motion has reached at its next turn, 0 if none.
+  pure integer function attractor_at_turn(moving, catalogue, section) result(found)
+    class(machine_t), intent(in) :: moving
+    type(attractor_t), intent(in) :: catalogue(:)
+    class(section_state_t), intent(in) :: section
+    type(section_state_t) :: later
+    type(tally_t) :: unused
+    integer :: reason
+    found = 0
     later = copy_of(section)
     call moving%advance_to_turn(later, unused, reason)
     if (reason == 0) found = find_capture(catalogue, moving%turn_point(later), .true., by_event=.true.)
-  end function attractor_reached
+  end function attractor_at_turn
 
   !> Whether a crank beside a body at rest keeps its speed, or gains: all that follows is then no slower.
   pure logical function goes_on_turning(moving, section) result(goes_on)
