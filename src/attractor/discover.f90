@@ -59,7 +59,7 @@ contains
     if (.not. moving%has_section) return
     do i = 1, size(starts, 2)
       if (is_given_up(catalogue)) return
-      section = moving%start(starts(:, i))
+      call moving%start(starts(:, i), section)
       patience = span%duration
       do
         call settle(moving, catalogue, patience, section, segment)

@@ -27,7 +27,7 @@ contains
     integer :: i
     reason = 0
     driver = 0
-    section = moving%start(start)
+    call moving%start(start, section)
     section_time = -section%state%time
     do i = 1, size(times)
       do while (moving%timed .and. times(i) - section_time >= moving%period .and. reason == 0)

@@ -162,7 +162,7 @@ contains
     type(span_t), intent(in) :: span
     real(wp), intent(in) :: start(:)
     type(trajectory_state_t), intent(out) :: trajectory
-    trajectory%section_state_t = moving%start(start)
+    call moving%start(start, trajectory%section_state_t)
     call set_off(moving, span, trajectory)
   end subroutine begin_trajectory
 

@@ -94,7 +94,7 @@ contains
       call derive_attractor(moving, grid%laws, grid%derived, [cycle], 1, span, values)
       if (.not. any(ieee_is_nan(values))) return
     end if
-    section = moving%start(grid%start)
+    call moving%start(grid%start, section)
     call moving%begin_tally(section, tally)
     origin = -section%state%time
     until = span%duration - span%window

@@ -107,12 +107,12 @@ contains
     n = merge(1, coordinates_of_body(self%body), self%by_event)
   end function coordinates
 
-  pure function start(self, values) result(section)
+  pure subroutine start(self, values, section)
     class(body_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
-    type(section_state_t) :: section
+    type(section_state_t), intent(out) :: section
     section%state = start_of_body(self%body, values)
-  end function start
+  end subroutine start
 
   pure logical function allows(self, values) result(allowed)
     class(body_machine_t), intent(in) :: self
@@ -125,7 +125,7 @@ contains
     type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(section_state_t) :: section
-    section = self%start([before%state%x, before%state%v, angle])
+    call self%start([before%state%x, before%state%v, angle], section)
     if (before%state%mode /= 0) section%state = resumed_body(self%body, before%state, angle)
   end function resume
 

@@ -71,12 +71,12 @@ module machine_type
     !> A state at x [m], v [m/s] and the crank at an angle [rad]; a driving body as in its machine. What follows in `values` are
     !> positions and velocities of the coordinates of several bodies, in place of those of the machine; with a motor the speed of
     !> the crank [rad/s] and current [A] or integral of the control [rad].
-    pure function start_interface(self, values) result(section)
+    pure subroutine start_interface(self, values, section)
       import :: machine_t, section_state_t, wp
       class(machine_t), intent(in) :: self
       real(wp), intent(in) :: values(:)
-      type(section_state_t) :: section
-    end function start_interface
+      type(section_state_t), intent(out) :: section
+    end subroutine start_interface
 
     !> The state on the section with the coordinates `point`; what they leave open is zero.
     pure function at_interface(self, point) result(section)
@@ -194,7 +194,7 @@ contains
     type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(section_state_t) :: section
-    section = self%start([before%state%x, before%state%v, angle])
+    call self%start([before%state%x, before%state%v, angle], section)
   end function resume
 
   !> Coordinates of a state where the motion turns round.

@@ -103,17 +103,17 @@ contains
     n = merge(4, 3, self%motor%system%control%has_own)
   end function coordinates
 
-  pure function start(self, values) result(section)
+  pure subroutine start(self, values, section)
     class(motor_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
-    type(section_state_t) :: section
+    type(section_state_t), intent(out) :: section
     real(wp) :: all(5)
     integer :: n
     n = min(5, size(values))
     all(4:) = self%own_start
     all(:n) = values(:n)
     call start_motor(self%motor, all, section%state, section%motor)
-  end function start
+  end subroutine start
 
   !> The same after a ramp.
   pure function start_settled(self, values) result(section)

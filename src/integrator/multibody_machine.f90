@@ -134,19 +134,19 @@ contains
     end associate
   end function section_obstacle
 
-  pure function start(self, values) result(section)
+  pure subroutine start(self, values, section)
     class(multibody_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
-    type(section_state_t) :: section
+    type(section_state_t), intent(out) :: section
     section%multibody = start_of_multibody(self%bodies, values)
     section%state = watched_state(self%bodies%machine, section%multibody)
-  end function start
+  end subroutine start
 
   pure logical function allows(self, values) result(allowed)
     class(multibody_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
     type(section_state_t) :: section
-    section = self%start(values)
+    call self%start(values, section)
     allowed = .not. any(section%multibody%q /= section%multibody%q)
     if (allowed .and. self%has_driver) allowed = keeps_within(self%bodies%machine, section%multibody)
   end function allows
@@ -170,7 +170,7 @@ contains
         section%state = watched_state(machine, section%multibody)
       end associate
     end if
-    if (.not. ok) section = self%start([before%state%x, before%state%v, angle])
+    if (.not. ok) call self%start([before%state%x, before%state%v, angle], section)
   end function resume
 
   pure function state_at(self, point) result(section)

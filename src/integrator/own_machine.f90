@@ -150,16 +150,16 @@ contains
     if (.not. self%has_section) text = 'forces depend on the time t, and no drive.period states after which time they repeat'
   end function section_obstacle
 
-  pure function start(self, values) result(section)
+  pure subroutine start(self, values, section)
     class(own_machine_t), intent(in) :: self
     real(wp), intent(in) :: values(:)
-    type(section_state_t) :: section
+    type(section_state_t), intent(out) :: section
     real(wp) :: all(2 + size(self%starts))
     all = [0.0_wp, 0.0_wp, self%starts]
     all(:2) = values(:2)
     if (size(values) > 3) all(3:) = values(4:)
     section = begin(self, all, merge(modulo(values(min(3, size(values))), two_pi)/two_pi*self%period, 0.0_wp, self%has_clock))
-  end function start
+  end subroutine start
 
   pure function begin(self, values, time) result(section)
     class(own_machine_t), intent(in) :: self
@@ -178,7 +178,7 @@ contains
     type(section_state_t), intent(in) :: before
     real(wp), intent(in) :: angle
     type(section_state_t) :: section
-    section = self%start([before%state%x, before%state%v, angle, before%motor%own(:size(self%starts))])
+    call self%start([before%state%x, before%state%v, angle, before%motor%own(:size(self%starts))], section)
   end function resume
 
   pure function state_at(self, point) result(section)

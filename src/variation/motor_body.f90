@@ -118,7 +118,7 @@ contains
     real(wp), intent(in) :: values(:)
     type(section_state_t), intent(out) :: section
     logical, intent(out) :: ok
-    section = self%machine%start(values)
+    call self%machine%start(values, section)
     ok = self%machine%allows(values)
   end subroutine start_of_motor
 

@@ -239,7 +239,7 @@ contains
     real(wp), intent(in) :: values(:)
     type(section_state_t), intent(out) :: section
     logical, intent(out) :: ok
-    section = self%machine%start(values)
+    call self%machine%start(values, section)
     ok = self%machine%allows(values)
   end subroutine start_of_own
 
@@ -256,7 +256,7 @@ contains
       else if (abs(on(2)) <= near_section*self%size_of(v_of)) then
         on(2) = 0
       end if
-      section = self%machine%start([on, 0.0_wp, point(v_of + 1:)])
+      call self%machine%start([on, 0.0_wp, point(v_of + 1:)], section)
     end if
   end function state_of_own
 
