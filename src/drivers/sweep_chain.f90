@@ -12,7 +12,7 @@ module sweep_chain
   use kinds, only: int64, wp
   use limit_kind, only: find_kind, kind_doubling, kind_not_known, kind_stick
   use machine_type, only: section_state_t
-  use motor_choices, only: has_motor, start_of_motor
+  use motor_choices, only: has_motor
   use status, only: reason_time_over
   use stop_check, only: check_stop
   use settling, only: marks_of_outcome, same_mark, settled_t
@@ -129,15 +129,17 @@ contains
     type(section_state_t) :: state
     integer :: i, k, found, before, mark
     logical :: changed
-    state = first_state(grid)
     found = 0
     before = 0
     mark = 0
     visited = merge(values, values(size(values):1:-1), up)
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
-      call hold_parameter(grid, span, path, visited(i), state, merge(grid%start(3), 0.0_wp, i == 1), samples, longest, held, &
-        error)
+      if (before == 0) then
+        call hold_parameter(grid, span, path, visited(i), samples, longest, held, error)
+      else
+        call hold_parameter(grid, span, path, visited(i), samples, longest, held, error, state)
+      end if
       if (allocated(error)) return
       settled(i) = held%settled
       holds(:hold_numbers, k) = numbers_of(held)
@@ -177,18 +179,6 @@ contains
     packed = [reshape(holds, [size(holds)]), reshape(points, [size(points)]), real(size(limits, 2), wp), &
               reshape(limits, [size(limits)])]
   end function packed_chain
-
-  !> The state before the first hold: a motor has a speed, and a current or an integral, too.
-  pure type(section_state_t) function first_state(grid) result(state)
-    type(grid_t), intent(in) :: grid
-    real(wp) :: motor(2)
-    state%state%x = grid%start(1)
-    state%state%v = grid%start(2)
-    if (.not. has_motor(grid%laws)) return
-    motor = start_of_motor(grid%laws)
-    state%motor%w = motor(1)
-    state%motor%own(1) = motor(2)
-  end function first_state
 
   !> A limit before number `beyond` of the values that are `visited`, the motion having settled as `settled` at those before that
   !> were not given up, and being in a `state` then; `marks` before and behind it. Numbers as in `run_chain`, without speeds.

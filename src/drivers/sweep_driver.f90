@@ -20,7 +20,6 @@ module sweep_driver
   use grid, only: grid_t
   use journal, only: duration_text, size_text
   use kinds, only: int64, wp
-  use machine_type, only: section_state_t
   use map_file, only: map_file_t
   use map_final, only: write_whole
   use map_schema, only: name_length, schema_t, type_float64
@@ -163,15 +162,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(grid_t) :: grid
     type(hold_t) :: held
-    type(section_state_t) :: state
     real(wp) :: start
     grid = grid_of(session%the_case, session%the_case%axes(:0))
-    state%state%x = grid%start(1)
-    state%state%v = grid%start(2)
     call cpu_time(start)
     associate (sweep => session%the_case%sweep)
       call hold_parameter(grid, span_of(session%the_case), trim(sweep%swept%name), &
-                          sweep%swept%values(1 + size(sweep%swept%values)/2), state, grid%start(3), sweep%samples, &
+                          sweep%swept%values(1 + size(sweep%swept%values)/2), sweep%samples, &
                           longest_cycle(session%the_case), held, error)
     end associate
     call cpu_time(seconds)

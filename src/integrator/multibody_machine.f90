@@ -159,9 +159,10 @@ contains
     type(section_state_t) :: section
     logical :: ok
     type(multibody_state_t) :: from
-    ok = before%multibody%time >= 0
+    ok = allocated(before%multibody)
     if (ok) then
       from = before%multibody
+      allocate (section%multibody)
       associate (machine => self%bodies%machine, n => self%bodies%machine%n)
         if (self%has_driver) from%q(:n) = from%q(:n) - machine%driver%running*from%clock
         call start_multibody(self%bodies, from%q(:n), from%v(:n), angle, section%multibody, ok)

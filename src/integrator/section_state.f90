@@ -12,10 +12,10 @@ module section_state
 
   public :: copy_of
 
-  !> `state` is that of the body, or of the watched one of several.
+  !> `state` is that of the body, or of the watched one of several; `multibody`, which is large, is there for several only.
   type, public :: section_state_t
     type(state_t) :: state
-    type(multibody_state_t) :: multibody
+    type(multibody_state_t), allocatable :: multibody
     type(motor_state_t) :: motor
     !> The last `advance` ended on the section, where that does not come at given times.
     logical :: passed = .false.
@@ -34,7 +34,7 @@ contains
   pure type(section_state_t) function copy_of(section) result(copy)
     class(section_state_t), intent(in) :: section
     copy%state = section%state
-    copy%multibody = section%multibody
+    if (allocated(section%multibody)) copy%multibody = section%multibody
     copy%motor = section%motor
     copy%passed = section%passed
     copy%lasted = section%lasted

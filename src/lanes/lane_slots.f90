@@ -157,6 +157,7 @@ contains
     type(tally_t), intent(inout) :: tally
     select type (moving)
     type is (multibody_machine_t)
+      if (.not. allocated(section%multibody)) allocate (section%multibody)
       call structure_lane_state(moving%bodies, bodies%structures, lane, section%multibody)
       section%state = watched_state(moving%bodies%machine, section%multibody)
       call take_structure_counts(bodies%structures, lane, tally)

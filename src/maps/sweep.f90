@@ -43,19 +43,19 @@ module sweep
 
 contains
 
-  !> Holds parameter `path` at `value` for at least the duration, starting from `state` with the crank at `crank_angle`;
-  !> features are over the window; where a cycle was found, regime, impacts and rotation are its own. The reason is `time_over`
-  !> unless the hold had to be given up. A cycle of at most `longest` drive periods is looked for in what would follow; 0 =
-  !> none is.
-  subroutine hold_parameter(grid, span, path, value, state, crank_angle, samples, longest, held, error)
+  !> Holds parameter `path` at `value` for at least the duration, starting from the state at the end of another hold, `from`, or,
+  !> without, from the start of the case; features are over the window; where a cycle was found, regime, impacts and rotation are
+  !> its own. The reason is `time_over` unless the hold had to be given up. A cycle of at most `longest` drive periods is looked for
+  !> in what would follow; 0 = none is.
+  subroutine hold_parameter(grid, span, path, value, samples, longest, held, error, from)
     type(grid_t), intent(in) :: grid
     type(span_t), intent(in) :: span
     character(len=*), intent(in) :: path
-    real(wp), intent(in) :: value, crank_angle
-    type(section_state_t), intent(in) :: state
+    real(wp), intent(in) :: value
     integer, intent(in) :: samples, longest
     type(hold_t), intent(out) :: held
     type(error_t), allocatable, intent(out) :: error
+    type(section_state_t), intent(in), optional :: from
     class(machine_t), allocatable :: moving
     type(tally_t) :: tally
     integer :: periods, in_window, i
@@ -65,7 +65,11 @@ contains
     in_window = max(1, ceiling(span%window/moving%period))
     periods = max(ceiling(span%duration/moving%period), in_window, samples)
     allocate (held%samples(2, samples), source=ieee_value(1.0_wp, ieee_quiet_nan))
-    held%state = moving%resume(state, crank_angle)
+    if (present(from)) then
+      held%state = moving%resume(from, 0.0_wp)
+    else
+      call moving%start(grid%start, held%state)
+    end if
     call moving%begin_tally(held%state, tally)
     do i = 1, periods
       if (i == periods - in_window + 1) then

@@ -56,7 +56,7 @@ contains
     do while (abs(far - near) > tolerance)
       middle = 0.5_wp*(near + far)
       if (.not. (abs(middle - near) > 0 .and. abs(middle - far) > 0)) exit
-      call hold_parameter(grid, span, path, middle, last, 0.0_wp, 0, 0, held, error)
+      call hold_parameter(grid, span, path, middle, 0, 0, held, error, last)
       if (allocated(error)) return
       if (held%reason /= reason_time_over) exit
       if (same_mark(held%mark, mark)) then

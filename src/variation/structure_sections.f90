@@ -12,6 +12,7 @@ submodule(structure) structure_sections
 contains
 
   module procedure begin_structure
+    allocate (section%multibody)
     call start_of_structure(self, point, section%multibody, ok)
     if (ok) section%state = watched_state(self%frame%moving%machine, section%multibody)
   end procedure begin_structure

@@ -55,6 +55,7 @@ contains
       start = 0
       if (machine%driver%at > 0) start(:, machine%driver%at) = driver
       start(:, machine%watched) = [x, v]
+      allocate (state%multibody)
       call start_multibody(moving%bodies, start(1, :), start(2, :), angle, state%multibody, ok)
     end associate
     if (.not. ok) error stop 'pairs: no mode to start in'
