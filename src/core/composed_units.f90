@@ -1,17 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Units composed of others by products, quotients and whole powers: 'N/m^3', 'kN s^2/m^2', '1/s'; also 'rpm'.
+!> Units composed of others by products, quotients and powers, whole or half: 'N/m^3', 'kN s^2/m^2', 'N/(m s)', 'N/m^1.5'; also
+!> 'rpm'.
 module composed_units
   use constants, only: two_pi
   use kinds, only: wp
-  use text, only: join, replace_all, to_text
+  use text, only: join, parse_number, replace_all, to_text
   implicit none
   private
 
   public :: read_unit, unit_in_ascii, known_units
 
-  !> Exponents of m, kg, s, A and K.
+  !> Number of base units: m, kg, s, A and K.
   integer, parameter, public :: base_count = 5
 
   type, public :: composed_unit_t
@@ -19,8 +20,9 @@ module composed_units
     character(len=:), allocatable :: si
     !> SI value = number*multiplier/divisor. Dividing by powers of ten keeps "12.5 mm" equal to 0.0125 to the bit.
     real(wp) :: multiplier = 1, divisor = 1
+    !> Twice the exponents of the base units.
     integer :: exponents(base_count) = 0
-    !> Powers of an angle and of Hz, which count as pure numbers and 1/s in the exponents.
+    !> Twice the powers of an angle and of Hz, which count as pure numbers and 1/s in the exponents.
     integer :: angle = 0, hertz = 0
   end type composed_unit_t
 
@@ -69,90 +71,129 @@ contains
     type(composed_unit_t), intent(out) :: unit
     integer, intent(out) :: column
     character(len=:), allocatable :: factor, text
-    integer :: at, length, power
-    logical :: below
+    integer :: at, length, halves
+    logical :: below, in_parentheses
     text = unit_in_ascii(spelling)
     unit%si = ''
     at = 1
     column = 0
     below = .false.
+    in_parentheses = .false.
     if (text == ' rpm' .or. text == 'rpm') then
       ! Alone: a product with a quotient would be ambiguous.
-      unit = composed_unit_t('rad/s', two_pi, 60.0_wp, [0, 0, -1, 0, 0], 1)
+      unit = composed_unit_t('rad/s', two_pi, 60.0_wp, [0, 0, -2, 0, 0], 2)
       return
     end if
     do
-      do while (at <= len(text))
-        if (text(at:at) /= ' ') exit
+      call skip_blanks(text, at)
+      if (below .and. .not. in_parentheses .and. text(at:min(at, len(text))) == '(') then
+        in_parentheses = .true.
         at = at + 1
-      end do
-      length = scan(text(at:)//' ', ' */') - 1
+        call skip_blanks(text, at)
+      end if
+      length = scan(text(at:)//' ', ' */()') - 1
       column = at
       if (length < 1) return
       factor = text(at:at + length - 1)
-      call read_factor(factor, below, unit, power)
-      if (power == 0) return
+      call read_factor(factor, below, unit, halves)
+      if (halves == 0) return
       at = at + length
-      do while (at <= len(text))
-        if (text(at:at) /= ' ') exit
+      call skip_blanks(text, at)
+      if (in_parentheses .and. text(at:min(at, len(text))) == ')') then
+        in_parentheses = .false.
         at = at + 1
-      end do
+        call skip_blanks(text, at)
+      end if
       if (at > len(text)) exit
-      below = text(at:at) == '/'
-      if (below .or. text(at:at) == '*') at = at + 1
+      column = at
+      if (in_parentheses .and. text(at:at) == '/') return
+      if (.not. in_parentheses) below = text(at:at) == '/'
+      if (scan(text(at:at), '/*') > 0) at = at + 1
     end do
+    column = at
+    if (in_parentheses) return
     column = 0
     if (len(unit%si) == 0) unit%si = '1'
     if (unit%si(1:1) == '/') unit%si = '1'//unit%si
   end subroutine read_unit
 
-  !> One factor with its exponent; `power` is 0 if it is not known.
-  pure subroutine read_factor(text, below, unit, power)
+  pure subroutine skip_blanks(text, at)
+    character(len=*), intent(in) :: text
+    integer, intent(inout) :: at
+    do while (at <= len(text))
+      if (text(at:at) /= ' ') exit
+      at = at + 1
+    end do
+  end subroutine skip_blanks
+
+  !> One factor with twice its exponent, `halves`, which is 0 if it is not known.
+  pure subroutine read_factor(text, below, unit, halves)
     character(len=*), intent(in) :: text
     logical, intent(in) :: below
     type(composed_unit_t), intent(inout) :: unit
-    integer, intent(out) :: power
+    integer, intent(out) :: halves
     type(symbol_t) :: symbol
     character(len=:), allocatable :: shown
-    integer :: mark, status, i
-    mark = index(text, '^')
-    power = 1
-    if (mark == 0) mark = len(text) + 1
-    if (mark < len(text)) then
-      read (text(mark + 1:), *, iostat=status) power
-      if (status /= 0 .or. verify(text(mark + 1:), '-0123456789') > 0) power = 0
-      if (abs(power) > largest_exponent) power = 0
-    else if (mark == len(text)) then
-      power = 0
-    end if
-    if (power == 0) return
+    integer :: mark
+    mark = index(text//'^', '^')
+    call read_exponent(text(mark:), halves)
+    if (halves == 0) return
     call find_symbol(text(:mark - 1), symbol)
     if (len_trim(symbol%spelling) == 0) then
-      power = 0
+      halves = 0
       return
     end if
     shown = trim(symbol%si)
-    if (power /= 1) shown = shown//'^'//to_text(power)
+    if (modulo(halves, 2) /= 0) then
+      shown = shown//'^'//to_text(real(halves, kind(1.0d0))/2)
+    else if (halves /= 2) then
+      shown = shown//'^'//to_text(halves/2)
+    end if
     if (below) then
       unit%si = unit%si//'/'//shown
-      power = -power
+      halves = -halves
     else if (symbol%si /= '1') then
       if (len(unit%si) > 0) unit%si = unit%si//' '
       unit%si = unit%si//shown
     end if
-    do i = 1, abs(power)
-      if (power > 0) then
-        unit%multiplier = unit%multiplier*symbol%multiplier
-        unit%divisor = unit%divisor*symbol%divisor
-      else
-        unit%multiplier = unit%multiplier*symbol%divisor
-        unit%divisor = unit%divisor*symbol%multiplier
-      end if
-    end do
-    unit%exponents = unit%exponents + power*symbol%exponents
-    if (symbol%si == 'rad') unit%angle = unit%angle + power
-    if (symbol%si == 'Hz') unit%hertz = unit%hertz + power
+    call multiply(unit, symbol, halves)
   end subroutine read_factor
+
+  !> Twice the exponent that `text` states, '^2' or '^1.5'; 0 if that is none. Without a text it is 1.
+  pure subroutine read_exponent(text, halves)
+    character(len=*), intent(in) :: text
+    integer, intent(out) :: halves
+    real(kind(1.0d0)) :: power
+    integer :: status
+    halves = 2
+    if (len(text) == 0) return
+    halves = 0
+    if (len(text) == 1 .or. verify(text, '^-.0123456789') > 0) return
+    call parse_number(text(2:), power, status)
+    if (status /= 0) return
+    if (abs(power) <= largest_exponent .and. .not. abs(2*power - anint(2*power)) > 0) halves = nint(2*power)
+  end subroutine read_exponent
+
+  pure subroutine multiply(unit, symbol, halves)
+    type(composed_unit_t), intent(inout) :: unit
+    type(symbol_t), intent(in) :: symbol
+    integer, intent(in) :: halves
+    real(wp) :: above, under
+    integer :: i
+    above = merge(symbol%multiplier, symbol%divisor, halves > 0)
+    under = merge(symbol%divisor, symbol%multiplier, halves > 0)
+    do i = 1, abs(halves)/2
+      unit%multiplier = unit%multiplier*above
+      unit%divisor = unit%divisor*under
+    end do
+    if (modulo(halves, 2) /= 0) then
+      unit%multiplier = unit%multiplier*sqrt(above)
+      unit%divisor = unit%divisor*sqrt(under)
+    end if
+    unit%exponents = unit%exponents + halves*symbol%exponents
+    if (symbol%si == 'rad') unit%angle = unit%angle + halves
+    if (symbol%si == 'Hz') unit%hertz = unit%hertz + halves
+  end subroutine multiply
 
   !> A symbol, perhaps with a prefix; blank if there is none of the name.
   pure subroutine find_symbol(name, symbol)

@@ -35,7 +35,7 @@ contains
     integer :: column
     call read_unit(text, unit, column)
     if (column > 0) return
-    quantity%exponents = 2*unit%exponents
+    quantity%exponents = unit%exponents
     quantity%is_known = any(unit%exponents /= 0)
     quantity%is_stated = quantity%is_known
   end function parameter_unit
@@ -148,7 +148,7 @@ contains
       if (modulo(quantity%exponents(i), 2) == 0) then
         text = text//'^'//to_text(quantity%exponents(i)/2)
       else
-        text = text//'^('//to_text(quantity%exponents(i))//'/2)'
+        text = text//'^'//to_text(real(quantity%exponents(i), kind(1.0d0))/2)
       end if
     end do
     if (len(text) == 0) text = '1'

@@ -15,12 +15,12 @@ module series_flight
   use step_length, only: is_plain, natural_step
   use tape, only: tape_t
   use tape_series, only: expand, prepare_series, series_t
-  use tape_value, only: evaluate, starting_branches
+  use tape_value, only: evaluate
   implicit none
   private
 
-  public :: start_flight, restart_flight, set_branches, change_branches, advance_flight, value_in_flight, keep_bounds, &
-    take_bounds, series_order
+  public :: start_flight, restart_flight, set_branches, go_on_with, branches_of, sizes_of_state, advance_flight, &
+    value_in_flight, keep_bounds, take_bounds, series_order
 
   !> How a motion ended: at its last time; at a guard; where an operation is not defined; where no step, however short, is
   !> proven; at the budget of steps; at its start, whose branches are not those of the state.
@@ -155,27 +155,34 @@ contains
     end do
   end subroutine set_branches
 
-  !> Goes on with the other branch of the switching functions that crossed at the end, and with those that their sign there gives
-  !> of functions that were in no branch before.
-  pure subroutine change_branches(flight)
+  !> Goes on with these branches of switching functions. `zeros`: order of the zero that a function has, -1 if it stays zero.
+  pure subroutine go_on_with(flight, branches, zeros)
     type(flight_t), intent(inout) :: flight
-    integer :: branches(size(flight%series%branches)), k, own
-    logical :: watched(size(flight%guards) - size(flight%series%branches))
+    integer, intent(in) :: branches(:), zeros(:)
+    logical :: watched(size(flight%guards) - size(branches))
+    integer :: own
     own = size(watched)
     watched = flight%is_active(:own)
-    call starting_branches(flight%tape, flight%state, flight%parameters, branches)
-    do k = 1, size(branches)
-      if (flight%crossed(own + k)) then
-        branches(k) = -flight%series%branches(k)
-      else if (flight%is_active(own + k) .or. branches(k) == 0) then
-        branches(k) = flight%series%branches(k)
-      end if
-    end do
     call set_branches(flight, branches)
     flight%is_active(:own) = watched
+    flight%is_active(own + 1:) = flight%is_active(own + 1:) .and. zeros >= 0
+    flight%zeros(own + 1:) = max(zeros, 0)
     ! Other forces allow other steps.
     flight%proven = 1
-  end subroutine change_branches
+  end subroutine go_on_with
+
+  pure function branches_of(flight) result(branches)
+    type(flight_t), intent(in) :: flight
+    integer :: branches(size(flight%series%branches))
+    branches = flight%series%branches
+  end function branches_of
+
+  !> What the state at the end of a step is a sum of, for its rounding.
+  pure function sizes_of_state(flight) result(sizes)
+    type(flight_t), intent(in) :: flight
+    real(wp) :: sizes(size(flight%rates))
+    sizes = sum(abs(flight%path), dim=1)
+  end function sizes_of_state
 
   !> Value of a node at the present state, in the present branches.
   pure real(wp) function value_in_flight(flight, node) result(value)

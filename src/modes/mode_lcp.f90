@@ -290,7 +290,11 @@ contains
     integer :: i, limit
     do i = 1, lcp%count
       limit = degenerate_at(lcp, i, r, y, side, tolerance(i))
-      if (limit > 0) then
+      if (limit /= 0 .and. .not. lcp%upper(i) > lcp%lower(i)) then
+        ! No load: friction is at both limits.
+        lcp%lower(i) = 0 - rate(i)
+        lcp%upper(i) = rate(i)
+      else if (limit > 0) then
         lcp%lower(i) = -huge(1.0_wp)
         lcp%upper(i) = rate(i)
       else if (limit < 0) then

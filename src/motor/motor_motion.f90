@@ -26,18 +26,16 @@ module motor_motion
   use motor_system, only: guard_back, guard_body_down, guard_body_up, guard_count, guard_crank_down, guard_crank_up, &
     guard_fastest, guard_lower, guard_section, guard_standstill, guard_turning, guard_upper, motor_system_t, y_at
   use own_equations, only: build_own_equations
-  use series_flight, only: advance_flight, change_branches, flight_crossed, flight_left_domain, flight_reached, &
-    flight_step_budget, flight_t, flight_wrong_branch
+  use series_flight, only: advance_flight, flight_crossed, flight_left_domain, flight_reached, flight_step_budget, flight_t, &
+    flight_wrong_branch
   use status, only: reason_event_budget, reason_left_domain, reason_mode_cycle, reason_not_finite, reason_step_budget, &
     reason_step_failed
   use stored_jumps, only: add_jump, keep_stored
+  use switch_branches, only: most_idle_events, pass_switches
   implicit none
   private
 
-  public :: prepare_motor, start_motor, start_own, advance_motor, check_hold, do_events
-
-  !> Events without progress in time after which a motion is given up.
-  integer, parameter, public :: most_idle_events = 32
+  public :: prepare_motor, start_motor, start_own, advance_motor, check_hold, do_events, most_idle_events
 
   !> A machine with a motor, ready to move.
   type, public :: motor_motion_t
@@ -206,19 +204,6 @@ contains
     tally%v_max = max(tally%v_max, state%v)
     reason = reason_of_flight(status, flight)
   end subroutine fly
-
-  !> Goes on with the other branches of forces where their switching functions crossed zero; no branch fits where that happens
-  !> again and again at one time.
-  pure subroutine pass_switches(flight, last, idle, status)
-    type(flight_t), intent(inout) :: flight
-    real(wp), intent(inout) :: last
-    integer, intent(inout) :: idle, status
-    if (.not. any(flight%crossed(guard_count + 1:))) return
-    idle = merge(0, idle + 1, flight%time > last)
-    last = flight%time
-    call change_branches(flight)
-    if (idle >= most_idle_events) status = flight_wrong_branch
-  end subroutine pass_switches
 
   !> State and losses after a part of a flight.
   pure subroutine take_state(system, flight, state, crank, log)

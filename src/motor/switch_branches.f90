@@ -5,15 +5,17 @@
 module switch_branches
   use kinds, only: wp
   use operations, only: op_add, op_select, op_subtract
-  use series_flight, only: flight_t
+  use series_flight, only: branches_of, flight_t, flight_wrong_branch, go_on_with, sizes_of_state
   use tape, only: tape_t
   use tape_series, only: expand, prepare_series, series_t
-  use tape_value, only: evaluate
+  use tape_value, only: evaluate, sizes_of_nodes, starting_branches
   implicit none
   private
 
-  public :: choose_branches
+  public :: choose_branches, pass_switches
 
+  !> Events without progress in time after which a motion is given up.
+  integer, parameter, public :: most_idle_events = 32
   !> Terms that decide.
   integer, parameter :: low_order = 6
 
@@ -21,12 +23,13 @@ contains
 
   !> Signs of the switching functions at the variables `z`. `zeros`: order of the zero that a function has there, 0 for none, -1
   !> if it stays zero. `fits` is false if the motion leaves no branch on the side of that branch, or a function that stays zero
-  !> has different branches: forces jump where the motion can only slide along the jump.
-  pure subroutine choose_branches(flight, z, parameters, branches, zeros, fits)
+  !> has different branches: forces jump where the motion can only slide along the jump. `are_zero` are known to be so.
+  pure subroutine choose_branches(flight, z, parameters, branches, zeros, fits, are_zero)
     type(flight_t), intent(in) :: flight
     real(wp), intent(in) :: z(:), parameters(:)
     integer, intent(out) :: branches(:), zeros(:)
     logical, intent(out) :: fits
+    logical, intent(in), optional :: are_zero(:)
     type(series_t) :: series
     real(wp) :: value(flight%tape%count), least
     integer :: faults(flight%tape%count), nodes(size(branches)), before(size(branches)), k, try, fault
@@ -42,6 +45,7 @@ contains
       least = size_of(flight%tape, value, nodes(k)) + abs(series%c(1, nodes(k))*z(1))
       zeros(k) = merge(1, 0, abs(value(nodes(k))) <= 16*epsilon(1.0_wp)*least)
     end do
+    if (present(are_zero)) zeros = merge(1, 0, are_zero)
     if (all(zeros == 0)) return
     do try = 1, 2*size(branches) + 2
       before = branches
@@ -57,6 +61,59 @@ contains
     end do
     if (fits) fits = .not. jumps(flight%tape, series, zeros)
   end subroutine choose_branches
+
+  !> Goes on with the other branches of forces where their switching functions crossed zero; no branch fits where that happens
+  !> again and again at one time.
+  pure subroutine pass_switches(flight, last, idle, status)
+    type(flight_t), intent(inout) :: flight
+    real(wp), intent(inout) :: last
+    integer, intent(inout) :: idle, status
+    if (.not. any(flight%crossed(size(flight%guards) - size(flight%tape%switches) + 1:))) return
+    idle = merge(0, idle + 1, flight%time > last)
+    last = flight%time
+    call pass_zeros(flight)
+    if (idle >= most_idle_events) status = flight_wrong_branch
+  end subroutine pass_switches
+
+  !> Goes on with the other branches where functions crossed zero at the end of a step. Others may be zero there, too, as in
+  !> if(x < 0, max(-k*x, 0), 0): their signs are rounding, and their first terms decide.
+  pure subroutine pass_zeros(flight)
+    type(flight_t), intent(inout) :: flight
+    real(wp) :: value(flight%tape%count), sizes(flight%tape%count)
+    integer, dimension(size(flight%tape%switches)) :: nodes, branches, zeros
+    logical, dimension(size(flight%tape%switches)) :: crossed, are_zero
+    integer :: faults(flight%tape%count), own
+    logical :: fits
+    nodes = flight%tape%switches%argument
+    own = size(flight%guards) - size(nodes)
+    crossed = flight%crossed(own + 1:)
+    call evaluate(flight%tape, flight%state, flight%parameters, value, faults)
+    sizes = sizes_of_nodes(flight%tape, value, sizes_of_state(flight))
+    are_zero = crossed .or. (abs(value(nodes)) <= 16*epsilon(1.0_wp)*sizes(nodes) .and. faults(nodes) == 0)
+    fits = any(are_zero .and. .not. crossed)
+    if (fits) call choose_branches(flight, flight%state, flight%parameters, branches, zeros, fits, are_zero)
+    if (.not. fits) then
+      zeros = flight%zeros(own + 1:)
+      call change_branches(flight, crossed, branches)
+    end if
+    call go_on_with(flight, branches, zeros)
+  end subroutine pass_zeros
+
+  !> The other branch of the functions that crossed zero at the end of a step, and those that their sign there gives of functions
+  !> that were in no branch before.
+  pure subroutine change_branches(flight, crossed, branches)
+    type(flight_t), intent(in) :: flight
+    logical, intent(in) :: crossed(:)
+    integer, intent(out) :: branches(:)
+    integer :: before(size(branches))
+    before = branches_of(flight)
+    call starting_branches(flight%tape, flight%state, flight%parameters, branches)
+    where (crossed)
+      branches = -before
+    else where (flight%is_active(size(flight%guards) - size(branches) + 1:) .or. branches == 0)
+      branches = before
+    end where
+  end subroutine change_branches
 
   !> Branch and order of a function by its first coefficient that is not zero, `c(1)` being that of order 0.
   pure subroutine leave_zero(c, branch, order)

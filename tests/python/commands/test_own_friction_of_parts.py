@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The Separatrix developers
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Friction between parts by an expression of the sliding speed is that of the catalogue of the same form."""
+"""Friction between parts by an expression of the sliding speed; a load that grows from nothing."""
 
 from pathlib import Path
 
@@ -81,3 +81,37 @@ def test_what_is_no_friction_is_rejected_by_its_key(separatrix, tmp_path, force,
     assert ended.code == 65
     assert "friction.a.force" in ended.err
     assert allowed in ended.err
+
+
+UNLOADED = """
+[body.a]
+mass = 0.02
+[friction.a]
+law = "coulomb_load"
+between = ["a"]
+kinetic_coefficient = 0.4
+static_coefficient = 0.5
+load = "98*t + 9.8e5*t^2"
+[drive.push]
+law = "expression"
+body = "a"
+force = "growth*t"
+growth = {rate}
+[run]
+duration = 1e-3
+average = "window"
+"""
+
+
+@pytest.mark.parametrize("rate", [67, -67, 48, -48])
+def test_friction_without_a_load_at_the_start(separatrix, tmp_path, rate) -> None:
+    # Load and force begin at zero: their rates decide. The body slides until the load has grown.
+    (tmp_path / "case.toml").write_text(UNLOADED.format(rate=rate))
+    succeed(separatrix, "trajectory", "case.toml", "-o", "out.h5", "--force", folder=tmp_path)
+    slope, bend = abs(rate) - 0.4 * 98, 0.4 * 9.8e5
+    end = 1.5 * slope / bend
+    moved = (slope * end**3 / 6 - bend * end**4 / 12) / 0.02 if abs(rate) > 49 else 0.0
+    with h5py.File(tmp_path / "out.h5") as file:
+        times, x = file["event_time"][()], float(file["x"][-1])
+    np.testing.assert_allclose(times, [end] if moved > 0 else [], rtol=1e-9)
+    np.testing.assert_allclose(x, np.sign(rate) * moved, rtol=1e-9)
