@@ -20,14 +20,14 @@ module lane_slots
   use structure_preparation, only: prepare_structure_lanes
   use structure_types, only: structure_batch_t
   use tape_lane_types, only: tape_batch_t
-  use tape_lanes, only: add_tape_region, fly_tape_lanes, occupy_tape_lane, set_tape_clock, take_tape_clock, tape_flies, &
-    tape_lane_state
+  use tape_lanes, only: add_tape_region, fly_tape_lanes, occupy_tape_lane, set_tape_clock, take_tape_clock, tape_batches, &
+    tape_flies, tape_lane_state
   use tape_bodies, only: prepare_motor_lanes, prepare_own_lanes
   implicit none
   private
 
   public :: prepare_flow, open_lanes, add_capture, flies_in_lane, put_into_lane, take_from_lane, set_clock, take_clock, &
-    advance_lanes
+    advance_lanes, advance_batches, batches_at_once
 
   !> Motions in lanes that are not those of one body in a closed form: of several bodies, of a body whose equations are a tape.
   type, public :: lane_bodies_t
@@ -190,6 +190,24 @@ contains
     real(wp), intent(inout) :: since, until
     if (allocated(bodies%tapes)) call take_tape_clock(bodies%tapes, batch, lane, since, until)
   end subroutine take_clock
+
+  !> Batches that are worth flying at once.
+  pure integer function batches_at_once(flow)
+    type(lane_flow_t), intent(in) :: flow
+    batches_at_once = 1
+    if (allocated(flow%tape)) batches_at_once = tape_batches(flow)
+  end function batches_at_once
+
+  !> `advance_lanes` of as many batches as are worth flying at once.
+  pure subroutine advance_batches(flow, lane_slots)
+    type(lane_flow_t), intent(in) :: flow
+    type(lane_slots_t), intent(inout) :: lane_slots(:)
+    if (size(lane_slots) == 1) then
+      call advance_lanes(flow, lane_slots(1))
+    else
+      call fly_tape_lanes(flow, lane_slots(1)%batch, lane_slots(1)%bodies%tapes, lane_slots(2)%batch, lane_slots(2)%bodies%tapes)
+    end if
+  end subroutine advance_batches
 
   !> Flies every occupied lane until it has stopped or is left to the event loop.
   pure subroutine advance_lanes(flow, lane_slots)

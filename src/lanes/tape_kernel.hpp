@@ -271,30 +271,54 @@ inline void step(const tape_machine &m, const tape_batch &batch, bool fresh, tap
   }
 }
 
-inline void fly_tape(const tape_machine &m, lane_batch &control, tape_batch &batch) {
-  for (int first = 0; first < lanes; first += vec_size) {
+// Lanes of a vector that are in one batch, and batches that fly at once.
+const int in_batch = lanes, piece = vec_size < in_batch ? vec_size : in_batch,
+          batches_at_once = vec_size / piece;
+static_assert(batches_at_once * piece == vec_size && batches_at_once <= 2, "as separatrix_fly_tape has them");
+
+// Copies the lanes of a group from batches to vectors, or back; the first lane is number `first` of its
+// batch.
+struct tape_exchange {
+  lane_batch *const *control;
+  tape_batch *const *batch;
+  int first;
+
+  template <bool in> void run(tape_group &g) const {
+    for (int part = 0; part < batches_at_once; part++) {
+      auto copy = [&](double *lane, vec &all) {
+        double *vector = (double *)&all + part * piece;
+        memcpy(in ? vector : lane + first, in ? lane + first : vector, sizeof(double[piece]));
+      };
+      g.c.exchange(control[part]->fields, copy);
+      double *fields = (double *)&batch[part]->fields;
+      for (int i = 0; i < tape_members; i++)
+        copy(fields + i * lanes, *((vec *)&g.s + i));
+    }
+  }
+};
+
+// The lanes of `batches_at_once` batches, of which the first knows where they can converge to.
+inline void fly_tape(const tape_machine &m, lane_batch *const *control, tape_batch *const *batch) {
+  for (int first = 0; first < lanes; first += piece) {
+    const tape_exchange here = {control, batch, first};
     tape_group g;
-    g.c.exchange(control.fields, first, [](const double *from, vec &to) { memcpy(&to, from, sizeof to); });
+    here.run<true>(g);
     mask sent = (g.c.status == lane_fresh) | (g.c.status == lane_flying);
     if (!any(sent))
       continue;
     put(g.c.status, sent, lane_flying);
-    for (int i = 0; i < tape_members; i++)
-      memcpy((vec *)&g.s + i, (const double *)&batch.fields + i * lanes + first, sizeof(vec));
     g.box_is_set = false;
     for (bool fresh = true; !any(sent & (g.c.status != lane_flying)); fresh = false)
-      step(m, batch, fresh, g);
-    g.c.exchange(control.fields, first, [](double *to, const vec &from) { memcpy(to, &from, sizeof from); });
-    for (int i = 0; i < tape_members; i++)
-      memcpy((double *)&batch.fields + i * lanes + first, (const vec *)&g.s + i, sizeof(vec));
+      step(m, *batch[0], fresh, g);
+    here.run<false>(g);
   }
 }
 
 } // namespace
 
 #define SEPARATRIX_TAPE_KERNEL(name)                                                                         \
-  extern "C" void name(const tape_machine *m, lane_batch *control, tape_batch *batch) {                      \
-    fly_tape(*m, *control, *batch);                                                                          \
+  extern "C" void name(const tape_machine *m, lane_batch *const *control, tape_batch *const *batch) {        \
+    fly_tape(*m, control, batch);                                                                            \
   }
 
 #endif

@@ -15,7 +15,7 @@ module tape_lanes
   private
 
   public :: tape_sizes, tape_flies, add_tape_region, occupy_tape_lane, tape_lane_state, set_tape_clock, take_tape_clock, &
-    fly_tape_lanes
+    fly_tape_lanes, tape_batches
 
   interface
     !> Bytes of tape_machine and tape_batch as C++ has them.
@@ -24,12 +24,21 @@ module tape_lanes
       integer(c_size_t), intent(out) :: machine, batch
     end subroutine separatrix_tape_sizes
 
-    pure subroutine separatrix_fly_tape(width, machine, control, batch) bind(c)
+    !> Batches that fly faster at once than one by one.
+    pure function separatrix_tape_batches(width) result(count) bind(c)
+      import :: c_int
+      integer(c_int), value :: width
+      integer(c_int) :: count
+    end function separatrix_tape_batches
+
+    pure subroutine separatrix_fly_tape(width, machine, control, batch, other_control, other_batch) bind(c)
       import :: c_int, lane_batch_t, tape_batch_t, tape_machine_t
       integer(c_int), value :: width
       type(tape_machine_t), intent(in) :: machine
       type(lane_batch_t), intent(inout) :: control
       type(tape_batch_t), intent(inout) :: batch
+      type(lane_batch_t), intent(inout), optional :: other_control
+      type(tape_batch_t), intent(inout), optional :: other_batch
     end subroutine separatrix_fly_tape
   end interface
 
@@ -146,12 +155,20 @@ contains
     until = control%until(lane)
   end subroutine take_tape_clock
 
-  !> Flies every occupied lane until it has stopped or is left to the event loop.
-  pure subroutine fly_tape_lanes(flow, control, batch)
+  !> Batches that the lanes of this width fly at once.
+  pure integer function tape_batches(flow)
+    type(lane_flow_t), intent(in) :: flow
+    tape_batches = separatrix_tape_batches(int(flow%width, c_int))
+  end function tape_batches
+
+  !> Flies every occupied lane of a batch, and of another, until one has stopped or is left to the event loop.
+  pure subroutine fly_tape_lanes(flow, control, batch, other_control, other_batch)
     type(lane_flow_t), intent(in) :: flow
     type(lane_batch_t), intent(inout) :: control
     type(tape_batch_t), intent(inout) :: batch
-    call separatrix_fly_tape(int(flow%width, c_int), flow%tape, control, batch)
+    type(lane_batch_t), intent(inout), optional :: other_control
+    type(tape_batch_t), intent(inout), optional :: other_batch
+    call separatrix_fly_tape(int(flow%width, c_int), flow%tape, control, batch, other_control, other_batch)
   end subroutine fly_tape_lanes
 
 end module tape_lanes

@@ -31,20 +31,20 @@ struct tape_control {
   vec status, until, flights, impacts, speed_sum, last_speed, margin, sections, budget, leaves, elapsed,
       reached, settled;
 
-  template <class each> void exchange(lane_fields<double[lanes]> &f, int first, each move) {
-    move(&f.status[first], status);
-    move(&f.until[first], until);
-    move(&f.flights[first], flights);
-    move(&f.impacts[first], impacts);
-    move(&f.speed_sum[first], speed_sum);
-    move(&f.last_speed[first], last_speed);
-    move(&f.margin[first], margin);
-    move(&f.sections[first], sections);
-    move(&f.budget[first], budget);
-    move(&f.leaves[first], leaves);
-    move(&f.elapsed[first], elapsed);
-    move(&f.reached[first], reached);
-    move(&f.settled[first], settled);
+  template <class each> void exchange(lane_fields<double[lanes]> &f, each move) {
+    move(f.status, status);
+    move(f.until, until);
+    move(f.flights, flights);
+    move(f.impacts, impacts);
+    move(f.speed_sum, speed_sum);
+    move(f.last_speed, last_speed);
+    move(f.margin, margin);
+    move(f.sections, sections);
+    move(f.budget, budget);
+    move(f.leaves, leaves);
+    move(f.elapsed, elapsed);
+    move(f.reached, reached);
+    move(f.settled, settled);
   }
 };
 

@@ -6,7 +6,7 @@
 module trajectories
   use attractors, only: attractor_t
   use errors, only: error_t
-  use lane_slots, only: lane_bodies_t, lane_slots_t, advance_lanes, open_lanes
+  use lane_slots, only: lane_bodies_t, lane_slots_t, advance_batches, batches_at_once, open_lanes
   use kinds, only: wp
   use lane_gpu, only: await_half, gpu_half_t, gpu_threads, open_gpu, send_half
   use lane_types, only: lane_batch_t, lane_count
@@ -47,8 +47,8 @@ contains
     type(attractor_t), intent(in) :: catalogue(:)
     real(wp), intent(in) :: starts(:, :)
     type(outcome_t), intent(out) :: outcomes(:)
-    type(slot_t) :: slots(lane_count)
-    type(lane_slots_t) :: lanes
+    type(slot_t), allocatable :: slots(:, :)
+    type(lane_slots_t), allocatable :: lanes(:)
     integer :: i, next
     if (.not. ensemble%flow%available) then
       do i = 1, size(starts, 2)
@@ -56,13 +56,19 @@ contains
       end do
       return
     end if
-    call open_lanes(ensemble%moving, lanes)
-    call set_regions(ensemble%moving, catalogue, lanes)
+    i = merge(batches_at_once(ensemble%flow), 1, size(starts, 2) > lane_count)
+    allocate (slots(lane_count, i), lanes(i))
     next = 1
-    call load_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%bodies, outcomes)
+    do i = 1, size(lanes)
+      call open_lanes(ensemble%moving, lanes(i))
+      call set_regions(ensemble%moving, catalogue, lanes(i))
+      call load_all(ensemble, catalogue, starts, next, slots(:, i), lanes(i)%batch, lanes(i)%bodies, outcomes)
+    end do
     do while (any(slots%start > 0))
-      call advance_lanes(ensemble%flow, lanes)
-      call service_all(ensemble, catalogue, starts, next, slots, lanes%batch, lanes%bodies, outcomes)
+      call advance_batches(ensemble%flow, lanes)
+      do i = 1, size(lanes)
+        call service_all(ensemble, catalogue, starts, next, slots(:, i), lanes(i)%batch, lanes(i)%bodies, outcomes)
+      end do
     end do
   end subroutine run_trajectories
 
