@@ -104,7 +104,7 @@ contains
     integer :: i
     point = start
     do i = 1, most_newton
-      call body%free_rates(point, rates, slopes)
+      call body%rates_at(mode_slip_plus, point, rates, slopes)
       call solve(slopes, -rates, step, ok)
       if (ok) ok = norm2((point + step - start)/body%size_of) <= near
       if (.not. ok) return
@@ -112,7 +112,7 @@ contains
       if (norm2(step/body%size_of) <= converged) exit
     end do
     ok = i <= most_newton
-    if (ok) call body%free_rates(point, rates, slopes)
+    if (ok) call body%rates_at(mode_slip_plus, point, rates, slopes)
     if (ok) call set_eigenvalues(slopes, values, ok)
   end subroutine find_equilibrium
 

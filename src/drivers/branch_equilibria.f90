@@ -13,7 +13,9 @@ module branch_equilibria
   use kinds, only: int64, wp
   use machine_family, only: machine_of_family
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int8
+  use hybrid_body, only: rests_on_barrier
   use hybrid_machine, only: hybrid_t
+  use own_body, only: own_body_t
   use session, only: session_t
   use structure, only: structure_t
   use structure_modes, only: phases_in
@@ -80,6 +82,8 @@ contains
     call machine_of_family(search%family, point%parameter, machine, error)
     if (allocated(error)) return
     select type (machine)
+    type is (own_body_t)
+      pressed = merge(1, 0, rests_on_barrier(point%mode))
     type is (structure_t)
       associate (joints => machine%frame%moving%machine%joints)
         pressed = count(is_stop(joints%kind) .and. phase_of(phases_in(machine%frame%moving%machine, point%mode), size(joints)) /= 0)

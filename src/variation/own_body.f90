@@ -39,7 +39,7 @@ module own_body
     real(wp), allocatable :: sizes(:)
   contains
     procedure :: rests => own_rests
-    procedure :: free_rates
+    procedure :: rates_at
     procedure :: fly => fly_body
     procedure :: slope => slope_of_body
     procedure :: guard => guard_of_own
@@ -141,17 +141,20 @@ contains
     own_rests = .not. slips(mode) .and. .not. (self%smooth_turns .and. mode == mode_stick)
   end function own_rests
 
-  !> Rates of a body without a clock that nothing holds, and their derivatives.
-  pure subroutine free_rates(self, y, rates, slopes)
+  !> Rates of a body without a clock in a mode, and their derivatives.
+  pure subroutine rates_at(self, mode, y, rates, slopes)
     class(own_body_t), intent(in) :: self
+    integer, intent(in) :: mode
     real(wp), intent(in) :: y(:)
     real(wp), intent(out) :: rates(:), slopes(:, :)
     real(wp) :: z(self%n + w_at), all(self%n + w_at)
     z = variables_at(self, 0.0_wp, y)
-    all = rates_in(self%flows(1), z, parameters_in(self, 1))
-    rates = all(x_at:)
-    slopes = slopes_in(self%flows(1), z, parameters_in(self, 1))
-  end subroutine free_rates
+    associate (flow => self%flows(merge(2, 1, self%rests(mode))), parameters => parameters_in(self, slip_in(mode)))
+      all = rates_in(flow, z, parameters)
+      rates = all(x_at:)
+      slopes = slopes_in(flow, z, parameters)
+    end associate
+  end subroutine rates_at
 
   pure subroutine fly_body(self, mode, t0, y0, t1, y1, flight)
     class(own_body_t), intent(in) :: self
