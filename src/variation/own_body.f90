@@ -24,8 +24,8 @@ module own_body
   public :: set_own_body, why_not_varied
 
   integer, parameter, public :: x_of = 1, v_of = 2
-  !> A speed at an event that is none, in sizes.
-  real(wp), parameter :: no_speed = 1e-9_wp
+  !> A speed at an event that is none, in sizes, and one that has a direction alone: damping makes no force of it.
+  real(wp), parameter :: no_speed = 1e-9_wp, direction_alone = 1e-30_wp
   !> A point this near to the section by an event, in sizes, is on it: it would be met again at once.
   real(wp), parameter :: near_section = 1e-9_wp
 
@@ -212,7 +212,7 @@ contains
     real(wp) :: z(self%n + w_at), rates(self%n + w_at)
     z = variables_at(self, t, y)
     ! Where it comes to rest, the branches are those of the side from which it comes.
-    if (slips(mode) .and. abs(z(v_at)) < no_speed*self%size_of(v_of)) z(v_at) = slip_in(mode)*no_speed*self%size_of(v_of)
+    if (slips(mode) .and. abs(z(v_at)) < no_speed*self%size_of(v_of)) z(v_at) = slip_in(mode)*direction_alone*self%size_of(v_of)
     rates = rates_in(self%flows(merge(2, 1, self%rests(mode))), z, parameters_in(self, slip_in(mode)))
     slope = rates(x_at:)
     if (.not. self%rests(mode)) slope(x_of) = y(v_of)

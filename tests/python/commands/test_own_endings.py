@@ -57,6 +57,15 @@ def test_states_at_an_equilibrium_are_named(separatrix, tmp_path) -> None:
     assert "at the stable equilibrium x = 1.00000000 m, z = 1.00000000," in ended.out
 
 
+@pytest.mark.parametrize("periods", [64, 400])
+def test_a_motion_with_a_state_that_dies_away_is_no_cycle(separatrix, tmp_path, periods) -> None:
+    more = '[state.z]\nrate = "x - 2*z"\n'
+    force = "(-0.2 - x^2)*v - x + 0.3*z"
+    ended = stability(separatrix, tmp_path, force, more, 0.5, 0, "--periods", str(periods))
+    assert "periodic" not in ended.out
+    assert "comes to rest at the stable equilibrium x = " in ended.out
+
+
 def test_an_angle_at_rest_has_its_unit(separatrix, tmp_path) -> None:
     (tmp_path / "case.toml").write_text(
         '[body]\nmass = "1 kg m^2"\n[restoring]\nlaw = "pendulum"\nmoment = "1 N m"\n[force.damper]\n'
