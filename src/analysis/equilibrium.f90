@@ -1,18 +1,18 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Equilibria of a structure without a clock in a given mode of its joints: Newton's method on the rates and on what the mode
+!> Equilibria of a machine without a clock in a given mode: Newton's method on the rates and on what the mode
 !> holds, and the eigenvalues of the motion beside them that stays in the mode.
 module equilibrium
   use body_family, only: family_t
   use branch_point, only: no_label
   use eigen, only: general_eigen
   use errors, only: error_t
+  use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
   use matrices, only: solve
-  use structure, only: structure_t
-  use structure_rest, only: margins_at_rest, misses_at_rest, rates_at_rest
+  use rest_modes, only: margins_of_rest, misses_of_rest, rates_of_rest
   use variations, only: by_difference, neighbourhood_t
   implicit none
   private
@@ -42,9 +42,9 @@ module equilibrium
 contains
 
   !> The equations and their derivatives by coordinates and parameter, in natural sizes.
-  pure subroutine equations(machines, structure, point, parameter_size, miss, slopes)
+  pure subroutine equations(machines, machine, point, parameter_size, miss, slopes)
     type(neighbourhood_t), intent(in) :: machines
-    type(structure_t), intent(in) :: structure
+    class(hybrid_t), intent(in) :: machine
     type(equilibrium_t), intent(in) :: point
     real(wp), intent(in) :: parameter_size
     real(wp), intent(out) :: miss(:), slopes(:, :)
@@ -52,31 +52,28 @@ contains
     real(wp), dimension(size(point%y), size(point%y)) :: by_state, kept
     integer :: i, n
     n = size(point%y)
-    time = structure%size_of_time()
-    miss = misses_at_rest(structure, point%mode, point%y)
+    time = machine%size_of_time()
+    miss = misses_of_rest(machine, point%mode, point%y)
     near = 0
     do i = 1, 4
-      select type (other => machines%near(i)%machine)
-      type is (structure_t)
-        near(:, i) = misses_at_rest(other, point%mode, point%y)
-      end select
+      near(:, i) = misses_of_rest(machines%near(i)%machine, point%mode, point%y)
     end do
     slopes(:, n + 1) = by_difference(machines, miss, near)*parameter_size
-    call rates_at_rest(structure, point%mode, point%y, rate, by_state)
-    call structure%fly(point%mode, 0.0_wp, point%y, 0.0_wp, held, kept)
+    call rates_of_rest(machine, point%mode, point%y, rate, by_state)
+    call machine%fly(point%mode, 0.0_wp, point%y, 0.0_wp, held, kept)
     slopes(:n, :n) = by_state
     slopes(n + 1:, :n) = -kept
     do i = 1, n
       slopes(n + i, i) = slopes(n + i, i) + 1
     end do
     do i = 1, n
-      slopes(:, i) = slopes(:, i)*structure%size_of(i)
+      slopes(:, i) = slopes(:, i)*machine%size_of(i)
     end do
     do i = 1, n
-      miss(i) = miss(i)*time/structure%size_of(i)
-      slopes(i, :) = slopes(i, :)*time/structure%size_of(i)
-      miss(n + i) = miss(n + i)/structure%size_of(i)
-      slopes(n + i, :) = slopes(n + i, :)/structure%size_of(i)
+      miss(i) = miss(i)*time/machine%size_of(i)
+      slopes(i, :) = slopes(i, :)*time/machine%size_of(i)
+      miss(n + i) = miss(n + i)/machine%size_of(i)
+      slopes(n + i, :) = slopes(n + i, :)/machine%size_of(i)
     end do
   end subroutine equations
 
@@ -95,20 +92,17 @@ contains
     n = size(point%y)
     length = huge(length)
     do i = 1, most_newton
-      select type (structure => machines%centre)
-      type is (structure_t)
-        call equations(machines, structure, point, family%parameter_size, miss(:2*n), slopes(:2*n, :))
-        slopes(2*n + 1, :) = direction
-        miss(2*n + 1) = 0
-        call solve(matmul(transpose(slopes), slopes), -matmul(transpose(slopes), miss), step, ok)
-        if (ok) ok = all(abs(step) <= 1e3_wp)
-        if (.not. ok) return
-        ! Least squares leave a fixed parameter fixed but for rounding.
-        if (.not. any(abs(direction(:n)) > 0)) step(n + 1) = 0
-        before = length
-        length = norm2(step)
-        point%y = point%y + step(:n)*structure%size_of
-      end select
+      call equations(machines, machines%centre, point, family%parameter_size, miss(:2*n), slopes(:2*n, :))
+      slopes(2*n + 1, :) = direction
+      miss(2*n + 1) = 0
+      call solve(matmul(transpose(slopes), slopes), -matmul(transpose(slopes), miss), step, ok)
+      if (ok) ok = all(abs(step) <= 1e3_wp)
+      if (.not. ok) return
+      ! Least squares leave a fixed parameter fixed but for rounding.
+      if (.not. any(abs(direction(:n)) > 0)) step(n + 1) = 0
+      before = length
+      length = norm2(step)
+      point%y = point%y + step(:n)*machines%centre%size_of
       if (abs(step(n + 1)) > 0) then
         point%parameter = point%parameter + step(n + 1)*family%parameter_size
         call machine_neighbourhood(family, point%parameter, machines, error)
@@ -119,11 +113,8 @@ contains
     end do
     ok = length < converged_step .and. maxval(abs(miss)) < 1e3_wp*converged_step
     if (.not. ok) return
-    select type (structure => machines%centre)
-    type is (structure_t)
-      point%margins = margins_at_rest(structure, point%mode, point%y)
-      call set_eigenvalues(structure, point)
-    end select
+    point%margins = margins_of_rest(machines%centre, point%mode, point%y)
+    call set_eigenvalues(machines%centre, point)
   end subroutine correct_equilibrium
 
   !> Direction in which the equilibria go on, a unit vector in natural sizes on the side of `along`.
@@ -135,28 +126,24 @@ contains
     real(wp) :: miss(2*size(point%y) + 1), slopes(2*size(point%y) + 1, size(point%y) + 1), tangent(size(point%y) + 1)
     integer :: n
     n = size(point%y)
-    ok = .false.
-    select type (structure => machines%centre)
-    type is (structure_t)
-      call equations(machines, structure, point, parameter_size, miss(:2*n), slopes(:2*n, :))
-      slopes(2*n + 1, :) = along
-      call solve(matmul(transpose(slopes), slopes), along, tangent, ok)
-    end select
+    call equations(machines, machines%centre, point, parameter_size, miss(:2*n), slopes(:2*n, :))
+    slopes(2*n + 1, :) = along
+    call solve(matmul(transpose(slopes), slopes), along, tangent, ok)
     if (ok) point%tangent = tangent/norm2(tangent)
   end subroutine tangent_of_equilibrium
 
   !> Orthonormal directions (columns, in natural sizes) in which the mode lets the coordinates change.
-  pure function free_directions(structure, mode, y) result(directions)
-    type(structure_t), intent(in) :: structure
+  pure function free_directions(machine, mode, y) result(directions)
+    class(hybrid_t), intent(in) :: machine
     integer, intent(in) :: mode
     real(wp), intent(in) :: y(:)
     real(wp), allocatable :: directions(:, :)
     real(wp) :: kept(size(y), size(y)), held(size(y)), column(size(y)), basis(size(y), size(y))
     integer :: i, k, pass, found
-    call structure%fly(mode, 0.0_wp, y, 0.0_wp, held, kept)
+    call machine%fly(mode, 0.0_wp, y, 0.0_wp, held, kept)
     found = 0
     do k = 1, size(y)
-      column = kept(:, k)*structure%size_of(k)/structure%size_of
+      column = kept(:, k)*machine%size_of(k)/machine%size_of
       do pass = 1, 2
         do i = 1, found
           column = column - basis(:, i)*sum(basis(:, i)*column)
@@ -170,19 +157,19 @@ contains
   end function free_directions
 
   !> Eigenvalues of the motion that stays in the mode [1/s], and their eigenvectors (columns, in natural sizes).
-  pure subroutine eigen_of(structure, point, values, vectors)
-    type(structure_t), intent(in) :: structure
+  pure subroutine eigen_of(machine, point, values, vectors)
+    class(hybrid_t), intent(in) :: machine
     type(equilibrium_t), intent(in) :: point
     complex(wp), allocatable, intent(out) :: values(:), vectors(:, :)
     real(wp) :: rate(size(point%y)), by_state(size(point%y), size(point%y))
     real(wp), allocatable :: directions(:, :), reduced(:, :)
     integer :: i, n
     logical :: ok
-    call rates_at_rest(structure, point%mode, point%y, rate, by_state)
+    call rates_of_rest(machine, point%mode, point%y, rate, by_state)
     do i = 1, size(point%y)
-      by_state(:, i) = by_state(:, i)*structure%size_of(i)/structure%size_of
+      by_state(:, i) = by_state(:, i)*machine%size_of(i)/machine%size_of
     end do
-    directions = free_directions(structure, point%mode, point%y)
+    directions = free_directions(machine, point%mode, point%y)
     reduced = matmul(transpose(directions), matmul(by_state, directions))
     n = size(reduced, 1)
     allocate (values(n), vectors(n, n))
@@ -193,14 +180,14 @@ contains
   end subroutine eigen_of
 
   !> Eigenvalues of an equilibrium, in order.
-  pure subroutine set_eigenvalues(structure, point)
-    type(structure_t), intent(in) :: structure
+  pure subroutine set_eigenvalues(machine, point)
+    class(hybrid_t), intent(in) :: machine
     type(equilibrium_t), intent(inout) :: point
     complex(wp), allocatable :: values(:), vectors(:, :)
     complex(wp) :: moved
     real(wp) :: change
     integer :: i, k
-    call eigen_of(structure, point, values, vectors)
+    call eigen_of(machine, point, values, vectors)
     point%values = values
     where (abs(aimag(point%values)) <= 1e-12_wp*maxval(abs(point%values))) &
       point%values = cmplx(real(point%values), 0.0_wp, wp)
@@ -218,10 +205,10 @@ contains
   end subroutine set_eigenvalues
 
   !> Whether no equilibria are next to this one at the same value.
-  pure logical function is_isolated(structure, point)
-    type(structure_t), intent(in) :: structure
+  pure logical function is_isolated(machine, point)
+    class(hybrid_t), intent(in) :: machine
     type(equilibrium_t), intent(in) :: point
-    is_isolated = all(abs(point%values)*structure%size_of_time() > neutral)
+    is_isolated = all(abs(point%values)*machine%size_of_time() > neutral)
   end function is_isolated
 
   !> Eigenvalues with a positive real part.

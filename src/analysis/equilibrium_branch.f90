@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Branches of equilibria of a structure without a clock over a parameter, with their folds, Hopf points, and ends where a stop is
+!> Branches of equilibria of a machine without a clock over a parameter, with their folds, Hopf points, and ends where a stop is
 !> touched or let go.
 module equilibrium_branch
   use body_family, only: family_t
@@ -9,10 +9,10 @@ module equilibrium_branch
   use continuation, only: continuation_t
   use equilibrium, only: correct_equilibrium, count_unstable, equilibrium_t, is_isolated, lasts, tangent_of_equilibrium
   use errors, only: error_t
+  use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
-  use structure, only: structure_t
-  use structure_rest, only: modes_at_rest
+  use rest_modes, only: is_linear, modes_of_rest, without_speeds
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -66,40 +66,27 @@ contains
     do i = 1, size(values)
       call machine_neighbourhood(family, values(i), machines, error)
       if (allocated(error)) cycle
-      select type (structure => machines%centre)
-      type is (structure_t)
-        if (structure%has_clock) return
-        modes = modes_at_rest(structure)
-        do m = 1, size(modes)
-          do k = 1, starts_tried(structure, size(modes), size(starts, 2))
-            own = machines
-            seed = equilibrium_t(mode=modes(m), parameter=values(i), y=at_rest(structure, starts(:, k)))
-            call correct_equilibrium(family, own, seed, along_parameter(seed, 1), ok)
-            if (ok) ok = is_isolated(structure, seed) .and. lasts(seed)
-            if (ok) ok = .not. is_on(branches, family, structure, seed)
-            if (ok) call follow(family, plan, seed, branches)
-          end do
+      modes = modes_of_rest(machines%centre)
+      do m = 1, size(modes)
+        do k = 1, starts_tried(machines%centre, size(modes), size(starts, 2))
+          own = machines
+          seed = equilibrium_t(mode=modes(m), parameter=values(i), y=without_speeds(machines%centre, starts(:, k)))
+          call correct_equilibrium(family, own, seed, along_parameter(seed, 1), ok)
+          if (ok) ok = is_isolated(machines%centre, seed) .and. lasts(seed)
+          if (ok) ok = .not. is_on(branches, family, machines%centre, seed)
+          if (ok) call follow(family, plan, seed, branches)
         end do
-      end select
+      end do
     end do
   end subroutine find_equilibria
 
   !> Starts for each of so many modes: a linear one has one equilibrium; of many modes fewer starts are tried.
-  pure integer function starts_tried(structure, modes, given) result(tried)
-    type(structure_t), intent(in) :: structure
+  pure integer function starts_tried(machine, modes, given) result(tried)
+    class(hybrid_t), intent(in) :: machine
     integer, intent(in) :: modes, given
     tried = min(given, max(least_starts, most_tries/modes))
-    if (structure%frame%moving%machine%linear) tried = 1
+    if (is_linear(machine)) tried = 1
   end function starts_tried
-
-  !> A start without speeds.
-  pure function at_rest(structure, start) result(y)
-    type(structure_t), intent(in) :: structure
-    real(wp), intent(in) :: start(:)
-    real(wp) :: y(size(start))
-    y = start
-    y(structure%positions + 1:structure%positions + structure%frame%speeds) = 0
-  end function at_rest
 
   pure function along_parameter(point, way) result(direction)
     type(equilibrium_t), intent(in) :: point
@@ -110,10 +97,10 @@ contains
   end function along_parameter
 
   !> Whether a branch passes through an equilibrium: between two of its points they are corrected to that value.
-  logical function is_on(branches, family, structure, point)
+  logical function is_on(branches, family, machine, point)
     type(equilibria_t), intent(in) :: branches(:)
     type(family_t), intent(in) :: family
-    type(structure_t), intent(in) :: structure
+    class(hybrid_t), intent(in) :: machine
     type(equilibrium_t), intent(in) :: point
     type(neighbourhood_t) :: machines
     type(error_t), allocatable :: error
@@ -132,7 +119,7 @@ contains
             there = line(i + k)
             there%parameter = point%parameter
             call correct_equilibrium(family, machines, there, along_parameter(there, 1), ok)
-            if (ok) is_on = is_on .or. norm2((there%y - point%y)/structure%size_of) < same
+            if (ok) is_on = is_on .or. norm2((there%y - point%y)/machine%size_of) < same
           end do
           if (is_on) return
         end do
@@ -174,20 +161,17 @@ contains
       if (seed%parameter < plan%lowest .or. seed%parameter > plan%highest) cycle
       call machine_neighbourhood(family, seed%parameter, machines, error)
       if (allocated(error)) cycle
-      select type (structure => machines%centre)
-      type is (structure_t)
-        modes = modes_at_rest(structure)
-        do m = 1, size(modes)
-          if (modes(m) == last%mode) cycle
-          own = machines
-          seed = equilibrium_t(mode=modes(m), parameter=seed%parameter, y=last%y)
-          call correct_equilibrium(family, own, seed, along_parameter(seed, 1), ok)
-          if (ok) ok = is_isolated(structure, seed) .and. lasts(seed)
-          if (ok) ok = norm2((seed%y - last%y)/structure%size_of) < 1e3_wp*beyond
-          if (ok) ok = .not. is_on(branches, family, structure, seed)
-          if (ok) call follow(family, plan, seed, branches)
-        end do
-      end select
+      modes = modes_of_rest(machines%centre)
+      do m = 1, size(modes)
+        if (modes(m) == last%mode) cycle
+        own = machines
+        seed = equilibrium_t(mode=modes(m), parameter=seed%parameter, y=last%y)
+        call correct_equilibrium(family, own, seed, along_parameter(seed, 1), ok)
+        if (ok) ok = is_isolated(machines%centre, seed) .and. lasts(seed)
+        if (ok) ok = norm2((seed%y - last%y)/machines%centre%size_of) < 1e3_wp*beyond
+        if (ok) ok = .not. is_on(branches, family, machines%centre, seed)
+        if (ok) call follow(family, plan, seed, branches)
+      end do
     end do
   end subroutine leave_mode
 

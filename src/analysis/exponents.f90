@@ -41,6 +41,21 @@ module exponents
   character(len=*), parameter, public :: motion_names(0:4) = [character(len=14) :: 'not_known', 'periodic', 'quasi_periodic', &
     'chaotic', 'transient']
 
+  !> What holds a body that has come to rest.
+  integer, parameter, public :: rests_nowhere = 0, rests_on_equilibrium = 1, rests_by_friction = 2, rests_on_stop = 3
+
+  !> The end of a motion that comes to no further section.
+  type, public :: ending_t
+    integer :: rest = rests_nowhere
+    !> How long it was waited for a section [s], and the impacts meanwhile; whether there was a motion before the rest.
+    real(wp) :: lasted = 0
+    integer(int64) :: impacts = 0
+    logical :: moved = .true.
+    !> The state at rest; of an equilibrium the eigenvalues [1/s], largest real part first.
+    real(wp), allocatable :: point(:)
+    complex(wp), allocatable :: eigenvalues(:)
+  end type ending_t
+
   type, public :: spectrum_t
     !> Exponents [1/s], the largest first, -huge for a direction that is lost (sticking, completed chatter); standard errors by
     !> batch means.
@@ -75,6 +90,7 @@ module exponents
     !> Sections that a structure passed, and whether it was all but at rest then, or else comes to rest.
     integer :: passed = 0
     logical :: at_rest = .false.
+    type(ending_t) :: ending
   end type spectrum_t
 
 contains

@@ -10,11 +10,11 @@ module hopf_cycles
   use equilibrium, only: eigen_of, equilibrium_t
   use equilibrium_branch, only: equilibria_t
   use errors, only: error_t
+  use hybrid_machine, only: hybrid_t
   use kinds, only: wp
   use machine_family, only: machine_neighbourhood
   use orbit_motion, only: is_admissible, orbit_of_motion
   use periodic_orbit, only: closing_time, correct_orbit, orbit_t
-  use structure, only: structure_t
   use variations, only: neighbourhood_t
   implicit none
   private
@@ -26,6 +26,9 @@ module hopf_cycles
   !> A branch ends in a Hopf point that is as near in the parameter, as a share of its range, and in the logarithm of the period,
   !> with a cycle of at most this extent in natural sizes.
   real(wp), parameter :: near_parameter = 1e-3_wp, near_period = 0.02_wp, smallest_extent = 0.05_wp
+
+  !> The imaginary parts of a pair differ by rounding.
+  real(wp), parameter :: of_pair = 1e-9_wp
 
 contains
 
@@ -44,10 +47,7 @@ contains
       call machine_neighbourhood(family, point%parameter, machines, error)
       ok = .not. allocated(error)
       if (.not. ok) return
-      select type (structure => machines%centre)
-      type is (structure_t)
-        along = at_maximum(structure, point)
-      end select
+      along = at_maximum(machines%centre, point)
       start = point%y + sizes_tried(i)*along*machines%centre%size_of
       call orbit_of_motion(machines, point%parameter, start, 1, orbit, ok)
       if (.not. ok) cycle
@@ -63,20 +63,20 @@ contains
   end subroutine begin_cycle
 
   !> The state on the cycle where the watched position is largest, over its size there, in natural sizes.
-  pure function at_maximum(structure, point) result(along)
-    type(structure_t), intent(in) :: structure
+  pure function at_maximum(machine, point) result(along)
+    class(hybrid_t), intent(in) :: machine
     type(equilibrium_t), intent(in) :: point
     real(wp) :: along(size(point%y)), rows(2, size(point%y))
     complex(wp), allocatable :: values(:), vectors(:, :)
     complex(wp) :: position
     integer :: k
-    call eigen_of(structure, point, values, vectors)
+    call eigen_of(machine, point, values, vectors)
     k = minloc(abs(real(values)), 1)
-    rows = structure%watched
-    position = sum(rows(1, :)*structure%size_of*vectors(:, k))
+    rows = machine%watched
+    position = sum(rows(1, :)*machine%size_of*vectors(:, k))
     along = 0
     if (.not. abs(position) > 0) return
-    along = real(vectors(:, k)/position, wp)*structure%size_of(1)
+    along = real(vectors(:, k)/position, wp)*machine%size_of(1)
     if (.not. maxval(abs(along)) < 1e3_wp) along = 0
   end function at_maximum
 
@@ -136,7 +136,7 @@ contains
           limit%orbit%multipliers(1) = 1
           last = 1
           do k = 1, size(point%values)
-            if (abs(abs(aimag(point%values(k))) - frequency) <= 0) cycle
+            if (abs(abs(aimag(point%values(k))) - frequency) <= of_pair*frequency) cycle
             last = last + 1
             if (last < size(limit%orbit%multipliers)) limit%orbit%multipliers(last) = exp(point%values(k)*(two_pi/frequency))
           end do

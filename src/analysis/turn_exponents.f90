@@ -9,8 +9,10 @@ module turn_exponents
   use exponents, only: batches, decay_of, error_of, spectrum_t
   use hybrid_machine, only: event_t
   use kinds, only: int64, wp
+  use machine_type, only: section_state_t
   use motion_state, only: event_chatter_lower, event_chatter_upper, event_impact_lower, event_impact_upper, &
     mode_slip_minus, tally_t
+  use motion_ending, only: note_ending, note_rest
   use status, only: reason_not_smooth, reason_step_failed
   use structure_family, only: vary_section
   use variations, only: neighbourhood_t
@@ -28,6 +30,14 @@ module turn_exponents
   !> And above which it does not come to rest on a cycle.
   real(wp), parameter, public :: goes_on = 1e-3_wp
 
+  !> How fast a motion changes at its sections.
+  type :: pace_t
+    !> In natural sizes, and the largest so far; the duration of the last return and of the longest one [s].
+    real(wp) :: rate = 0, largest = 0, lasted = 0, longest = 0
+    !> Sections in a row on which it has died away.
+    integer :: quiet = 0
+  end type pace_t
+
 contains
 
   !> Exponents of the motion from `start` (see `machine_t`), after `transient` turns, over `turns` (at least 32). `series` has the
@@ -43,7 +53,7 @@ contains
     logical :: ok
     series = 0
     call machines%centre%fly_to_section(start, point, events, ok)
-    if (.not. ok) spectrum%reason = reason_step_failed
+    if (.not. ok) call note_ending(machines, start, .true., spectrum)
     if (ok) call exponents_from_point(machines, point, transient, turns, spectrum, series)
   end subroutine exponents_of_turns
 
@@ -55,39 +65,44 @@ contains
     type(spectrum_t), intent(inout) :: spectrum
     real(wp), intent(out) :: series(:)
     type(event_t), allocatable :: events(:)
-    real(wp) :: growth(size(point)), frame(size(point), size(point)), batch(batches, size(point)), duration, pace(turns), largest
+    real(wp) :: growth(size(point)), frame(size(point), size(point)), batch(batches, size(point)), duration, rates(turns)
     type(cycle_watch_t) :: watch
-    integer :: i, left, part, directions, quiet
+    type(pace_t) :: pace
+    integer :: i, left, part, directions
     series = 0
-    largest = 0
-    quiet = 0
     batch = 0
     duration = 0
     directions = size(point) - merge(0, 1, machines%centre%has_clock)
     left = directions
     call begin_frame(frame)
     do i = 1 - transient, turns
-      pace(max(1, i)) = pace_of(machines, point)
-      largest = max(largest, pace(max(1, i)))
-      quiet = merge(quiet + 1, 0, pace(max(1, i)) <= died_away*largest)
-      spectrum%at_rest = quiet >= quiet_sections .or. pace(max(1, i)) < still
+      call note_pace(machines, point, pace)
+      rates(max(1, i)) = pace%rate
+      spectrum%at_rest = pace%quiet >= quiet_sections .or. pace%rate < still
       spectrum%passed = transient + i
-      if (quiet >= quiet_sections) return
+      if (pace%quiet >= quiet_sections) call note_rest(machines, point, mode_slip_minus, spectrum)
+      if (pace%quiet >= quiet_sections) return
       call advance_frame(machines, point, frame, growth, events, left, spectrum%reason)
-      if (spectrum%reason == reason_not_smooth .and. i < 1) then
+      if (spectrum%reason /= 0 .and. i < 1) then
         ! What a transient meets does not matter: the directions begin anew.
         call begin_frame(frame)
         call pass_turn(machines, point, spectrum%reason)
+      else if (spectrum%reason == 0) then
+        call note_return(duration_of(machines, events), pace)
+      end if
+      if (spectrum%reason == reason_step_failed) then
+        call note_ending(machines, point, .false., spectrum)
+        return
       end if
       if (spectrum%reason /= 0) return
       ! Nor what it loses.
       if (i < 1) then
         left = directions
         ! Without a clock it may be coming to rest.
-        if (.not. pace(1) > goes_on) cycle
+        if (.not. pace%rate > goes_on) cycle
         call watch%look(machines, point(1), point)
         if (watch%sections == 0) cycle
-        call pass_cycle(machines, watch, directions, point, spectrum, series)
+        call pass_cycle(machines, watch, directions, pace%lasted, point, spectrum, series)
         if (spectrum%known .or. spectrum%reason /= 0) return
         cycle
       end if
@@ -98,14 +113,29 @@ contains
       if (i <= size(series)) series(i) = point(1)
       if (i == size(series)) spectrum%point = point
     end do
-    spectrum%known = .true.
-    spectrum%periods = turns
-    spectrum%passed = transient + turns
-    spectrum%mean_period = duration/turns
-    call conclude(batch(:, :directions)*batches/duration, left, spectrum)
+    call conclude(batch(:, :directions)*batches/duration, left, turns, duration, spectrum)
     spectrum%at_rest = .not. (machines%centre%has_clock .or. machines%centre%crank_section)
-    if (spectrum%at_rest) spectrum%at_rest = fades_away(pace, -spectrum%exponents(1)*duration/2)
+    if (spectrum%at_rest) spectrum%at_rest = fades_away(rates, -spectrum%exponents(1)*duration/2)
   end subroutine exponents_from_point
+
+  !> Notes the pace at a point of the section. That of impacts that die out is the acceleration, which stays: they come ever
+  !> faster, by as much as they are weaker.
+  pure subroutine note_pace(machines, point, pace)
+    type(neighbourhood_t), intent(in) :: machines
+    real(wp), intent(in) :: point(:)
+    type(pace_t), intent(inout) :: pace
+    pace%rate = pace_of(machines, point)
+    if (pace%longest > 0) pace%rate = pace%rate*(pace%lasted/pace%longest)
+    pace%largest = max(pace%largest, pace%rate)
+    pace%quiet = merge(pace%quiet + 1, 0, pace%rate <= died_away*pace%largest)
+  end subroutine note_pace
+
+  pure subroutine note_return(lasted, pace)
+    real(wp), intent(in) :: lasted
+    type(pace_t), intent(inout) :: pace
+    pace%lasted = lasted
+    pace%longest = max(pace%longest, lasted)
+  end subroutine note_return
 
   !> Rate of change at a point of a section by an event, in natural sizes; endless where the section keeps the motion on.
   pure real(wp) function pace_of(machines, point) result(pace)
@@ -119,11 +149,13 @@ contains
   end function pace_of
 
   !> Goes once round the cycle on which a motion is; its exponents are those of its multipliers. Nothing is known where these do not
-  !> distinguish the directions that are left from those that are lost; the watch goes on then.
-  subroutine pass_cycle(machines, watch, directions, point, spectrum, series)
+  !> distinguish the directions that are left from those that are lost; the watch goes on then. `lasted` [s]: the last return of
+  !> the motion, more than all those of the rest that it may come to.
+  subroutine pass_cycle(machines, watch, directions, lasted, point, spectrum, series)
     type(neighbourhood_t), intent(in) :: machines
     type(cycle_watch_t), intent(inout) :: watch
     integer, intent(in) :: directions
+    real(wp), intent(in) :: lasted
     real(wp), intent(inout) :: point(:)
     type(spectrum_t), intent(inout) :: spectrum
     real(wp), intent(inout) :: series(:)
@@ -145,7 +177,8 @@ contains
       positions(i) = point(1)
     end do
     allocate (spectrum%exponents(directions), spectrum%errors(directions))
-    call note_cycle_exponents(watch, duration, left, spectrum, ok)
+    ok = duration > lasted/2
+    if (ok) call note_cycle_exponents(watch, duration, left, spectrum, ok)
     if (.not. ok) then
       deallocate (spectrum%exponents, spectrum%errors)
       watch%sections = 0
@@ -185,13 +218,19 @@ contains
     real(wp), intent(inout) :: point(:)
     integer, intent(out) :: reason
     type(event_t), allocatable :: events(:)
+    type(section_state_t) :: section
     type(tally_t) :: tally
     real(wp) :: image(size(point))
     integer :: mode
     logical :: ok
     call machines%centre%fly_sections(point, 1, .false., image, events, mode, tally, ok)
+    if (.not. ok) then
+      ! The instant of an event may not be certain, while the motion is.
+      call machines%centre%begin(point, section, ok)
+      if (ok) call machines%centre%go_on(section, image, ok)
+    end if
     reason = merge(0, reason_step_failed, ok)
-    point = image
+    if (ok) point = image
   end subroutine pass_turn
 
   !> One section, with orthonormal directions (columns of `frame`, in natural sizes), which grow by `growth`. `left`: directions
@@ -248,12 +287,15 @@ contains
     mean_log = sum(log_of(max(tiny(values), values)))/size(values)
   end function mean_log
 
-  !> Means and standard errors of the batches (one column per exponent); directions beyond those `left` are lost.
-  pure subroutine conclude(batch, left, spectrum)
-    real(wp), intent(in) :: batch(:, :)
-    integer, intent(in) :: left
+  !> Means and standard errors of the batches (one column per exponent) of so many turns; directions beyond those `left` are lost.
+  pure subroutine conclude(batch, left, turns, duration, spectrum)
+    real(wp), intent(in) :: batch(:, :), duration
+    integer, intent(in) :: left, turns
     type(spectrum_t), intent(inout) :: spectrum
     integer :: k, n
+    spectrum%known = .true.
+    spectrum%periods = turns
+    spectrum%mean_period = duration/turns
     n = size(batch, 2)
     allocate (spectrum%exponents(n), spectrum%errors(n))
     do k = 1, n

@@ -8,7 +8,7 @@ module derived_quantities
   use expression_names, only: has_name
   use expression_text, only: read_expression
   use kinds, only: wp
-  use law_table, only: law_choice_t, parameter_row_t, path_of, rows_of
+  use law_table, only: is_hidden, law_choice_t, parameter_row_t, path_of, rows_of
   use machine_columns, only: machine_column_t
   use machine_type, only: machine_t
   use motion_state, only: log_t, open_log
@@ -103,7 +103,7 @@ contains
     do i = 1, size(laws)
       rows = rows_of(laws(i))
       do k = 1, size(rows)
-        if (rows(k)%list .or. size(laws(i)%parameters(k)%values) /= 1) cycle
+        if (rows(k)%list .or. size(laws(i)%parameters(k)%values) /= 1 .or. is_hidden(rows(k))) cycle
         call constant(tape, laws(i)%parameters(k)%values(1), node)
         names = [character(len=longest_path) :: names, path_of(laws(i))//'.'//trim(rows(k)%name)]
         nodes = [nodes, node]

@@ -11,6 +11,7 @@ module case_source
   use structure_data, only: structure_file_reader
   use suggest, only: nearest_word
   use text, only: join, replace_all, starts_with, to_text
+  use written_names, only: as_written, of_parts_only, read_as_t
   use toml_bindings, only: read_toml, toml_array, toml_boolean, toml_entry_t, toml_float, toml_integer, toml_string, toml_table
   implicit none
   private
@@ -36,6 +37,8 @@ module case_source
     !> Paths of the keys that may occur.
     character(len=path_length), allocatable :: known(:)
     type(problem_t), allocatable :: problems(:)
+    !> Tables that are read under other names.
+    type(read_as_t), allocatable :: tables(:)
     !> What its readers decided that it does not state, separated by semicolons.
     character(len=:), allocatable :: assumed
     !> Reads HDF5 files of structures, where the program can.
@@ -53,7 +56,7 @@ contains
     integer :: i
     source%name = name
     source%assumed = ''
-    allocate (source%known(0), source%problems(0))
+    allocate (source%known(0), source%problems(0), source%tables(0))
     call read_toml(text, name, entries, error)
     if (allocated(error)) return
     allocate (source%entries(size(entries)))
@@ -190,7 +193,7 @@ contains
     call location_of_key(source, path, location, line)
     above = path
     if (present(shown)) above = shown
-    new = problem_t(line, path, location//': key '''//above//''': '//problem)
+    new = problem_t(line, path, location//': '//as_written(source%tables, 'key '''//above//''': '//problem))
     if (present(missing)) new%missing = missing
     if (present(file_missing)) new%file_missing = file_missing
     call insert(source, new)
@@ -361,6 +364,7 @@ contains
       name = source%known(i)(len(above) + 1:)
       name = name(1:scan(trim(name)//'.', '.[') - 1)
       if (len_trim(name) == 0) cycle
+      if (any(source%tables%read == above(:max(0, len(above) - 1))) .and. any(of_parts_only == name)) cycle
       if (all(names /= name)) call append(names, trim(name))
     end do
   end function names_below

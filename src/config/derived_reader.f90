@@ -3,7 +3,7 @@
 
 !> The tables [derived.NAME]: quantities derived from the motions of the machine.
 module derived_reader
-  use case_source, only: case_source_t, enter_table, know, report
+  use case_source, only: case_source_t, enter_table, find, know, report
   use case_type, only: case_t
   use case_values, only: take_choice, take_text
   use build_motion, only: machine_of
@@ -14,7 +14,8 @@ module derived_reader
   use machine_type, only: machine_t
   use motion_state, only: options_t
   use part_names, only: names_of
-  use text, only: join, to_text
+  use text, only: join, parse_integer, starts_with, to_text
+  use written_names, only: as_read, column_as_written
   implicit none
   private
 
@@ -63,6 +64,7 @@ contains
     else
       one%unit = ''
       call take_text(source, path//'.expression', one%expression, required=.true.)
+      one%expression = as_read(source%tables, one%expression)
       call take_text(source, path//'.unit', one%unit, required=.true.)
       call check_unit(source, path//'.unit', one%unit)
     end if
@@ -102,8 +104,25 @@ contains
     do i = 1, size(the_case%derived)
       if (is_power(the_case%derived(i)) .or. len_trim(the_case%derived(i)%expression) == 0) cycle
       call compile(machine, the_case%laws, the_case%derived(i:i), compiled, faulty, error)
-      if (allocated(error)) call report(source, 'derived.'//trim(the_case%derived(i)%name)//'.expression', error%message)
+      if (allocated(error)) call report_expression(source, 'derived.'//trim(the_case%derived(i)%name)//'.expression', error%message)
     end do
   end subroutine check_derived
+
+  !> Reports what is wrong with an expression, at its column in the file.
+  subroutine report_expression(source, path, message)
+    type(case_source_t), intent(inout) :: source
+    character(len=*), intent(in) :: path, message
+    character(len=*), parameter :: begin = 'column '
+    integer :: column, mark, status
+    mark = index(message, ':')
+    status = 1
+    if (starts_with(message, begin) .and. mark > 0) call parse_integer(message(len(begin) + 1:mark - 1), column, status)
+    if (status /= 0) then
+      call report(source, path, message)
+    else
+      column = column_as_written(source%tables, source%entries(find(source, path))%entry%string, column)
+      call report(source, path, begin//to_text(column)//message(mark:))
+    end if
+  end subroutine report_expression
 
 end module derived_reader

@@ -4,8 +4,9 @@
 !> One body with elements of spring and slider, in the short form of a case: its tables become those of parts, [body.body],
 !> [spring.restoring], [friction.friction] and [drive.drive]. Only parts have the sticking of such elements.
 module slip_reader
-  use case_overrides, only: source_entry_t
-  use case_source, only: case_source_t, find
+  use case_overrides, only: is_or_is_below, source_entry_t
+  use case_source, only: case_source_t, find, report
+  use written_names, only: of_parts_only, read_as_t
   use part_names, only: is_table
   use part_reader, only: has_parts
   use text, only: starts_with
@@ -35,6 +36,7 @@ contains
     drive = text_of(source, 'drive.law')
     turns = text_of(source, 'restoring.law') == 'pendulum'
     has_foot = drive == 'harmonic' .or. drive == 'fourier'
+    call check_keys(source)
     call remove(source, 'body.law')
     if (text_of(source, 'restoring.law') == 'none') call remove(source, 'restoring')
     if (drive == 'none') call remove(source, 'drive')
@@ -46,6 +48,8 @@ contains
       if (has_foot .and. path == 'drive.law') source%entries(i)%entry%string = 'motion'
       source%entries(i)%entry%path = new_path(path, turns)
     end do
+    source%tables = [(read_as_t(tables(i), parts(i)), i=1, size(tables))]
+    if (turns) source%tables = [read_as_t('body.mass', 'body.body.inertia'), source%tables]
     call add_ends(source, 'friction.friction', has_foot=.false.)
     if (is_table(source, 'spring.restoring')) call add_ends(source, 'spring.restoring', has_foot)
     if (drive == 'force') call add_text(source, 'drive.drive.body', 'body')
@@ -84,6 +88,31 @@ contains
 
   end function is_admitted
 
+  !> Reports keys that only parts have, which are none of the short form, and those that it needs and parts do not.
+  subroutine check_keys(source)
+    type(case_source_t), intent(inout) :: source
+    character(len=:), allocatable :: path
+    integer :: i, k
+    do i = 1, size(tables)
+      do k = 1, size(of_parts_only)
+        path = trim(tables(i))//'.'//trim(of_parts_only(k))
+        if (find(source, path) == 0) cycle
+        call report(source, path, 'unknown; allowed beside [body.NAME]')
+        call remove(source, path)
+      end do
+    end do
+    if (text_of(source, 'restoring.law') == 'linear') call need('restoring.stiffness')
+    if (any(text_of(source, 'drive.law') == [character(len=8) :: 'force', 'harmonic'])) call need('drive.amplitude')
+
+  contains
+
+    subroutine need(key)
+      character(len=*), intent(in) :: key
+      if (find(source, key) == 0) call report(source, key, 'missing', missing=.true.)
+    end subroutine need
+
+  end subroutine check_keys
+
   !> A path of the short form as that of a part.
   pure function new_path(path, turns) result(new)
     character(len=*), intent(in) :: path
@@ -119,7 +148,7 @@ contains
     logical :: stays(size(source%entries))
     integer :: i, k
     do i = 1, size(stays)
-      stays(i) = source%entries(i)%entry%path /= path .and. .not. starts_with(source%entries(i)%entry%path, path//'.')
+      stays(i) = .not. is_or_is_below(source%entries(i)%entry%path, path)
     end do
     allocate (kept(count(stays)))
     k = 0
@@ -168,15 +197,19 @@ contains
     call append(source, new)
   end subroutine add_number
 
+  !> Appends an entry, which comes from where its part does.
   pure subroutine append(source, new)
     type(case_source_t), intent(inout) :: source
     type(source_entry_t), intent(in) :: new
     type(source_entry_t), allocatable :: longer(:)
-    integer :: n
+    integer :: n, at
     n = size(source%entries)
     allocate (longer(n + 1))
     longer(:n) = source%entries
     longer(n + 1) = new
+    at = find(source, new%entry%path(:index(new%entry%path, '.', back=.true.) - 1))
+    if (at > 0) longer(n + 1)%entry%line = source%entries(at)%entry%line
+    if (at > 0) longer(n + 1)%override = source%entries(at)%override
     call move_alloc(longer, source%entries)
   end subroutine append
 

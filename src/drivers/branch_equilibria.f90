@@ -6,13 +6,16 @@ module branch_equilibria
   use branch_point, only: label_closed, label_names, last_label, no_label
   use search_state, only: search_t
   use equilibrium, only: count_unstable, equilibrium_t
+  use eigenvalue_text, only: values_json, values_text
   use errors, only: error_t
   use multibody, only: is_stop
   use journal, only: json_number, json_text
   use kinds, only: int64, wp
   use machine_family, only: machine_of_family
   use map_schema, only: name_length, schema_t, type_float64, type_int16, type_int32, type_int8
+  use hybrid_body, only: rests_on_barrier
   use hybrid_machine, only: hybrid_t
+  use own_body, only: own_body_t
   use session, only: session_t
   use structure, only: structure_t
   use structure_modes, only: phases_in
@@ -54,9 +57,9 @@ contains
             shown = to_text(point%parameter, 13)
             if (unit /= '1') shown = shown//' '//unit
             call session%journal%line('equilibrium', '  '//name_of(point%label)//' at '//search%family%path//' = '//shown// &
-              ', x = '//to_text(at(1), 9)//', eigenvalues '//values_text(point), '"branch": '//to_text(b)//', "label": '// &
+              ', x = '//to_text(at(1), 9)//', eigenvalues '//values_text(point%values), '"branch": '//to_text(b)//', "label": '// &
               json_text(trim(label_names(point%label)))//', "parameter": '//json_number(point%parameter)//', "x": '// &
-              json_number(at(1))//', "eigenvalues": '//values_json(point))
+              json_number(at(1))//', "eigenvalues": '//values_json(point%values))
           end associate
         end do
       end associate
@@ -69,34 +72,6 @@ contains
     text = replace_all(trim(label_names(label)), '_', ' ')
   end function name_of
 
-  pure function values_text(point) result(text)
-    type(equilibrium_t), intent(in) :: point
-    character(len=:), allocatable :: text
-    integer :: k
-    text = ''
-    do k = 1, size(point%values)
-      associate (value => point%values(k))
-        if (k > 1) text = text//', '
-        text = text//to_text(real(value), 6)
-        if (abs(aimag(value)) > 0) text = text//merge('+', '-', aimag(value) > 0)//to_text(abs(aimag(value)), 9)//'i'
-      end associate
-    end do
-    text = text//' 1/s'
-    if (size(point%values) == 0) text = 'none: everything is held'
-  end function values_text
-
-  pure function values_json(point) result(text)
-    type(equilibrium_t), intent(in) :: point
-    character(len=:), allocatable :: text
-    integer :: k
-    text = '['
-    do k = 1, size(point%values)
-      if (k > 1) text = text//', '
-      text = text//json_number(real(point%values(k)))//', '//json_number(aimag(point%values(k)))
-    end do
-    text = text//']'
-  end function values_json
-
   !> Stops that are pressed.
   integer function count_pressed(search, point) result(pressed)
     type(search_t), intent(in) :: search
@@ -107,6 +82,8 @@ contains
     call machine_of_family(search%family, point%parameter, machine, error)
     if (allocated(error)) return
     select type (machine)
+    type is (own_body_t)
+      pressed = merge(1, 0, rests_on_barrier(point%mode))
     type is (structure_t)
       associate (joints => machine%frame%moving%machine%joints)
         pressed = count(is_stop(joints%kind) .and. phase_of(phases_in(machine%frame%moving%machine, point%mode), size(joints)) /= 0)

@@ -140,7 +140,8 @@ contains
     character(len=:), allocatable :: text
     text = ''
     if (sum(search%found%lost) > 0) text = '; the motions of '//to_text(sum(search%found%lost))//' of '// &
-                                           to_text(sum(search%found%starts))//' starts were given up or left the domain'
+                                           to_text(sum(search%found%starts))//' starts were given up, left the domain or '// &
+                                           'came to rest'
   end function lost_text
 
   !> Every labelled point, and what was found from how many seeds.

@@ -9,6 +9,7 @@ module stability_driver
   use case_setup, only: options_of
   use case_type, only: case_t
   use command_line, only: command_t
+  use ending_text, only: why_json, why_not_known
   use endings, only: assess_motion
   use errors, only: error_t
   use exponents, only: most_points, motion_names, spectrum_t, type_of_motion, zero_one_test
@@ -18,7 +19,7 @@ module stability_driver
   use machine_family, only: machine_neighbourhood
   use more_periods, only: periods_needed
   use session, only: open_session, session_t
-  use stability_of_map, only: needed_text, run_stability_of_map, seen_text, why_not_known
+  use stability_of_map, only: needed_text, run_stability_of_map, seen_text
   use status, only: exit_done, reason_name
   use structure_exponents, only: exponents_of_machine
   use text, only: replace_all, to_text
@@ -79,7 +80,8 @@ contains
         k = zero_one_test(section)
         call report(session, spectrum, machines%centre%has_clock, k)
       else
-        call session%journal%line('not_known', 'not known: '//why_not_known(spectrum))
+        call session%journal%line('not_known', 'not known: '//why_not_known(spectrum, session%the_case%laws), &
+                                  '"known": false'//why_json(spectrum))
       end if
       call assess_motion(spectrum%reason, reason_name(spectrum%reason), command%partial, error)
     end if

@@ -6,6 +6,7 @@ module stability_of_map
   use body_family, only: family_t
   use case_type, only: case_t
   use command_line, only: command_t
+  use ending_text, only: why_json, why_not_known
   use endings, only: assess_given_up
   use errors, only: error_t, fail
   use exponents, only: most_points, motion_chaotic, motion_contracting, motion_neutral, motion_not_known, &
@@ -17,7 +18,7 @@ module stability_of_map
   use machine_family, only: machine_neighbourhood
   use map_entries, only: entry_t, read_entries
   use more_periods, only: periods_needed, test_is_open
-  use status, only: exit_usage, is_given_up, reason_left_domain, reason_name
+  use status, only: exit_usage, is_given_up
   use structure_exponents, only: exponents_of_machine
   use team, only: team_t
   use text, only: replace_all, to_text
@@ -25,7 +26,7 @@ module stability_of_map
   implicit none
   private
 
-  public :: needed_text, run_stability_of_map, seen_text, why_not_known
+  public :: needed_text, run_stability_of_map, seen_text
 
   !> Points on the section are the same within this share of their range.
   real(wp), parameter :: same = 1e-7_wp
@@ -136,7 +137,8 @@ contains
       data = data//', "period": '//to_text(found%period)
     end if
     if (.not. found%spectrum%known) then
-      words = words//': '//why_not_known(found%spectrum)
+      words = words//': '//why_not_known(found%spectrum, the_case%laws)
+      data = data//why_json(found%spectrum)
     else
       call add_numbers(found, words, data)
       if (found%type == not_known) then
@@ -170,22 +172,6 @@ contains
     if (test_is_open(spectrum, k) .and. spectrum%periods < most_points) text = '; the 0-1 test decides here, and takes up '// &
       'to '//to_text(most_points)//' periods into account (--periods '//to_text(most_points)//')'
   end function needed_text
-
-  !> Why nothing is known of the exponents of a motion.
-  pure function why_not_known(spectrum) result(why)
-    type(spectrum_t), intent(in) :: spectrum
-    character(len=:), allocatable :: why
-    if (spectrum%at_rest) then
-      why = 'the motion comes to rest: after '//to_text(spectrum%passed)//' sections nothing is left that '// &
-            'turns round; the eigenvalues of an equilibrium are those that `separatrix branches` gives'
-    else if (is_given_up(spectrum%reason)) then
-      why = 'the motion was given up: '//reason_name(spectrum%reason)
-    else if (spectrum%reason == reason_left_domain) then
-      why = 'the motion leaves the domain (run.domain)'
-    else
-      why = 'the motion met an event tangentially, or rests where nothing holds it'
-    end if
-  end function why_not_known
 
   !> Exponents with standard errors, their sum, the 0-1 test and what they are from.
   subroutine add_numbers(found, words, data)

@@ -33,6 +33,7 @@ module hybrid_body
     procedure :: fly_sections => fly_body_over_sections
     procedure :: map => map_of_body
     procedure :: at_rest
+    procedure :: rests_freely
     procedure :: section_event => event_of_section
     procedure(start_interface), deferred :: start
     procedure(state_interface), deferred :: state_at
@@ -86,13 +87,13 @@ module hybrid_body
       real(wp), intent(inout) :: after(:), by_state(:, :), by_time(:)
     end subroutine impact_interface
 
-    !> Takes a state on to the next section. `ok` is false if the trajectory had to be given up.
-    pure subroutine advance_interface(self, section, tally, ok, log)
+    !> Takes a state on to the next section. `reason` (module `status`) is not 0 if it did not come there.
+    pure subroutine advance_interface(self, section, tally, reason, log)
       import :: log_t, section_state_t, tally_t, hybrid_body_t
       class(hybrid_body_t), intent(in) :: self
       type(section_state_t), intent(inout) :: section
       type(tally_t), intent(inout) :: tally
-      logical, intent(out) :: ok
+      integer, intent(out) :: reason
       type(log_t), intent(inout), optional :: log
     end subroutine advance_interface
 
@@ -116,6 +117,16 @@ contains
     integer, intent(in) :: mode
     body_rests = self%n > 0 .and. .not. slips(mode)
   end function body_rests
+
+  !> Whether an event at a position is that of a body that nothing holds, which rests as long as the forces on it are zero: its
+  !> flight goes on through the rest.
+  pure logical function rests_freely(self, kind, x)
+    class(hybrid_body_t), intent(in) :: self
+    integer, intent(in) :: kind
+    real(wp), intent(in) :: x
+    rests_freely = kind == event_release .or. (kind == event_stick .and. x < self%upper .and. x > self%lower)
+    rests_freely = rests_freely .and. .not. self%rests(mode_stick)
+  end function rests_freely
 
   pure logical function rests_on_barrier(mode)
     integer, intent(in) :: mode
@@ -211,7 +222,9 @@ contains
     real(wp), intent(out) :: point(:)
     logical, intent(out) :: ok
     type(tally_t) :: tally
-    call self%advance(section, tally, ok)
+    integer :: reason
+    call self%advance(section, tally, reason)
+    ok = reason == 0
     point = self%point_of(section)
   end subroutine go_on_with_body
 
@@ -258,7 +271,7 @@ contains
     logical, intent(out) :: ok
     type(log_t) :: log
     type(event_t) :: last
-    integer :: i
+    integer :: i, reason
     logical :: certain
     allocate (events(0))
     certain = .true.
@@ -271,7 +284,8 @@ contains
     log%balance%kept = .false.
     do i = 1, sections
       log%events = 0
-      call self%advance(section, tally, ok, log)
+      call self%advance(section, tally, reason, log)
+      ok = reason == 0
       if (.not. ok) return
       call add_events(self, log, i - 1, image, last, events, certain)
       image = self%point_of(section)
@@ -298,6 +312,7 @@ contains
     integer :: i
     do i = 1, log%events
       if (self%smooth_turns .and. log%event_kind(i) == event_turning_point) cycle
+      if (self%rests_freely(log%event_kind(i), log%event_data(2, i))) cycle
       event = event_t(kind=log%event_kind(i), before=last%after, time=log%event_data(1, i))
       call self%set_arrival(log, i, sections, start, last, event)
       call set_mode(self, event, certain)

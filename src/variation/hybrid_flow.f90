@@ -34,7 +34,7 @@ module hybrid_flow
   !> Changes of rates at a switch that are rounding, as a share of the rates.
   real(wp), parameter :: rounding = 1e-13_wp
 
-  public :: add_slope_nodes, fly, new_flow, rates_in, values_in
+  public :: add_slope_nodes, fly, new_flow, rates_in, slopes_in, values_in
 
   !> A system z' = f(z), with the derivatives of its variables from `first` on by these at the start, one column after the other.
   type, public :: hybrid_flow_t
@@ -116,6 +116,22 @@ contains
     where (fault > 0) value = ieee_value(1.0_wp, ieee_quiet_nan)
     rates = value(flow%rates(:flow%n))
   end function rates_in
+
+  !> Derivatives of the rates of the varied variables by these.
+  pure function slopes_in(flow, z, parameters) result(slopes)
+    type(hybrid_flow_t), intent(in) :: flow
+    real(wp), intent(in) :: z(:), parameters(:)
+    real(wp) :: slopes(flow%varied, flow%varied), all(size(flow%states)), value(flow%tape%count)
+    integer :: fault(flow%tape%count), i
+    all = 0
+    all(:flow%n) = z
+    do i = 1, flow%varied
+      all(flow%n + flow%varied*(i - 1) + i) = 1
+    end do
+    call evaluate(flow%tape, all, with_piece(flow, z, parameters), value, fault, branches_at(flow, z, parameters, 1))
+    where (fault > 0) value = ieee_value(1.0_wp, ieee_quiet_nan)
+    slopes = reshape(value(flow%rates(flow%n + 1:)), shape(slopes))
+  end function slopes_in
 
   !> The parameters in the piece of the motor in which the variables are.
   pure function with_piece(flow, z, parameters) result(now)

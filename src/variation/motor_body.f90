@@ -18,6 +18,7 @@ module motor_body
   use motor_now, only: parameters_now
   use motor_rest, only: slips
   use motor_state, only: motor_state_t
+  use status, only: reason_time_over
   use hybrid_body, only: event_of_section, guard_of_body, hybrid_body_t, jump_of_body, no_jump, rests_on_barrier
   implicit none
   private
@@ -239,23 +240,21 @@ contains
     end associate
   end subroutine take_velocity
 
-  pure subroutine advance_turn(self, section, tally, ok, log)
+  pure subroutine advance_turn(self, section, tally, reason, log)
     class(motor_body_t), intent(in) :: self
     type(section_state_t), intent(inout) :: section
     type(tally_t), intent(inout) :: tally
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    integer :: reason
     logical :: passed
     if (.not. present(log)) then
       call self%machine%advance_to_section(section, tally, reason)
-      ok = reason == 0
       return
     end if
     passed = .true.
     associate (state => section%state, crank => section%motor)
       call advance_motor(self%machine%motor, state, crank, state%time + longest*self%period, passed, tally, reason, log)
-      ok = reason == 0 .and. passed .and. crank%turning == crank%passed_last
+      if (reason == 0 .and. .not. (passed .and. crank%turning == crank%passed_last)) reason = reason_time_over
     end associate
   end subroutine advance_turn
 

@@ -9,13 +9,14 @@ module own_body
   use constants, only: two_pi
   use kinds, only: wp
   use machine_type, only: section_state_t
-  use motion_state, only: log_t, mode_slip_minus, tally_t
+  use motion_state, only: log_t, mode_slip_minus, mode_stick, tally_t
   use motor_motion, only: advance_motor
   use motor_rest, only: slips
   use motor_system, only: body_held, both_move, guard_body_down, guard_body_up, phi_at, v_at, w_at, x_at
-  use hybrid_flow, only: add_slope_nodes, fly, hybrid_flow_t, new_flow, rates_in, values_in
+  use hybrid_flow, only: add_slope_nodes, fly, hybrid_flow_t, new_flow, rates_in, slopes_in, values_in
   use own_machine, only: own_machine_t
   use hybrid_body, only: event_of_section, guard_of_body, hybrid_body_t, jump_of_body, no_jump, rests_on_barrier
+  use status, only: reason_time_over
   use turn_section, only: longest_return
   implicit none
   private
@@ -23,8 +24,8 @@ module own_body
   public :: set_own_body, why_not_varied
 
   integer, parameter, public :: x_of = 1, v_of = 2
-  !> A speed at an event that is none, in sizes.
-  real(wp), parameter :: no_speed = 1e-9_wp
+  !> A speed at an event that is none, in sizes, and one that has a direction alone: damping makes no force of it.
+  real(wp), parameter :: no_speed = 1e-9_wp, direction_alone = 1e-30_wp
   !> A point this near to the section by an event, in sizes, is on it: it would be met again at once.
   real(wp), parameter :: near_section = 1e-9_wp
 
@@ -37,6 +38,8 @@ module own_body
     integer, allocatable :: release_slopes(:, :), restitution_slopes(:)
     real(wp), allocatable :: sizes(:)
   contains
+    procedure :: rests => own_rests
+    procedure :: rates_at
     procedure :: fly => fly_body
     procedure :: slope => slope_of_body
     procedure :: guard => guard_of_own
@@ -131,6 +134,28 @@ contains
     slip_in = merge(-1, 1, mode == mode_slip_minus)
   end function slip_in
 
+  !> Whether something holds the body: without friction it rests where the forces are zero, as it would in a flight.
+  pure logical function own_rests(self, mode)
+    class(own_body_t), intent(in) :: self
+    integer, intent(in) :: mode
+    own_rests = .not. slips(mode) .and. .not. (self%smooth_turns .and. mode == mode_stick)
+  end function own_rests
+
+  !> Rates of a body without a clock in a mode, and their derivatives.
+  pure subroutine rates_at(self, mode, y, rates, slopes)
+    class(own_body_t), intent(in) :: self
+    integer, intent(in) :: mode
+    real(wp), intent(in) :: y(:)
+    real(wp), intent(out) :: rates(:), slopes(:, :)
+    real(wp) :: z(self%n + w_at), all(self%n + w_at)
+    z = variables_at(self, 0.0_wp, y)
+    associate (flow => self%flows(merge(2, 1, self%rests(mode))), parameters => parameters_in(self, slip_in(mode)))
+      all = rates_in(flow, z, parameters)
+      rates = all(x_at:)
+      slopes = slopes_in(flow, z, parameters)
+    end associate
+  end subroutine rates_at
+
   pure subroutine fly_body(self, mode, t0, y0, t1, y1, flight)
     class(own_body_t), intent(in) :: self
     integer, intent(in) :: mode
@@ -140,8 +165,9 @@ contains
     real(wp) :: z(self%n + w_at), slopes(self%n, self%n), parameters(size(self%machine%motor%system%sheet%parameters))
     real(wp) :: t, until
     integer :: k, turn, last
-    k = merge(1, 2, slips(mode))
-    y1 = self%at_rest(mode, y0)
+    k = merge(2, 1, self%rests(mode))
+    y1 = y0
+    if (k == 2) y1 = self%at_rest(mode, y0)
     if (present(flight)) then
       flight = 0
       do turn = 1, self%n
@@ -186,10 +212,10 @@ contains
     real(wp) :: z(self%n + w_at), rates(self%n + w_at)
     z = variables_at(self, t, y)
     ! Where it comes to rest, the branches are those of the side from which it comes.
-    if (slips(mode) .and. abs(z(v_at)) < no_speed*self%size_of(v_of)) z(v_at) = slip_in(mode)*no_speed*self%size_of(v_of)
-    rates = rates_in(self%flows(merge(1, 2, slips(mode))), z, parameters_in(self, slip_in(mode)))
+    if (slips(mode) .and. abs(z(v_at)) < no_speed*self%size_of(v_of)) z(v_at) = slip_in(mode)*direction_alone*self%size_of(v_of)
+    rates = rates_in(self%flows(merge(2, 1, self%rests(mode))), z, parameters_in(self, slip_in(mode)))
     slope = rates(x_at:)
-    if (slips(mode)) slope(x_of) = y(v_of)
+    if (.not. self%rests(mode)) slope(x_of) = y(v_of)
   end function slope_of_body
 
   pure subroutine margin_of_own(self, side, t, y, margin, by_state, by_time)
@@ -267,23 +293,27 @@ contains
     point = [section%state%x, section%state%v, section%motor%own(:self%n - v_of)]
   end function point_of_own
 
-  pure subroutine advance_own(self, section, tally, ok, log)
+  pure subroutine advance_own(self, section, tally, reason, log)
     class(own_body_t), intent(in) :: self
     type(section_state_t), intent(inout) :: section
     type(tally_t), intent(inout) :: tally
-    logical, intent(out) :: ok
+    integer, intent(out) :: reason
     type(log_t), intent(inout), optional :: log
-    integer :: reason
+    real(wp) :: start
+    integer :: i
     logical :: passed
     if (self%has_clock) then
       call self%machine%advance_to_section(section, tally, reason, log)
-      ok = reason == 0
       return
     end if
-    passed = .true.
-    call advance_motor(self%machine%motor, section%state, section%motor, section%state%time + longest_return*self%period, passed, &
-                       tally, reason, log)
-    ok = reason == 0 .and. passed
+    start = section%state%time
+    ! A flight knows its events to the rounding of all of it: one of 256 periods would end no sequence of small bounces.
+    do i = 1, longest_return
+      passed = .true.
+      call advance_motor(self%machine%motor, section%state, section%motor, start + i*self%period, passed, tally, reason, log)
+      if (reason /= 0 .or. passed) return
+    end do
+    reason = reason_time_over
   end subroutine advance_own
 
   !> The section of a machine without a clock: the velocity is zero, or the angle, upwards or downwards, half a turn.
