@@ -265,6 +265,7 @@ contains
       ! A neighbour that goes another way shares no error: whole exponents are powers by products, and a table of contact forces
       ! has its own steps. Of the table the values between are so little that only a long step shows them.
       if (index(one%path, 'exponent') > 0) natural_step = max(share, sqrt(plan%options%tolerance))
+      if (index(one%path, 'hardening') > 0) natural_step = max(share, sqrt(plan%options%tolerance))
       if (index(one%path, 'contact_curve') > 0) natural_step = max(share, sqrt(sqrt(plan%options%tolerance)))
       natural_step = natural_step*max(abs(value), smallest_share*natural_size(trim(one%unit), plan%scales))
     end function natural_step

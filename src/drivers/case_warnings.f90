@@ -7,7 +7,7 @@ module case_warnings
   use case_parameters, only: parameter_value
   use case_setup, only: grid_of
   use case_type, only: case_t
-  use contact_law, only: contact_at_speed, contact_kelvin_voigt, contact_t
+  use contact_law, only: contact_at_speed, contact_hardened, contact_kelvin_voigt, contact_t
   use drive_law, only: ends_with_its_first
   use eigen, only: undamped_modes
   use errors, only: error_t
@@ -205,7 +205,7 @@ contains
     law = contact_at_speed(contact, 1.0_wp)
     depth = power(force/law%stiffness, 1/law%exponent)
     damping = law%damping
-    if (law%kind /= contact_kelvin_voigt) damping = law%damping*force
+    if (.not. any(law%kind == [contact_kelvin_voigt, contact_hardened])) damping = law%damping*force
     rate = damping/(6*mass)
     if (depth > 0) rate = rate + 3*sqrt(law%exponent*law%stiffness*power(depth, law%exponent - 1)/mass)
     rate = max(rate, tiny(rate)**0.25_wp)

@@ -5,7 +5,7 @@
 !> stiffness: until the velocity falls to zero, the body leaves the barrier, or the time is over. Where the force
 !> formula would pull and may not, the force is nil; the surface counts as recovered as soon as it would push again.
 module contact_flight
-  use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_t
+  use contact_law, only: contact_at_speed, contact_force, contact_margin, contact_pushes, contact_t, margin_is_curved
   use drive_law, only: foot_motion, next_sample
   use effect_law, only: dahl_force, slip_memory_t
   use energy, only: balance_instant, gauss_position, gauss_points, gauss_weight, record_with_balance
@@ -20,7 +20,7 @@ module contact_flight
   use oscillator, only: extra_force, oscillator_t
   use polynomial, only: degree, maximum_until, value_at
   use restoring_law, only: restoring_force
-  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above, push_ends, push_returns
   implicit none
   private
 
@@ -84,7 +84,7 @@ contains
     pressed%direction = merge(1, -1, state%mode == mode_slip_plus)
     pressed%memory = slip_memory_t(real(pressed%direction, wp), state%x, state%z)
     y = [side*(state%x - pressed%surface), side*state%v, 0.0_wp]
-    pressed%pushing = pressed%machine%contact%tension .or. margin_at(pressed%machine%contact, y) >= 0
+    pressed%pushing = pressed%machine%contact%tension .or. contact_pushes(pressed%machine%contact, y(1), y(2))
     call sizes_of(pressed, y, scale, duration)
     call list_guards(pressed, 0.0_wp, y, guards, count_guards)
     call begin_march(march, pressed, options%tolerance, 1e-3_wp*scale, duration, 0.0_wp, y)
@@ -159,19 +159,17 @@ contains
     end associate
   end function extension_at
 
-  !> The extension [m] of the spring, with the sign that it has in a margin.
-  pure real(wp) function extension_margin(self, number, time, y)
+  !> The extension [m] of the spring, or the force of the barrier [N], with the sign that it has in a margin.
+  pure real(wp) function extension_margin(self, number, time, y) result(margin)
     class(pressed_t), intent(in) :: self
     integer, intent(in) :: number
     real(wp), intent(in) :: time, y(:)
-    extension_margin = merge(1, -1, number == extension_above)*extension_at(self, time, y)
+    if (any(number == [push_ends, push_returns])) then
+      margin = merge(1, -1, number == push_ends)*contact_force(self%machine%contact, y(1), y(2))
+    else
+      margin = merge(1, -1, number == extension_above)*extension_at(self, time, y)
+    end if
   end function extension_margin
-
-  pure real(wp) function margin_at(contact, y)
-    type(contact_t), intent(in) :: contact
-    real(wp), intent(in) :: y(:)
-    margin_at = sum(contact_margin(contact)*[1.0_wp, y(1), y(2)])
-  end function margin_at
 
   !> What ends the contact or changes its forces from the state `y` on at `time` [s after its start]; keeps it to the pieces of
   !> the tables that it is in there.
@@ -195,6 +193,7 @@ contains
       margin = merge(1, -1, pressed%pushing)*contact_margin(pressed%machine%contact)
       guards(cut)%constant = margin(1)
       guards(cut)%coefficients(1:2) = margin(2:3)
+      if (margin_is_curved(pressed%machine%contact)) guards(cut) = guard_t(margin=merge(push_ends, push_returns, pressed%pushing))
     end if
     count_guards = cut
     associate (effects => pressed%machine%effects, side => pressed%side)

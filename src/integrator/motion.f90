@@ -7,7 +7,7 @@ module motion
   use adaptive_flight, only: fly_adaptive
   use constants, only: two_pi
   use contact_flight, only: contact_side
-  use contact_law, only: contact_table, velocity_after_impact
+  use contact_law, only: contact_hardened, contact_table, velocity_after_impact
   use effect_law, only: dahl_level
   use energy, only: balance_exact, balance_rest
   use errors, only: error_t, fail
@@ -65,7 +65,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     moving%machine = machine
     moving%options = options
-    if (machine%effects%unknown_to_lanes .or. machine%contact%kind == contact_table) moving%options%lane_width = 0
+    if (machine%effects%unknown_to_lanes) moving%options%lane_width = 0
+    if (any(machine%contact%kind == [contact_table, contact_hardened])) moving%options%lane_width = 0
     moving%layer = machine%friction%layer_speed
     call prepare_flow(machine, moving%flow)
     moving%exact = moving%flow%available .and. options%flight /= flight_adaptive

@@ -3,7 +3,7 @@
 
 !> Barriers. A rigid one turns the velocity round at once, with a restitution that may depend on the speed. A
 !> soft one pushes back over the penetration p >= 0,
-!>   K p^n (1 + a p')  or  K p + D p'  or  q(p) (1 + a p')  with a table q,
+!>   K p^n (1 + a p')  or  K p^n + D p'  or  q(p) (1 + a p')  with a table q,
 !> and never pulls unless the law allows it.
 module contact_law
   use contact_rows, only: restitution_formulas
@@ -15,12 +15,14 @@ module contact_law
   implicit none
   private
 
-  public :: contact_of, add_to_contact, compliant_contact, force_table, contact_at_speed, barrier_positions, &
+  public :: contact_of, add_to_contact, compliant_contact, hardened_contact, force_table, contact_at_speed, barrier_positions, &
     beyond_barrier, barriers_are_soft, &
-    velocity_after_impact, restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, force_on_body
+    velocity_after_impact, restitution_at, contact_force, contact_force_slopes, contact_energy, contact_margin, contact_pushes, &
+    margin_is_curved, force_on_body
 
   integer, parameter, public :: contact_constant = 0, contact_linear = 1, contact_power = 2, &
-    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6, contact_table = 7
+    contact_viscoelastic = 3, contact_kelvin_voigt = 4, contact_hunt_crossley = 5, contact_curve = 6, contact_table = 7, &
+    contact_hardened = 8
 
   !> Effects that make rigid barriers soft.
   character(len=20), parameter, public :: softening(3) = [character(len=20) :: 'compliant_contact', 'kelvin_voigt_contact', &
@@ -136,6 +138,19 @@ contains
       law%exponent = value_of(choice, 'exponent')
     end select
   end function compliant_contact
+
+  !> A soft law whose force over the penetration has the exponent n + `change` and is the same at the depth `penetration`.
+  pure type(contact_t) function hardened_contact(soft, choice) result(law)
+    type(contact_t), intent(in) :: soft
+    type(law_choice_t), intent(in) :: choice
+    real(wp) :: change
+    law = soft
+    change = value_of(choice, 'change')
+    if (.not. abs(change) > 0) return
+    law%exponent = soft%exponent + change
+    law%stiffness = soft%stiffness*exponential(-change*logarithm(value_of(choice, 'penetration')))
+    if (soft%kind == contact_kelvin_voigt) law%kind = contact_hardened
+  end function hardened_contact
 
   !> The force over the penetration of a choice of `contact_curve`, with q(0) = 0. The polynomial through the knots may
   !> begin downwards where the force grows steeply: then it begins level.
@@ -254,6 +269,8 @@ contains
       force = law%stiffness*p + law%damping*rate
     else if (law%kind == contact_table) then
       force = continued_at(law%change, p)*(1 + law%damping*rate)
+    else if (law%kind == contact_hardened) then
+      force = law%stiffness*signed_power(p, law%exponent) + law%damping*rate
     else
       force = law%stiffness*signed_power(p, law%exponent)*(1 + law%damping*rate)
     end if
@@ -270,8 +287,10 @@ contains
       slopes = [slope_of(law%change, p)*(1 + law%damping*rate), continued_at(law%change, p)*law%damping]
       return
     end if
-    slopes(1) = law%stiffness*(1 + law%damping*rate)
+    slopes(1) = law%stiffness
+    if (law%kind /= contact_hardened) slopes(1) = slopes(1)*(1 + law%damping*rate)
     if (law%exponent /= 1) slopes(1) = slopes(1)*law%exponent*abs(signed_power(p, law%exponent - 1))
+    if (law%kind == contact_hardened) return
     slopes(2) = law%stiffness*signed_power(p, law%exponent)*law%damping
   end function contact_force_slopes
 
@@ -306,13 +325,30 @@ contains
   end function allowed_force
 
   !> A linear function of p and p' that is positive where the formula of a soft law pushes: its coefficients with
-  !> 1, p and p'.
+  !> 1, p and p'. There is none where `margin_is_curved`: then the force itself is that margin.
   pure function contact_margin(law) result(margin)
     type(contact_t), intent(in) :: law
     real(wp) :: margin(3)
     margin = [1.0_wp, 0.0_wp, law%damping]
     if (law%kind == contact_kelvin_voigt) margin = [0.0_wp, law%stiffness, law%damping]
   end function contact_margin
+
+  !> Whether the line on which the force of a soft law is zero is a curve over p and p'.
+  pure elemental logical function margin_is_curved(law)
+    type(contact_t), intent(in) :: law
+    margin_is_curved = law%kind == contact_hardened
+  end function margin_is_curved
+
+  !> Whether the formula of a soft law pushes at the penetration `p` [m] that grows at `rate` [m/s].
+  pure elemental logical function contact_pushes(law, p, rate)
+    type(contact_t), intent(in) :: law
+    real(wp), intent(in) :: p, rate
+    if (margin_is_curved(law)) then
+      contact_pushes = contact_force(law, p, rate) >= 0
+    else
+      contact_pushes = sum(contact_margin(law)*[1.0_wp, p, rate]) >= 0
+    end if
+  end function contact_pushes
 
   !> |p|^n with the sign of p, in reproducible arithmetic.
   pure elemental real(wp) function signed_power(p, n)

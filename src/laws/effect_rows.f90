@@ -49,6 +49,8 @@ module effect_rows
               'Goldsmith, Impact (1960)'), &
     law_row_t('effect', 'contact_curve', 'rigid barriers become soft: q(p) (1 + a p''), q a table from q(0) = 0 on, never pulls', &
               'Hunt, Crossley, J. Appl. Mech. 42 (1975)'), &
+    law_row_t('effect', 'contact_hardening', 'the force K p^n of soft barriers becomes K p^n (p/p0)^c, their damping stays', &
+              'Johnson, Contact Mechanics (1985)'), &
     law_row_t('effect', 'second_barrier', 'a barrier on the free side, with the same law', sum_of_laws), &
     law_row_t('effect', 'drive_ripple', 'crank angle phi + sine sin(n phi) + cosine cos(n phi) in place of phi', &
               'Kononenko, Vibrating Systems with a Limited Power Supply (1969)'), &
@@ -115,6 +117,10 @@ module effect_rows
     parameter_row_t('effect', 'contact_curve', 'force', 'N', not_negative, 'force at these penetrations', list=.true.), &
     parameter_row_t('effect', 'contact_curve', 'damping', 's/m', not_negative, 'a; 1/a bounds the speed of rebound', &
                     optional=.true.), &
+    parameter_row_t('effect', 'contact_hardening', 'change', '1', range_t(-0.5_wp, 9.0_wp), &
+                    'c, change of the exponent n of the force over the penetration'), &
+    parameter_row_t('effect', 'contact_hardening', 'penetration', 'm', positive, &
+                    'p0, the penetration at which the force stays the same'), &
     parameter_row_t('effect', 'second_barrier', 'position', 'm', any_value, &
                     'below an upper barrier, or above a lower one'), &
     parameter_row_t('effect', 'drive_ripple', 'sine', 'rad', any_value, &
@@ -156,6 +162,7 @@ module effect_rows
     effect_trait_t('compliant_contact', over_penetration, 'barrier', '', 'stiffness damping', 'contact.restitution'), &
     effect_trait_t('kelvin_voigt_contact', over_penetration, 'barrier', '', 'stiffness damping', 'contact.restitution'), &
     effect_trait_t('contact_curve', over_penetration, 'barrier', 'force', '', 'contact.restitution'), &
+    effect_trait_t('contact_hardening', over_penetration, 'barrier', 'change', '', 'contact.stiffness'), &
     effect_trait_t('second_barrier', 'contact over position', 'barrier', '', '', 'contact.restitution'), &
     effect_trait_t('drive_ripple', over_phase, 'flight', 'sine cosine', '', 'drive.ratio'), &
     effect_trait_t('drive_harmonics', over_phase, 'flight', 'cosine sine', '', 'drive.ratio'), &

@@ -14,8 +14,9 @@ module table_pieces
 
   !> Variables of tables: extension of the spring, position, speed in the direction of the slip.
   integer, parameter, public :: of_extension = 1, of_position = 2, of_speed = 3
-  !> Margins that are not linear in the state: of the extension of the spring below a constant, and above it.
-  integer, parameter, public :: extension_below = 1, extension_above = 2
+  !> Margins that are not linear in the state: of the extension of the spring below a constant, and above it; of the
+  !> force of a soft barrier that ends, and that comes back.
+  integer, parameter, public :: extension_below = 1, extension_above = 2, push_ends = 3, push_returns = 4
   !> Two each of spring, play, force, factor of dry friction, friction.
   integer, parameter, public :: most_ends = 10
 

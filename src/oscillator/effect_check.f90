@@ -3,7 +3,7 @@
 
 !> Which effects the laws of a machine admit.
 module effect_check
-  use contact_law, only: force_table, softening
+  use contact_law, only: contact_of, contact_t, force_table, softening
   use curve_law, only: is_positive, knots_problem, most_knots
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
@@ -18,6 +18,8 @@ module effect_check
 
   !> Corners of a play that are rounded within less, in shares of its gap, are not resolved.
   real(wp), parameter :: least_rounding = 1e-9_wp
+  !> Of the force of a contact over its penetration.
+  real(wp), parameter :: least_exponent = 0.5_wp
 
 contains
 
@@ -31,7 +33,7 @@ contains
       if (choices(i)%family /= effect_family) cycle
       select case (choices(i)%name)
       case ('restitution_slope', 'restitution_curve', 'compliant_contact', 'kelvin_voigt_contact', 'contact_curve', &
-            'second_barrier')
+            'contact_hardening', 'second_barrier')
         problem = contact_problem(choices, choices(i))
       case ('drive_ripple')
         problem = ripple_problem(choices, choices(i))
@@ -88,6 +90,8 @@ contains
                                                                 ', allowed one of them'
       if (index(law, 'newton') /= 1) problem = ': found with contact.law = "'//law//'", allowed with the rigid ones: newton, '// &
                                                'newton_linear, newton_power, newton_viscoelastic'
+    case ('contact_hardening')
+      problem = hardening_problem(choices, effect)
     case default
       if (law == 'none') then
         problem = ': found with contact.law = "none", allowed with one barrier'
@@ -105,6 +109,21 @@ contains
       end if
     end select
   end function contact_problem
+
+  !> What is wrong with another exponent of a soft contact, '' if nothing.
+  pure function hardening_problem(choices, effect) result(problem)
+    type(law_choice_t), intent(in) :: choices(:), effect
+    character(len=:), allocatable :: problem
+    type(contact_t) :: law
+    problem = ''
+    if (position_of(choices, 'contact') > 0) law = contact_of(choices(position_of(choices, 'contact')), mass=1.0_wp)
+    if (.not. law%soft) then
+      problem = ': found with contact.law = "'//name_of(choices, 'contact')//'", allowed with the soft ones'
+    else if (law%exponent + value_of(effect, 'change') < least_exponent) then
+      problem = '.change: found '//number(value_of(effect, 'change'))//', allowed at least '// &
+                number(least_exponent - law%exponent)//': the exponent of a contact is at least '//number(least_exponent)
+    end if
+  end function hardening_problem
 
   !> Another effect than `but` that makes the barriers soft, '' if there is none.
   pure function soft_effect(choices, but) result(name)

@@ -5,7 +5,8 @@
 !> fixed positions, crank angle phi = Omega t + phi_0.
 module oscillator
   use constants, only: two_pi, unreachable
-  use contact_law, only: add_to_contact, barrier_positions, compliant_contact, contact_of, contact_t, force_on_body
+  use contact_law, only: add_to_contact, barrier_positions, compliant_contact, contact_of, contact_t, force_on_body, &
+    hardened_contact
   use drive_law, only: add_harmonics, add_ripple, drive_of, drive_t, foot_motion, measured_force
   use effect_check, only: refuse_effects
   use effect_law, only: add_to_effects, add_to_sensor, effect_force, effects_t, finish_effects, position_force, replace_friction, &
@@ -113,6 +114,8 @@ contains
       select case (choices(i)%name)
       case ('compliant_contact', 'kelvin_voigt_contact', 'contact_curve')
         machine%contact = compliant_contact(machine%contact, choices(i))
+      case ('contact_hardening')
+        machine%contact = hardened_contact(machine%contact, choices(i))
       case ('drive_harmonics')
         call add_harmonics(machine%drive, choices(i))
       end select

@@ -4,7 +4,7 @@
 !> A slip of one body over a given time, and its derivative by its start: on the closed form where that exists, also between
 !> passages of a Stribeck layer, else on the equations of motion and of their variation. Modes are those of module `one_body`.
 module body_flight
-  use contact_law, only: contact_force_slopes, contact_margin
+  use contact_law, only: contact_force, contact_force_slopes, contact_margin, margin_is_curved
   use drive_law, only: foot_motion
   use effect_law, only: slip_memory_t
   use elementary, only: exponential, sine_cosine
@@ -19,7 +19,7 @@ module body_flight
   use oscillator, only: oscillator_t
   use restoring_law, only: restoring_stiffness
   use slip_force, only: direction_in, pressed_side, pushes, quarter, slip_acceleration, surface_of
-  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above
+  use table_pieces, only: enter_pieces, list_ends, margin_of_end, most_ends, piece_end_t, extension_above, push_ends, push_returns
   implicit none
   private
 
@@ -277,6 +277,7 @@ contains
       margin = merge(1, -1, system%pushing)*contact_margin(system%machine%contact)
       cut(cut_off)%constant = margin(1) - side*surface_of(system%machine, side)*margin(2)
       cut(cut_off)%coefficients(1:2) = side*margin(2:3)
+      if (margin_is_curved(system%machine%contact)) cut(cut_off) = guard_t(margin=merge(push_ends, push_returns, system%pushing))
     end if
     if (system%machine%effects%by_table) call keep_to_pieces(system, direction_in(mode), time, y, cut, count_cuts)
   end subroutine list_cuts
@@ -300,15 +301,28 @@ contains
     count_cuts = count_cuts + count_ends
   end subroutine keep_to_pieces
 
-  !> The extension [m] of the spring, with the sign that it has in a margin.
-  pure real(wp) function extension_margin(self, number, time, y)
+  !> The extension [m] of the spring, or the force of the soft barrier [N], with the sign that it has in a margin.
+  pure real(wp) function extension_margin(self, number, time, y) result(margin)
     class(slip_t), intent(in) :: self
     integer, intent(in) :: number
     real(wp), intent(in) :: time, y(:)
     real(wp) :: foot
+    if (any(number == [push_ends, push_returns])) then
+      margin = merge(1, -1, number == push_ends)*push_at(self, y)
+      return
+    end if
     call foot_motion(self%machine%drive, self%machine%drive_frequency*sign(1, self%mode)*(self%start + time), foot)
-    extension_margin = merge(1, -1, number == extension_above)*(self%machine%restoring%free_length + foot - y(1))
+    margin = merge(1, -1, number == extension_above)*(self%machine%restoring%free_length + foot - y(1))
   end function extension_margin
+
+  !> Force that the formula of the soft barrier gives [N].
+  pure real(wp) function push_at(slip, y)
+    class(slip_t), intent(in) :: slip
+    real(wp), intent(in) :: y(:)
+    integer :: side
+    side = pressed_side(abs(slip%mode))
+    push_at = contact_force(slip%machine%contact, side*(y(1) - surface_of(slip%machine, side)), side*y(2))
+  end function push_at
 
   pure function slope_of_slip(self, time, y) result(slope)
     class(slip_t), intent(in) :: self

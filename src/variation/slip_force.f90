@@ -3,7 +3,7 @@
 
 !> Modes of one body, and the acceleration of a slip in them. Modes are those of module `one_body`.
 module slip_force
-  use contact_law, only: contact_force, contact_margin
+  use contact_law, only: contact_force, contact_pushes
   use drive_law, only: foot_motion
   use effect_law, only: slip_memory_t
   use friction_law, only: sliding_friction
@@ -52,7 +52,7 @@ contains
     side = pressed_side(mode)
     pushes = side /= 0
     if (.not. pushes .or. machine%contact%tension) return
-    pushes = sum(contact_margin(machine%contact)*[1.0_wp, side*(y(1) - surface_of(machine, side)), side*y(2)]) >= 0
+    pushes = contact_pushes(machine%contact, side*(y(1) - surface_of(machine, side)), side*y(2))
   end function pushes
 
   !> Difference of fourth order of the values two and one steps back, one and two further: derivative times the step.

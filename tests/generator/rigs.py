@@ -178,7 +178,7 @@ run.duration = 1
         case,
         machine,
         (0, 1, 2),
-        ("contact_curve", "compliant_contact"),
+        ("contact_hardening",),
         ("x",),
         driven=False,
         settle=0.0,

@@ -54,7 +54,12 @@ FAMILIES = {
     "friction over position": {"position_dependent_friction", "friction_position_curve"},
     "spring over extension": {"cubic_spring", "backlash", "spring_curve"},
     "restitution over impact speed": {"restitution_slope", "restitution_curve"},
-    "contact over penetration": {"compliant_contact", "kelvin_voigt_contact", "contact_curve"},
+    "contact over penetration": {
+        "compliant_contact",
+        "kelvin_voigt_contact",
+        "contact_curve",
+        "contact_hardening",
+    },
     "drive over phase": {"drive_ripple", "drive_harmonics"},
 }
 """Closed forms and the function of a family. A function names the family of any of its laws."""

@@ -160,6 +160,25 @@ def test_a_soft_wall_is_reported_by_its_family():
     )
 
 
+def test_another_exponent_of_a_soft_wall_is_named():
+    """A wall that is soft in the case too: its force grows faster, and its damper stays."""
+    text = CASE.replace('"newton"', '"kelvin_voigt"').replace(
+        "restitution = 0.62", "stiffness = 3000\ndamping = 12\ntension = 0"
+    )
+    without = Model.from_text(text.format(upper=0.55, amplitude=0.2))
+    true = without.with_effect("contact_hardening", {"change": 0.4, "penetration": 0.02})
+    names = ("contact_hardening", "compliant_contact", "cubic_spring", "quadratic_drag")
+    verdict, _ = ask(true, without, names)
+    assert (verdict["outcome"], verdict["effects"]) == ("named", ["contact_hardening"])
+    assert verdict["families"] == ["contact over penetration"]
+    low, high = verdict["parameters"]["effect.contact_hardening.change"]["interval_95"]
+    assert low < 0.4 < high
+    assert high - low < 0.1
+    # a wall that nothing is wrong with has no other exponent
+    verdict, _ = ask(without, without, names)
+    assert (verdict["outcome"], verdict["effects"]) == ("none", [])
+
+
 def test_the_force_of_a_soft_wall_is_drawn_as_a_function_and_is_that_of_hertz():
     without = base(upper=0.55, amplitude=0.2)
     true = without.with_effect("compliant_contact", {"stiffness": 20000.0, "damping": 0.3})

@@ -83,6 +83,7 @@ STARTS: dict[str, Starts] = {
         "stiffness": [s.mass * s.impact_speed**2 / (share * s.length) ** 2 for share in (0.03, 0.008, 0.1)],
         "damping": [0.3 * s.mass * s.impact_speed / (0.03 * s.length)],
     },
+    "contact_hardening": lambda s: {"change": [0.2]},
     "second_barrier": lambda s: {"position": [np.nan]},
     "drive_ripple": lambda s: {"sine": [0.02], "cosine": [0.02]},
     "sensor_bias": lambda s: {"bias": [0.01 * s.length]},
@@ -140,8 +141,11 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
             return positions
         sizes = {"position": positions}
     first = {key: float(values[0]) for key, values in sizes.items()}
+    fixed = {"penetration": _half_way_in(model, scales)} if name == "contact_hardening" else {}
+    if not all(size > 0 for size in fixed.values()):
+        return "the barriers of the machine are not pressed in these records"
     try:
-        extended = _opened(model, name, sizes, scales).with_effect(name, first)
+        extended = _opened(model, name, sizes, scales).with_effect(name, first | fixed)
     except SeparatrixError as reason:
         return str(reason)
     added = []
@@ -159,6 +163,14 @@ def candidate(model, free: list[Free], names: tuple[str, ...], name: str, scales
     linear = np.array([key in effect.amplitudes for key in first])
     forms = np.unique(np.where(linear, 0.0, np.array(starts)), axis=0)
     return Candidate((*names, name), extended, whole + added, indices, starts, list(forms), linear)
+
+
+def _half_way_in(model, scales: Scales) -> float:
+    """Half of the deepest penetration into the barriers of the case [m], negative without one."""
+    upper, lower = (model.parameters.get(f"contact.{end}") for end in ("upper", "lower"))
+    depths = [scales.highest - upper.value] if upper else []
+    depths += [lower.value - scales.lowest] if lower else []
+    return max(depths, default=-1.0) / 2
 
 
 def _opened(model, name: str, sizes: dict[str, list[float]], scales: Scales):

@@ -19,7 +19,7 @@ _FIXED = (
     "drive.ratio",
     "drive.interval",
 )
-_FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding")
+_FIXED_ENDS = ("exponent", "harmonic", "tension", "rounding", "penetration")
 _KNOTS = ("speed[", "position[", "extension[", "penetration[")
 SENSOR_BIAS = "effect.sensor_bias.bias"
 SENSOR_ZERO = "nuisance:sensor_zero"

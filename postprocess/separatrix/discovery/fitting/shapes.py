@@ -99,6 +99,7 @@ FORM_OF = {
     "restitution_slope": "linear",
     "cubic_spring": "cubic",
     "compliant_contact": "hertz",
+    "contact_hardening": "power",
 }
 """Closed form of its family that an effect is."""
 UNNAMED_FORMS = {"restitution_slope": ("power", "exponential", "viscoelastic")}

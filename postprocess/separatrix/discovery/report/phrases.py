@@ -28,6 +28,7 @@ PHRASES = {
     "restitution_curve": "restitution that depends on the impact speed",
     "compliant_contact": "a barrier that yields, stiffer the deeper it is pressed",
     "kelvin_voigt_contact": "a barrier that yields like a spring with a damper",
+    "contact_hardening": "a barrier whose force grows with another power of the penetration than in the case",
     "contact_curve": "a barrier whose force depends on the penetration in another way than in the case",
     "second_barrier": "a barrier on the free side",
     "drive_ripple": "a crank whose angle fluctuates within each turn",
