@@ -147,7 +147,9 @@ def _of_crank(record: Record, notes: list[str]) -> Sensor:
     middle = (np.max(level) + np.min(level)) / 2
     edges = np.flatnonzero((level[:-1] < middle) & (level[1:] >= middle))
     if edges.size < RECORDS.fewest_pulses:
-        raise SeparatrixError(f"{record.file}: {edges.size} pulses, at least {RECORDS.fewest_pulses} are needed")
+        raise SeparatrixError(
+            f"{record.file}: {edges.size} pulses, at least {RECORDS.fewest_pulses} are needed"
+        )
     share = (middle - level[edges]) / (level[edges + 1] - level[edges])
     digital = np.unique(level).size == 2
     at = t[edges] + (0.5 if digital else share) * record.interval
