@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables [body], [restoring], [friction], [contact], [drive], [motor] (`added_families`) and [effect.NAME], read by the law table.
+!> The tables [body], [restoring], [friction], [contact], [drive], those of `added_families`, and [effect.NAME], by the law table.
 module law_reader
   use case_parameters, only: find_parameter
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
