@@ -12,7 +12,7 @@ module c_trajectory
   use contact_law, only: barrier_positions, contact_t
   use errors, only: error_t, fail
   use kinds, only: wp
-  use machine_columns, only: machine_column_t
+  use machine_columns, only: values_named
   use machine_type, only: machine_t
   use model_type, only: model_t
   use motion_state, only: closing_error, log_t, open_log
@@ -158,16 +158,13 @@ contains
     integer, intent(in) :: kept
     real(wp), intent(inout) :: sample(:, :)
     type(contact_t) :: stops
-    type(machine_column_t), allocatable :: columns(:)
     real(wp), allocatable :: column(:)
     sample(:3, :kept) = log%sample_data(:, :kept)
     sample(4, :kept) = log%sample_mode(:kept)
     if (moving%has_driver) then
       sample(5:6, :kept) = log%sample_driver(:, :kept)
     else
-      sample(5, :kept) = 0
-      columns = moving%sample_columns(crank_angle, log)
-      if (columns(1)%name == 'drive') sample(5, :kept) = columns(1)%values(:kept)
+      sample(5, :kept) = values_named(moving%sample_columns(crank_angle, log), 'drive', kept)
       sample(6, :kept) = ieee_value(1.0_wp, ieee_quiet_nan)
     end if
     select type (moving)

@@ -15,7 +15,7 @@ module case_check
   use grid, only: sample_axis
   use kinds, only: wp
   use law_check, only: check_laws, is_good
-  use law_table, only: effect_family, families, force_family, law_choice_t, motor_family, state_family
+  use law_table, only: added_families, effect_family, families, force_family, law_choice_t, state_family
   use motor_choices, only: has_ramp
   use machine_type, only: machine_t
   use motion_state, only: options_t
@@ -62,7 +62,7 @@ contains
     if (of_axes .and. is_good(source, ['grid'])) call check_tiles(source, the_case)
     if (of_axes .and. is_good(source, ['body   ', 'contact', 'effect ', 'start  '])) call check_starts(source, the_case, of_sweep)
     call check_laws(source, the_case%laws, '')
-    of_laws = is_good(source, [character(len=len(families)) :: families, effect_family, motor_family, force_family, state_family])
+    of_laws = is_good(source, [character(len=len(families)) :: families, effect_family, added_families, force_family, state_family])
     if (of_laws .and. of_axes) call check_combinations(source, the_case, the_case%axes)
     if (of_laws .and. of_sweep) call check_combinations(source, the_case, [the_case%sweep%swept])
   end subroutine check_case

@@ -9,7 +9,7 @@ module case_parameters
   use errors, only: error_t, fail
   use old_keys, only: current_key
   use kinds, only: wp
-  use law_table, only: change_parameter, is_hidden, largest_angle, law_choice_t, motor_family, parameter_row_t, rows_of, &
+  use law_table, only: added_families, change_parameter, is_hidden, largest_angle, law_choice_t, parameter_row_t, rows_of, &
     part_family, path_of, split_element
   use motor_choices, only: has_motor
   use part_angles, only: is_of_angle, turns
@@ -89,7 +89,7 @@ contains
     type(parameter_row_t), intent(in) :: row
     logical, intent(in) :: is_angle
     row_bounds = bounds_t(lower=row%range%lower, upper=row%range%upper, lower_open=row%range%lower_open, unit=row%unit)
-    if (row%family /= motor_family) row_bounds%unit = unit_of(row%unit, is_angle)
+    if (all(row%family /= added_families)) row_bounds%unit = unit_of(row%unit, is_angle)
   end function row_bounds
 
   !> Whether a parameter is a position or a velocity.

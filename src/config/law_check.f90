@@ -5,7 +5,8 @@
 module law_check
   use angle_units, only: unit_of
   use build_multibody, only: is_multibody, multibody_of
-  use build_pair, only: is_pair, pair_of
+  use build_motion, only: kind_bodies, kind_body, kind_motor, kind_of, kind_own, machine_of
+  use build_pair, only: pair_of
   use case_parameters, only: parameter_value
   use case_source, only: case_source_t, has_problems, report
   use case_type, only: contact_law, drive_position => drive_law, restoring_law
@@ -17,11 +18,12 @@ module law_check
   use motor_system, only: motor_system_t
   use multibody, only: multibody_t
   use kinds, only: wp
-  use law_table, only: force_family, law_choice_t, list_of, state_family, value_of
+  use law_table, only: added_families, effect_family, force_family, law_choice_t, list_of, state_family, value_of
   use lever_reach, only: check_assembly
+  use machine_type, only: machine_t
+  use motion_state, only: options_t
   use oscillator, only: refuse_pair
   use own_equations, only: build_own_equations
-  use own_names, only: has_own
   use restoring_law, only: position_is_angle
   use text, only: to_text
   implicit none
@@ -49,8 +51,8 @@ contains
     character(len=*), intent(in) :: at
     logical :: good(3), whole
     good = [is_good(source, ['friction']), is_good(source, ['contact']), is_good(source, ['drive'])]
-    whole = all(good) .and. is_good(source, [character(len=9) :: 'body', 'restoring', 'effect', 'motor', &
-                                                                       force_family, state_family])
+    whole = all(good) .and. is_good(source, [character(len=len(added_families)) :: 'body', 'restoring', &
+                                               effect_family, added_families, force_family, state_family])
     if (good(1)) call check_friction(source, laws, at)
     if (good(2)) call check_barriers(source, laws, at)
     if (whole) call check_bodies(source, laws, at)
@@ -129,7 +131,7 @@ contains
     end associate
   end subroutine check_force
 
-  !> One body and two have laws of their own, and effects laws that they belong to.
+  !> A machine of each kind has laws of its own, and effects laws that they belong to.
   subroutine check_bodies(source, laws, at)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), intent(in) :: laws(:)
@@ -137,19 +139,24 @@ contains
     type(multibody_t) :: multibody
     type(error_t), allocatable :: error
     type(motor_system_t) :: system
-    if (has_motor(laws)) then
+    class(machine_t), allocatable :: machine
+    select case (kind_of(laws))
+    case (kind_motor)
       call build_motor_equations(laws, system, error)
-    else if (has_own(laws)) then
+    case (kind_own)
       call build_own_equations(laws, system, error)
-    else if (is_multibody(laws)) then
-      if (.not. is_good(source, ['spring   ', 'structure'])) return
-      call multibody_of(laws, multibody, error)
-    else if (is_pair(laws)) then
-      call pair_of(laws, multibody, error)
-    else
+    case (kind_bodies)
+      if (.not. is_multibody(laws)) then
+        call pair_of(laws, multibody, error)
+      else if (is_good(source, ['spring   ', 'structure'])) then
+        call multibody_of(laws, multibody, error)
+      end if
+    case (kind_body)
       call refuse_pair(laws, error)
       if (.not. allocated(error)) call refuse_effects(laws, error)
-    end if
+    case default
+      call machine_of(laws, options_t(), machine, error)
+    end select
     if (.not. allocated(error)) return
     call report(source, error%message(:index(error%message, ':') - 1), error%message(index(error%message, ':') + 2:)//at)
   end subroutine check_bodies

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> The tables [body], [restoring], [friction], [contact], [drive], [motor] and [effect.NAME], read by the law table.
+!> The tables [body], [restoring], [friction], [contact], [drive], those of `added_families`, and [effect.NAME], by the law table.
 module law_reader
   use case_parameters, only: find_parameter
   use case_source, only: case_source_t, description, enter_table, find, has_problems, know, know_all_below, report
@@ -13,8 +13,8 @@ module law_reader
   use part_names, only: is_table
   use part_reader, only: has_parts, read_parts
   use law_row, only: law_length
-  use law_table, only: effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, motor_family, own_law, &
-    parameter_row_t, parameters_of, part_family, set_value, table_of
+  use law_table, only: added_families, effect_family, families, find_law, law_choice, law_choice_t, laws, list_of, motor_family, &
+    own_law, parameter_row_t, parameters_of, part_family, set_value, table_of
   use pair_rows, only: pair_laws
   use restoring_law, only: position_is_angle
   use row_reader, only: take_row
@@ -53,7 +53,7 @@ contains
       call read_law(source, trim(families(i)), body, position_is_angle(choices(:i - 1)), choices(i))
     end do
     call resolve_static_friction(choices)
-    call read_motor(source, choices)
+    call read_added(source, choices)
     call read_own_tables(source, choices)
     call read_effects(source, choices)
   end subroutine read_laws
@@ -69,16 +69,19 @@ contains
     restores_an_angle = source%entries(at)%entry%string == 'pendulum'
   end function restores_an_angle
 
-  !> The table [motor]; a drive without has a given speed.
-  subroutine read_motor(source, choices)
+  !> The tables that a case may add, such as [motor]: a drive without has a given speed.
+  subroutine read_added(source, choices)
     type(case_source_t), intent(inout) :: source
     type(law_choice_t), allocatable, intent(inout) :: choices(:)
     type(law_choice_t) :: choice
-    call know(source, motor_family//'.')
-    if (.not. is_table(source, motor_family)) return
-    call read_law(source, motor_family, '', .false., choice)
-    choices = [choices, choice]
-  end subroutine read_motor
+    integer :: i
+    do i = 1, size(added_families)
+      call know(source, trim(added_families(i))//'.')
+      if (.not. is_table(source, trim(added_families(i)))) cycle
+      call read_law(source, trim(added_families(i)), '', .false., choice)
+      choices = [choices, choice]
+    end do
+  end subroutine read_added
 
   !> The tables [effect.NAME], in the order of the law table.
   subroutine read_effects(source, choices)

@@ -6,10 +6,11 @@
 module slip_reader
   use case_overrides, only: is_or_is_below, source_entry_t
   use case_source, only: case_source_t, find, report
-  use written_names, only: of_parts_only, read_as_t
+  use law_table, only: added_families, effect_family
   use part_names, only: is_table
   use part_reader, only: has_parts
   use text, only: starts_with
+  use written_names, only: of_parts_only, read_as_t
   use toml_bindings, only: toml_array, toml_float, toml_string
   implicit none
   private
@@ -61,10 +62,14 @@ contains
   !> Whether the other laws of the body can be written as parts.
   logical function is_admitted(source)
     type(case_source_t), intent(inout) :: source
+    integer :: i
     is_admitted = goes('restoring', [character(len=8) :: 'none', 'linear', 'pendulum']) .and. &
                   goes('contact', [character(len=8) :: 'none']) .and. &
                   goes('drive', [character(len=8) :: 'none', 'force', 'harmonic', 'fourier', 'base'])
-    is_admitted = is_admitted .and. is_table(source, 'body') .and. .not. (is_table(source, 'effect') .or. is_table(source, 'motor'))
+    is_admitted = is_admitted .and. is_table(source, 'body') .and. .not. is_table(source, effect_family)
+    do i = 1, size(added_families)
+      is_admitted = is_admitted .and. .not. is_table(source, trim(added_families(i)))
+    end do
     ! Beside 'none' other keys are errors, which the short form reports.
     is_admitted = is_admitted .and. .not. (is_idle('restoring') .or. is_idle('drive'))
     if (text_of(source, 'drive.law') == 'harmonic' .or. text_of(source, 'drive.law') == 'fourier') then

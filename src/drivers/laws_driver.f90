@@ -6,7 +6,7 @@ module laws_driver
   use journal, only: json_text
   use kinds, only: wp
   use law_row, only: law_row_t
-  use law_table, only: effect_family, families, force_family, is_hidden, laws, motor_family, &
+  use law_table, only: added_families, effect_family, families, force_family, is_hidden, laws, &
     parameter_row_t, parameters_of, part_family, part_kind, &
     part_law, state_family, table_of
   use text, only: to_text
@@ -21,7 +21,7 @@ contains
   !> Prints every law with parameters, units, bounds and source.
   subroutine run_laws(json)
     logical, intent(in) :: json
-    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: motor_family, &
+    character(len=len(families)), parameter :: listed(*) = [families, [character(len=len(families)) :: added_families, &
       force_family, state_family, part_family, effect_family]]
     integer :: i, k
     logical :: first

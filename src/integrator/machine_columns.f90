@@ -7,7 +7,7 @@ module machine_columns
   implicit none
   private
 
-  public :: set_column
+  public :: set_column, values_named
 
   !> A quantity at the samples, or at the events.
   type, public :: machine_column_t
@@ -29,5 +29,18 @@ contains
     column%values = values
     column%meanings = ''
   end subroutine set_column
+
+  !> The first `count` values of the column with a name; zeros where the machine has none.
+  pure function values_named(columns, name, count) result(values)
+    type(machine_column_t), intent(in) :: columns(:)
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: count
+    real(wp) :: values(count)
+    integer :: i
+    values = 0
+    do i = 1, size(columns)
+      if (columns(i)%name == name) values = columns(i)%values(:count)
+    end do
+  end function values_named
 
 end module machine_columns

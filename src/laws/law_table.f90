@@ -33,6 +33,9 @@ module law_table
   !> The motor of a drive whose power is limited: one law, or none.
   character(len=*), parameter, public :: motor_family = 'motor'
 
+  !> Tables that add one law to those of one body, where the case has them. Their units are as in their rows, also beside an angle.
+  character(len=*), parameter, public :: added_families(*) = [character(len=family_length) :: motor_family]
+
   !> Forces on one body and its further states, each with a name of its own; the law by expressions of any family.
   character(len=*), parameter, public :: force_family = 'force', state_family = 'state', own_law = 'expression'
 

@@ -14,7 +14,7 @@ module oscillator
   use errors, only: error_t, fail
   use friction_law, only: add_to_friction, friction_of, friction_t
   use kinds, only: wp
-  use law_table, only: effect_family, law_choice_t, motor_family, own_law, path_of, value_of
+  use law_table, only: added_families, effect_family, law_choice_t, own_law, path_of, value_of
   use law_texts, only: is_own
   use restoring_law, only: restoring_force, restoring_of, restoring_stiffness, restoring_t
   use status, only: exit_bad_case
@@ -204,9 +204,9 @@ contains
     integer :: i
     do i = 1, size(choices)
       if (allocated(error)) return
-      if (choices(i)%family == motor_family) then
-        call fail(error, exit_bad_case, 'motor.law: found "'//trim(choices(i)%name)//'", allowed in the commands trajectory, '// &
-                  'basin and sweep')
+      if (any(choices(i)%family == added_families)) then
+        call fail(error, exit_bad_case, path_of(choices(i))//'.law: found "'//trim(choices(i)%name)//'", allowed in the '// &
+                  'commands trajectory, basin and sweep')
         return
       end if
       if (choices(i)%name /= own_law .and. is_own(choices(i))) then

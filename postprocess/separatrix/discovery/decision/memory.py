@@ -17,8 +17,6 @@ from separatrix.discovery.fitting.memory_laws import dahl, dead_band, lugre, sli
 from separatrix.discovery.measured.driven import Driven
 from separatrix.discovery.policy import FIT, SEARCH
 
-_RIDGE = 1e-7
-_HATS = 12
 _MASS, _DAMPING = "body.mass", "friction.damping"
 _FRICTION = (_DAMPING, "friction.kinetic_coefficient", "effect.coulomb.force", "effect.viscous.damping")
 
@@ -127,7 +125,8 @@ def _without(runs: dict) -> Law:
     motions = [run.motion for run in runs["training"]]
     fast = max(np.max(np.abs(one.v)) for one in motions)
     x = np.concatenate([one.x for one in motions])
-    knots = np.linspace(x.min(), x.max(), _HATS), fast * np.linspace(0, 1, _HATS) ** 2
+    count = SEARCH.memory_knots
+    knots = np.linspace(x.min(), x.max(), count), fast * np.linspace(0, 1, count) ** 2
 
     def columns(run: _Run) -> np.ndarray:
         v, at = run.motion.v, run.motion.x
@@ -228,7 +227,7 @@ def _fit(name: str, runs: dict, columns, positive: int) -> tuple[Law, np.ndarray
     low[: len(bounds)], high[: len(bounds)] = bounds.T
     if positive:
         low[count - positive :] = 0.0
-    whole = np.vstack([matrix / scale, _RIDGE * np.linalg.norm(right) * np.eye(count)])
+    whole = np.vstack([matrix / scale, SEARCH.memory_ridge * np.linalg.norm(right) * np.eye(count)])
     found = lsq_linear(
         whole, np.append(right, np.zeros(count)),
         (np.minimum(low * scale, -1e-12), np.maximum(high * scale, 1e-12)),

@@ -14,8 +14,6 @@ from separatrix.discovery.measured.sensors import SensedPrepared, Sensor
 from separatrix.discovery.policy import FIT
 
 _TURN = 2 * np.pi
-# to which the zero of pulses is tried out before it is fitted [rad]
-_NEAR_ZERO = 0.05
 _ANGLE = CRANKED.index("crank")
 # parameters that no motion at one scale of forces determines, or that another one represents
 _FIXED = ("mass", "gravity", "free_length", "stribeck_exponent")
@@ -123,7 +121,7 @@ class CrankData(SensedData):
         turns = np.arange(FIT.phases) * _TURN / FIT.phases
         best = float(turns[int(np.argmin([self._misfit(model, free, turn) for turn in turns]))])
         step = _TURN / FIT.phases / 2
-        while step > _NEAR_ZERO:
+        while step > FIT.zero_step:
             tried = [best - step, best, best + step]
             best = tried[int(np.argmin([self._misfit(model, free, turn) for turn in tried]))]
             step /= 2

@@ -27,7 +27,6 @@ LAWS = ("linear", "kloss", "dc", "table")
 """Motors whose state a segment can begin with: the integral of a speed control shows in no sensor."""
 ANGLE = f"x.{CRANK}"
 _SUPPLY = {"dc": "motor.voltage", "linear": "motor.no_load_speed", "kloss": "motor.synchronous_speed"}
-_LEAST_TURNS = 4
 
 
 @dataclass
@@ -147,8 +146,10 @@ def _of_crank(record: Record, notes: list[str]) -> Sensor:
     t, level = record.t, record.sensors["pulse"]
     middle = (np.max(level) + np.min(level)) / 2
     edges = np.flatnonzero((level[:-1] < middle) & (level[1:] >= middle))
-    if edges.size < _LEAST_TURNS:
-        raise SeparatrixError(f"{record.file}: {edges.size} pulses, at least {_LEAST_TURNS} are needed")
+    if edges.size < RECORDS.fewest_pulses:
+        raise SeparatrixError(
+            f"{record.file}: {edges.size} pulses, at least {RECORDS.fewest_pulses} are needed"
+        )
     share = (middle - level[edges]) / (level[edges + 1] - level[edges])
     digital = np.unique(level).size == 2
     at = t[edges] + (0.5 if digital else share) * record.interval

@@ -14,10 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from separatrix.discovery.measured.records import Record
+from separatrix.discovery.measured.signals import FOURTH
 from separatrix.discovery.policy import RECORDS
-
-# sum of the squares of 1, -4, 6, -4, 1
-_FOURTH = 70.0
 
 
 def block_length(record: Record, columns: dict[str, np.ndarray], sigmas: dict[str, float]) -> int:
@@ -69,7 +67,7 @@ def smooth_rows(means: list[np.ndarray], sigma: float) -> np.ndarray:
     for one in means:
         smooth = np.ones(one.size, bool)
         if one.size >= 5:
-            rough = np.flatnonzero(np.abs(np.diff(one, 4)) > RECORDS.rough * np.sqrt(_FOURTH) * sigma)
+            rough = np.flatnonzero(np.abs(np.diff(one, 4)) > RECORDS.rough * np.sqrt(FOURTH) * sigma)
             for shift in (1, 2, 3):
                 smooth[rough + shift] = False
         found.append(smooth)

@@ -35,6 +35,9 @@ class Fit:
         "share of an interval over which an acceleration is a slope")
     slope_angle: float = row(1e-3, "rad", "rounding", "the same of the drive")
     joint_step: float = row(1e-6, "1", "rounding", "relative step of a parameter of a joint")
+    # fitting/crank_data.py
+    zero_step: float = row(0.05, "rad", "effort",
+        "step to which the zero of pulses is tried out before it is fitted")
     # fitting/curves.py
     knots: tuple = row((3, 5, 8, 12), "1", "campaign", "numbers of knots of a table that are tried")
     impacts_per_knot: int = row(3, "1", "test", "impacts per knot")

@@ -94,7 +94,10 @@ class Records:
     most_of_bodies: int = row(50_000, "sample", "effort", "longest record of several bodies")
     # measured/cranks.py
     steady_voltage: float = row(0.01, "1", "rig", "slow change of a voltage over its mean in one record")
+    fewest_pulses: int = row(4, "1", "test", "least pulses of the crank in a record")
     # measured/signals.py
+    clipped_noise: float = row(3.0, "1", "test",
+        "standard deviations within which fourth differences are noise")
     in_motion: float = row(0.9, "1", "campaign", "quantile of accelerations that motion reaches")
     moving_share: float = row(0.3, "1", "campaign",
         "share of this quantile that is their usual size where a body mostly rests")

@@ -174,6 +174,8 @@ class Search:
     memory_closed: float = row(0.5, "1", "test", "share of a gap that a law with memory must close")
     memory_odds: float = row(3.0, "1", "test", "difference of two laws, stroke by stroke, over its error")
     memory_alike: float = row(1.1, "1", "test", "ratio of what two laws leave that does not distinguish them")
+    memory_knots: int = row(12, "1", "campaign", "knots of a force without memory, over speed and position")
+    memory_ridge: float = row(1e-7, "1", "rounding", "least weight of an unknown that no sample determines")
     # decision/stages/several_effects.py
     closes_held_out: float = row(0.5, "1", "campaign",
         "share of a held-out gap that another effect must close")
