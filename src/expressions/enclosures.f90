@@ -9,7 +9,7 @@
 !> where they are too coarse, those of the step's own box decide.
 module enclosures
   use bernstein, only: bernstein_of
-  use intervals, only: interval_t
+  use intervals, only: hull, interval_t
   use kinds, only: wp
   use tape, only: tape_t
   use tape_bounds, only: bound_coefficients
@@ -21,12 +21,18 @@ module enclosures
 
   !> The last term of a step is then some epsilon of the first.
   integer, parameter, public :: series_order = merge(20, 36, epsilon(1.0_wp) > 1e-20_wp)
+  !> Terms up to this order count with their signs where the range of a polynomial is sought.
+  integer, parameter :: hull_order = 10
   !> Margins of enclosures, as parts of the state.
   real(wp), parameter, public :: widest_margin = epsilon(1.0_wp)**0.6_wp, least_margin = 16*epsilon(1.0_wp)
   !> Bounds over a box around several steps serve if the remainder is less than this part of its margin.
   real(wp), parameter :: most_excess = 0.25_wp
   !> Such a box is wider than the step's own by so many of its widths, on each side: more of them as long as bounds serve.
-  real(wp), parameter :: least_widening = 1, most_widening = 64
+  real(wp), parameter :: least_widening = 4, most_widening = 64
+  !> Otherwise the box may be that of a longer step, of at most so many: by one more where the remainder is less than this part of
+  !> its margin.
+  integer, parameter :: most_ahead = 4
+  real(wp), parameter :: little_excess = 1e-4_wp
   !> Most steps until a wider box is tried again.
   integer, parameter :: longest_wait = 64
 
@@ -43,6 +49,8 @@ module enclosures
     !> Steps until a wider box is tried again, and how many it will be then.
     integer :: wait = 0, next_wait = 1
     real(wp) :: widening = 16
+    !> Steps that the box is for where it is not wider.
+    integer :: ahead = 1
   end type bounds_t
 
   type, public :: enclosure_t
@@ -104,6 +112,7 @@ contains
     around%bounds%wait = first%bounds%wait
     around%bounds%next_wait = first%bounds%next_wait
     around%bounds%widening = first%bounds%widening
+    around%bounds%ahead = first%bounds%ahead
   end subroutine restart_enclosure
 
   !> Encloses a step: by the bounds there are, unless they are sought `anew`, or by new ones. `path`: the polynomials of the states
@@ -117,34 +126,93 @@ contains
     real(wp) :: margin(size(path, 2))
     around%is_own = .false.
     around%fault = 0
-    associate (bounds => around%bounds)
-      if (bounds%are_known .and. .not. anew) then
-        call range_by_sizes(path, around%margin, own, margin)
-        if (all(.not. around%matters .or. (own%low >= bounds%box%low .and. own%high <= bounds%box%high))) then
-          around%excess = excess_of(around, margin, step)
-          if (around%excess <= most_excess) return
-        end if
+    around%excess = huge(1.0_wp)
+    if (around%bounds%are_known .and. .not. anew) then
+      call range_by_sizes(path, around%margin, own, margin)
+      call try_known(own, margin, step, around)
+      if (around%excess <= most_excess) return
+    end if
+    call range_of_path(path, around%margin, own, margin)
+    if (.not. anew) then
+      if (around%bounds%are_known) call try_known(own, margin, step, around)
+      if (around%excess > most_excess) call try_wider(tape, parameters, own, margin, step, around)
+      if (around%excess > most_excess) call try_ahead(tape, parameters, path, own, margin, step, around)
+      if (around%excess <= most_excess) return
+    end if
+    around%is_own = .true.
+    call seek_bounds(tape, parameters, own, margin, step, around)
+    if (around%excess <= little_excess) around%bounds%ahead = max(2, around%bounds%ahead)
+  end subroutine enclose
+
+  !> The bounds there are, if they hold in a box.
+  pure subroutine try_known(own, margin, step, around)
+    type(interval_t), intent(in) :: own(:)
+    real(wp), intent(in) :: margin(:), step
+    type(enclosure_t), intent(inout) :: around
+    associate (box => around%bounds%box)
+      if (all(.not. around%matters .or. (own%low >= box%low .and. own%high <= box%high))) then
+        around%excess = excess_of(around, margin, step)
       end if
-      call range_by_hull(path, around%margin, own, margin)
-      bounds%wait = bounds%wait - 1
-      if (bounds%wait <= 0 .and. .not. anew) then
-        call find_bounds(tape, parameters, widened(own, bounds%widening), step, around)
-        if (around%fault == 0) around%excess = excess_of(around, margin, step)
-        if (around%fault == 0 .and. around%excess <= most_excess) then
-          bounds%next_wait = 1
-          bounds%widening = min(most_widening, 2*bounds%widening)
-          return
-        end if
+    end associate
+  end subroutine try_known
+
+  !> Bounds over a box wider than a step's own.
+  pure subroutine try_wider(tape, parameters, own, margin, step, around)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: parameters(:), margin(:), step
+    type(interval_t), intent(in) :: own(:)
+    type(enclosure_t), intent(inout) :: around
+    around%bounds%wait = around%bounds%wait - 1
+    if (around%bounds%wait > 0) return
+    call seek_bounds(tape, parameters, widened(own, around%bounds%widening), margin, step, around)
+    associate (bounds => around%bounds)
+      if (around%excess <= most_excess) then
+        bounds%next_wait = 1
+        bounds%widening = min(most_widening, 2*bounds%widening)
+      else
         bounds%widening = max(least_widening, bounds%widening/4)
         bounds%wait = bounds%next_wait
         bounds%next_wait = min(longest_wait, 2*bounds%next_wait)
       end if
-      around%is_own = .true.
-      around%excess = huge(1.0_wp)
-      call find_bounds(tape, parameters, own, step, around)
-      if (around%fault == 0) around%excess = excess_of(around, margin, step)
     end associate
-  end subroutine enclose
+  end subroutine try_wider
+
+  !> Bounds over the box of a longer step, where these proved shorter ones.
+  pure subroutine try_ahead(tape, parameters, path, own, margin, step, around)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: parameters(:), path(0:, :), margin(:), step
+    type(interval_t), intent(in) :: own(:)
+    type(enclosure_t), intent(inout) :: around
+    type(interval_t) :: further(size(own))
+    real(wp) :: longer(0:ubound(path, 1), size(own)), widths(size(own)), power
+    integer :: k
+    if (around%bounds%ahead <= 1) return
+    power = 1
+    do k = 0, ubound(path, 1)
+      longer(k, :) = path(k, :)*power
+      power = power*around%bounds%ahead
+    end do
+    call range_of_path(longer, around%margin, further, widths)
+    call seek_bounds(tape, parameters, hull(own, further), margin, step, around)
+    associate (bounds => around%bounds)
+      if (around%excess > most_excess) then
+        bounds%ahead = bounds%ahead - 1
+      else if (around%excess <= little_excess) then
+        bounds%ahead = min(most_ahead, bounds%ahead + 1)
+      end if
+    end associate
+  end subroutine try_ahead
+
+  !> Bounds over a box, and what they make of a step.
+  pure subroutine seek_bounds(tape, parameters, box, margin, step, around)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: parameters(:), margin(:), step
+    type(interval_t), intent(in) :: box(:)
+    type(enclosure_t), intent(inout) :: around
+    around%excess = huge(1.0_wp)
+    call find_bounds(tape, parameters, box, step, around)
+    if (around%fault == 0) around%excess = excess_of(around, margin, step)
+  end subroutine seek_bounds
 
   pure elemental type(interval_t) function widened(own, widening)
     type(interval_t), intent(in) :: own
@@ -168,21 +236,32 @@ contains
     end do
   end subroutine range_by_sizes
 
-  !> Closer ranges, by the hulls of the polynomials.
-  pure subroutine range_by_hull(path, share, box, margin)
+  !> Closer ranges: where a polynomial rises or falls throughout, of its ends, otherwise by its hull. Of terms
+  !> of high orders the magnitudes serve.
+  pure subroutine range_of_path(path, share, box, margin)
     real(wp), intent(in) :: path(0:, :), share
     type(interval_t), intent(out) :: box(:)
     real(wp), intent(out) :: margin(:)
-    real(wp) :: b(0:ubound(path, 1))
-    integer :: i
+    real(wp) :: b(0:hull_order), total, rest
+    integer :: i, k
     real(wp), parameter :: least = 1e-70_wp
     do i = 1, size(box)
-      b = bernstein_of(path(:, i))
-      box(i) = interval_t(minval(b), maxval(b))
+      total = 0
+      do k = 2, ubound(path, 1)
+        total = total + k*abs(path(k, i))
+      end do
+      if (abs(path(1, i)) >= total) then
+        total = sum(path(:, i))
+        box(i) = interval_t(min(path(0, i), total), max(path(0, i), total))
+      else
+        b = bernstein_of(path(:hull_order, i))
+        rest = sum(abs(path(hull_order + 1:, i)))
+        box(i) = interval_t(minval(b) - rest, maxval(b) + rest)
+      end if
       margin(i) = share*max(abs(box(i)%low), abs(box(i)%high)) + least
       box(i) = interval_t(box(i)%low - margin(i), box(i)%high + margin(i))
     end do
-  end subroutine range_by_hull
+  end subroutine range_of_path
 
   !> Bounds over a box, in a unit of time near the step.
   pure subroutine find_bounds(tape, parameters, box, step, around)

@@ -11,8 +11,8 @@ module series_flight
   use enclosures, only: bounds_t, enclose, enclosure_t, forget_bounds, least_margin, prepare_enclosure, restart_enclosure, &
     series_order, widest_margin
   use kinds, only: wp
-  use operations, only: op_add, op_select, op_subtract, op_variable
-  use step_length, only: is_plain, natural_step
+  use operations, only: op_select, op_variable
+  use step_length, only: is_plain, natural_step, size_of_arguments, sum_of_sizes
   use tape, only: tape_t
   use tape_series, only: expand, prepare_series, series_t
   use tape_value, only: evaluate
@@ -223,7 +223,7 @@ contains
       if (status == flight_no_progress .or. status == flight_left_domain) return
       flight%steps = flight%steps + 1
       before = flight%time
-      call move(flight, step*min(fraction, 1.0_wp))
+      call move(flight, step, min(fraction, 1.0_wp))
       idle = merge(0, idle + 1, flight%time > before)
       if (fraction > 1 .and. step >= longest) flight%time = until
       flight%zeros = merge(1, 0, flight%crossed)
@@ -246,7 +246,7 @@ contains
       if (.not. flight%is_active(g) .or. flight%zeros(g) > 0) cycle
       value = flight%series%c(0, flight%guards(g)%node)
       slope = flight%series%c(1, flight%guards(g)%node)/flight%series%unit
-      rounding = 16*epsilon(1.0_wp)*(size_of_arguments(flight, flight%series%c(0, :), flight%guards(g)%node) + &
+      rounding = 16*epsilon(1.0_wp)*(size_of_arguments(flight%tape, flight%series%c(0, :), flight%guards(g)%node) + &
                                      abs(slope*flight%time))
       if (abs(value) > rounding) cycle
       if (g > own) then
@@ -283,7 +283,7 @@ contains
       m = min(flight%zeros(g), series_order)
       value = flight%series%c(m, flight%guards(g)%node)
       rounding = 0
-      if (m == 0) rounding = 8*epsilon(1.0_wp)*size_of_arguments(flight, flight%series%c(0, :), flight%guards(g)%node)
+      if (m == 0) rounding = 8*epsilon(1.0_wp)*size_of_arguments(flight%tape, flight%series%c(0, :), flight%guards(g)%node)
       if (abs(value) > rounding .and. ((value > 0) .neqv. flight%series%branches(k) > 0)) branches_agree = .false.
     end do
   end function branches_agree
@@ -325,10 +325,11 @@ contains
         ! What the remainder allows: it grows with the step to the power of its order.
         scaling = exponential(logarithm(0.5_wp/max(around%excess, 1e-90_wp))/(series_order + 1))
         flight%proven = merge(step/natural*scaling, max(flight%proven, step/natural*scaling), around%is_own)
-        ! Less than 1 by far more than rounding of the polynomials.
+        ! Less than 1 by far more than rounding of the polynomials. The same bounds prove a step that is a little shorter.
         if (around%excess > 0.9_wp) then
-          step = step*max(0.25_wp, min(0.9_wp, scaling))
-          cycle
+          step = step*max(0.25_wp, scaling)
+          if (scaling < 0.5_wp) cycle
+          call set_path(flight, step)
         end if
         call find_crossing(flight, step, fraction, is_certain)
         if (is_certain .and. fraction <= 1) status = flight_crossed
@@ -409,51 +410,46 @@ contains
     integer :: k, m, node
     node = flight%guards(g)%node
     m = min(flight%zeros(g), series_order)
-    total = 0
+    at = 2
+    rounding = 0
+    is_proven = .true.
     p = flight%series%c(:, node)*flight%powers
+    if (m == 0) then
+      rounding = epsilon(1.0_wp)*size_of_arguments(flight%tape, flight%around%bounds%first, node)
+      total = sum_of_sizes(p)
+      ! The first term outweighs all others.
+      if (abs(p(0)) > total + remainder + rounding + (series_order + 2)*epsilon(1.0_wp)*(abs(p(0)) + total)) return
+    end if
+    total = 0
     do k = m, series_order
       total = total + (k + 1)*abs(p(k))
     end do
-    rounding = epsilon(1.0_wp)*total
-    if (m == 0) rounding = rounding + epsilon(1.0_wp)*size_of_arguments(flight, flight%around%bounds%first, node)
+    rounding = rounding + epsilon(1.0_wp)*total
     p(:series_order - m) = p(m:)
     p(series_order - m + 1:) = 0
     total = remainder + rounding
-    at = 2
-    is_proven = .true.
-    ! The first term outweighs all others.
-    if (abs(p(0)) > sum(abs(p(1:))) + total) return
+    if (abs(p(0)) > sum_of_sizes(p) + total) return
     call first_crossing(p, total, (series_order + 1 + m)*total, flight%guards(g)%direction, at, is_proven)
   end subroutine cross
 
-  !> Magnitude of what a guard is a sum of, from those of all nodes: it may be far larger than the sum.
-  pure real(wp) function size_of_arguments(flight, size_of, node)
-    type(flight_t), intent(in) :: flight
-    real(wp), intent(in) :: size_of(:)
-    integer, intent(in) :: node
-    associate (it => flight%tape%nodes(node))
-      size_of_arguments = abs(size_of(node))
-      if (it%operation == op_add .or. it%operation == op_subtract) then
-        size_of_arguments = abs(size_of(it%first)) + abs(size_of(it%second))
-      end if
-    end associate
-  end function size_of_arguments
-
-  !> State and time after a part of a step.
-  pure subroutine move(flight, step)
+  !> State and time after a fraction of the step whose path there is.
+  pure subroutine move(flight, step, fraction)
     type(flight_t), intent(inout) :: flight
-    real(wp), intent(in) :: step
-    real(wp) :: total
+    real(wp), intent(in) :: step, fraction
+    real(wp) :: total, power(0:series_order)
     integer :: i, k
-    call set_path(flight, step)
+    power(0) = 1
+    do k = 1, series_order
+      power(k) = power(k - 1)*fraction
+    end do
     do i = 1, size(flight%rates)
       total = 0
       do k = series_order, 0, -1
-        total = total + flight%path(k, i)
+        total = total + flight%path(k, i)*power(k)
       end do
       flight%state(i) = total
     end do
-    flight%time = flight%time + step
+    flight%time = flight%time + step*fraction
   end subroutine move
 
   !> Takes over bounds that a motion with the same tape, rates and guards has left, if it had the same parameters and branches.

@@ -1,7 +1,7 @@
 ! SPDX-FileCopyrightText: The Separatrix developers
 ! SPDX-License-Identifier: GPL-3.0-or-later
 
-!> Length of a Taylor step from its last coefficients (Jorba & Zou 2005).
+!> Length of a Taylor step from its last coefficients (Jorba & Zou 2005), and sizes of what a function is a sum of.
 module step_length
   use elementary, only: exponential
   use kinds, only: int64, real64, wp
@@ -11,15 +11,18 @@ module step_length
   implicit none
   private
 
-  public :: natural_step, is_plain
+  public :: natural_step, is_plain, size_of_arguments, sum_of_sizes
 
   integer :: i
   !> Products cost less than quotients.
   integer, parameter :: most_order = 64
   real(wp), parameter :: inverse(most_order) = [(1.0_wp/i, i=1, most_order)]
-  !> Logarithms are rough: double precision serves them in quadruple precision, too, where its arithmetic is slow.
-  real(real64), parameter :: rough_inverse(most_order) = [(1.0_real64/i, i=1, most_order)]
+  !> Logarithms are rough: double precision serves them in quadruple precision, too, where its arithmetic is slow. From 1/most_order
+  !> to 1.
+  real(real64), parameter :: rising_inverse(0:most_order - 1) = [(1.0_real64/(most_order - i), i=0, most_order - 1)]
   real(real64), parameter :: log_epsilon = (exponent(epsilon(1.0_wp)) - 1)*0.693147180559945_real64
+  !> Of zero.
+  real(real64), parameter :: none = -1e30_real64
 
 contains
 
@@ -34,7 +37,6 @@ contains
     ! Its powers must not overflow.
     real(real64), parameter :: most = 30
     reach = most
-    ! First those that are mostly the shortest: others then need fewer logarithms.
     do i = 1, size(others)
       call shorten(series%c(:, others(i)), series%order, reach)
     end do
@@ -43,7 +45,7 @@ contains
         if (all(abs(rate(n - 4:n)) <= 0)) cycle
         terms(0) = state(i)
         do k = 1, n
-          terms(k) = series%unit*rate(k)*inverse(k)
+          terms(k) = (series%unit*rate(k))*inverse(k)
         end do
       end associate
       call shorten(terms, series%order, reach)
@@ -59,19 +61,16 @@ contains
     real(real64), intent(inout) :: reach
     real(real64) :: size_of(0:most_order/2), last, longest
     integer :: k, j, known
-    real(real64), parameter :: none = -1e30_real64
     known = -1
     do k = order - 4, order
-      if (.not. abs(terms(k)) > 0) cycle
       last = rough_logarithm(abs(terms(k)))
-      longest = -huge(longest)
+      if (last <= none) cycle
+      longest = none
       do j = 0, order/2
-        if (j > known) then
-          known = j
-          size_of(j) = none
-          if (abs(terms(j)) > 0) size_of(j) = rough_logarithm(abs(terms(j)))
-        end if
-        longest = max(longest, log_epsilon*rough_inverse(order - j) + (size_of(j) - last)*rough_inverse(k - j))
+        if (j > known) size_of(j) = rough_logarithm(abs(terms(j)))
+        known = max(known, j)
+        longest = max(longest, log_epsilon*rising_inverse(most_order - order + j) + &
+                      (size_of(j) - last)*rising_inverse(most_order - k + j))
         if (longest >= reach) exit
       end do
       if (longest < reach) then
@@ -95,21 +94,44 @@ contains
     is_plain = (is_variable(1) .and. is_steady(2)) .or. (is_steady(1) .and. is_variable(2))
   end function is_plain
 
-  !> Logarithm of x > 0 to 0.06, by the exponent and a line; in double precision from the bits of normal numbers, without a call.
+  !> Sum of the magnitudes of all terms but the first, in four parts: additions need not wait for each other.
+  pure real(wp) function sum_of_sizes(p) result(total)
+    real(wp), intent(in) :: p(0:)
+    real(wp) :: parts(4)
+    integer :: k
+    parts = 0
+    do k = 1, ubound(p, 1) - 3, 4
+      parts = parts + abs(p(k:k + 3))
+    end do
+    total = (parts(1) + parts(2)) + (parts(3) + parts(4))
+    do k = ubound(p, 1) - modulo(ubound(p, 1), 4) + 1, ubound(p, 1)
+      total = total + abs(p(k))
+    end do
+  end function sum_of_sizes
+
+  !> Magnitude of what a node is a sum of, from those of all nodes: it may be far larger than the sum.
+  pure real(wp) function size_of_arguments(tape, size_of, node)
+    type(tape_t), intent(in) :: tape
+    real(wp), intent(in) :: size_of(:)
+    integer, intent(in) :: node
+    associate (it => tape%nodes(node))
+      size_of_arguments = abs(size_of(node))
+      if (it%operation == op_add .or. it%operation == op_subtract) then
+        size_of_arguments = abs(size_of(it%first)) + abs(size_of(it%second))
+      end if
+    end associate
+  end function size_of_arguments
+
+  !> Logarithm of x >= 0 to 0.06, by the exponent and a line; in double precision from the bits, which rise with it, without a call.
   pure elemental real(real64) function rough_logarithm(x)
     real(wp), intent(in) :: x
-    integer(int64) :: bits
-    real(real64) :: mantissa
-    integer :: power
+    real(real64) :: binary
     if (digits(x) == 53) then
-      bits = transfer(real(x, real64), 0_int64)
-      mantissa = transfer(ior(iand(bits, ishft(1_int64, 52) - 1), ishft(1022_int64, 52)), 0.0_real64)
-      power = int(ishft(bits, -52)) - 1022
+      binary = real(transfer(real(x, real64), 0_int64), real64)*2.0_real64**(-52) - 1023
     else
-      mantissa = real(fraction(x), real64)
-      power = exponent(x)
+      binary = exponent(x) + 2*real(fraction(x), real64) - 2
     end if
-    rough_logarithm = (power + 2*mantissa - 2)*0.693147180559945_real64
+    rough_logarithm = merge(binary*0.693147180559945_real64, none, x > 0)
   end function rough_logarithm
 
 end module step_length
