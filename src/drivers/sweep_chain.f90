@@ -126,7 +126,7 @@ contains
     real(wp) :: limits(limit_numbers, size(values)), visited(size(values))
     type(hold_t) :: held
     type(settled_t) :: settled(size(values))
-    type(section_state_t) :: state
+    type(section_state_t), allocatable :: state
     integer :: i, k, found, before, mark
     logical :: changed
     found = 0
@@ -135,11 +135,8 @@ contains
     visited = merge(values, values(size(values):1:-1), up)
     do i = 1, size(values)
       k = merge(i, size(values) + 1 - i, up)
-      if (before == 0) then
-        call hold_parameter(grid, span, path, visited(i), samples, longest, held, error)
-      else
-        call hold_parameter(grid, span, path, visited(i), samples, longest, held, error, state)
-      end if
+      ! The first hold has no state to go on from.
+      call hold_parameter(grid, span, path, visited(i), samples, longest, held, error, state)
       if (allocated(error)) return
       settled(i) = held%settled
       holds(:hold_numbers, k) = numbers_of(held)

@@ -159,18 +159,16 @@ contains
     type(section_state_t) :: section
     logical :: ok
     type(multibody_state_t) :: from
-    ok = allocated(before%multibody)
-    if (ok) then
-      from = before%multibody
-      allocate (section%multibody)
-      associate (machine => self%bodies%machine, n => self%bodies%machine%n)
-        if (self%has_driver) from%q(:n) = from%q(:n) - machine%driver%running*from%clock
-        call start_multibody(self%bodies, from%q(:n), from%v(:n), angle, section%multibody, ok)
-        section%multibody%slider = before%multibody%slider
-        section%multibody%integral = before%multibody%integral
-        section%state = watched_state(machine, section%multibody)
-      end associate
-    end if
+    call self%start([before%state%x, before%state%v, angle], section)
+    if (.not. allocated(before%multibody)) return
+    from = before%multibody
+    associate (machine => self%bodies%machine, n => self%bodies%machine%n)
+      if (self%has_driver) from%q(:n) = from%q(:n) - machine%driver%running*from%clock
+      call start_multibody(self%bodies, from%q(:n), from%v(:n), angle, section%multibody, ok)
+      section%multibody%slider = from%slider
+      section%multibody%integral = from%integral
+      section%state = watched_state(machine, section%multibody)
+    end associate
     if (.not. ok) call self%start([before%state%x, before%state%v, angle], section)
   end function resume
 
